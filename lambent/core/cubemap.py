@@ -1,0 +1,55 @@
+"""Cube maps: which direction a texel looks in. One truth for the bake, the shaders and the benches.
+
+Faces in the order +x, -x, +y, -y, +z, -z, rows from the top, exactly as WebGPU samples a cube texture: an array of
+shape (6, N, N, C) uploaded layer by layer is read back by `textureSample(cube, s, direction)` with world directions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.floating]
+
+
+def face_directions(n: int) -> Floats:
+    """(6, n, n, 3) directions of the texel centres, scaled so that the largest component is 1 (not unit vectors)."""
+    c = (np.arange(n) + 0.5) / n * 2 - 1
+    s, t = np.meshgrid(c, c)
+    one = np.ones_like(s)
+    faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
+    return np.stack([np.stack(face, axis=-1) for face in faces])
+
+
+def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
+    """Directions (..., 3) (largest component 1) at face coordinates s, t in [-1, 1], t downwards."""
+    one = np.ones_like(s)
+    all_faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
+    stacked = np.stack([np.stack(f, axis=-1) for f in all_faces])
+    return np.asarray(np.take_along_axis(stacked, face[None, ..., None], axis=0)[0])
+
+
+def texel_solid_angles(n: int) -> Floats:
+    """(n, n) solid angles of one face's texels in sr, approximated at the centre; the six faces sum to 4 pi."""
+    c = (np.arange(n) + 0.5) / n * 2 - 1
+    s, t = np.meshgrid(c, c)
+    omega = (2 / n) ** 2 / (1 + s * s + t * t) ** 1.5
+    return np.asarray(omega * (4 * np.pi / 6 / omega.sum()))
+
+
+def sample(cube: Floats, w: Floats) -> Floats:
+    """Bilinear look-up, clamped within each face: (..., C) of cube (6, n, n, C) at directions w (..., 3)."""
+    n = cube.shape[1]
+    x, y, z = w[..., 0], w[..., 1], w[..., 2]
+    axis = np.argmax(np.abs(w), axis=-1)
+    major = np.take_along_axis(w, axis[..., None], axis=-1)[..., 0]
+    face = axis * 2 + (major < 0)
+    s = np.choose(face, [-z, z, x, x, x, -x]) / np.abs(major)
+    t = np.choose(face, [-y, -y, z, -z, -y, -y]) / np.abs(major)
+    column, row = ((np.stack([s, t]) + 1) / 2 * n - 0.5).clip(0, n - 1)
+    c0, r0 = np.floor(column).astype(int), np.floor(row).astype(int)
+    c1, r1 = np.minimum(c0 + 1, n - 1), np.minimum(r0 + 1, n - 1)
+    fc, fr = (column - c0)[..., None], (row - r0)[..., None]
+    top = cube[face, r0, c0] * (1 - fc) + cube[face, r0, c1] * fc
+    bottom = cube[face, r1, c0] * (1 - fc) + cube[face, r1, c1] * fc
+    return np.asarray(top * (1 - fr) + bottom * fr)

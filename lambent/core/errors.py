@@ -1,0 +1,57 @@
+"""The one exception for what a user can cause; everything else is a bug and keeps its traceback."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class UserError(Exception):
+    """Input that cannot be used, said in one line: file, field, found, expected, what to do.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, without a full stop.
+    file : path-like, optional
+        The file it is wrong in.
+    field : str, optional
+        The field, key, option or line within the file.
+    got, expected : object, optional
+        What was found there and what belongs there.
+    hint : str, optional
+        What the user can do about it.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | Path | None = None,
+        field: str | None = None,
+        got: object = None,
+        expected: object = None,
+        hint: str | None = None,
+    ) -> None:
+        self.message, self.file, self.field = message, file, field
+        self.got, self.expected, self.hint = got, expected, hint
+        parts = [f"{file}: " if file is not None else "", f"{field}: " if field is not None else "", message]
+        if got is not None:
+            parts.append(f"; found {_short(got)}")
+        if expected is not None:
+            parts.append(f"; expected {_short(expected)}")
+        if hint is not None:
+            parts.append(f"; {hint}")
+        super().__init__("".join(parts).replace("\n", " "))
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """Hint for an unknown name, or None when nothing is close."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f"did you mean {close[0]!r}?" if close else None
+
+
+def _short(value: object, limit: int = 120) -> str:
+    text = str(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,51 @@
+"""Directions and angles.
+
+Conventions of the whole project: local frame (t, b, n) with n = +z; unit vectors of shape (..., 3) point away from the
+surface; `wi` to the light, `wo` to the viewer; theta from n, phi from t. World space is right-handed, y up, metres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.floating]
+
+
+def direction(theta_rad: ArrayLike, phi_rad: ArrayLike) -> Floats:
+    """Unit vectors (..., 3) in the local frame from spherical angles in radians."""
+    theta, phi = np.broadcast_arrays(np.asarray(theta_rad, float), np.asarray(phi_rad, float))
+    sin_theta = np.sin(theta)
+    return np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def angles(w: Floats) -> tuple[Floats, Floats]:
+    """(theta, phi) in radians of unit vectors (..., 3); theta in [0, pi], phi in [0, 2 pi).
+
+    theta by atan2, because arccos(z) loses half the digits near the normal.
+    """
+    theta = np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2])
+    return theta, np.arctan2(w[..., 1], w[..., 0]) % (2 * np.pi)
+
+
+def normalize(v: Floats) -> Floats:
+    """`v` (..., 3) at unit length; the zero vector stays zero."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    unit: Floats = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
+    return unit
+
+
+def reflect(w: Floats, about: Floats) -> Floats:
+    """`w` mirrored about the unit axis `about`: 2 (w.a) a - w."""
+    mirrored: Floats = 2 * np.sum(w * about, axis=-1, keepdims=True) * about - w
+    return mirrored
+
+
+def basis(n: Floats) -> tuple[Floats, Floats]:
+    """Tangents (t, b) that complete unit normals (..., 3) to right-handed frames (Duff et al. 2017, listing 3)."""
+    sign = np.where(n[..., 2] >= 0, 1.0, -1.0)
+    a = -1.0 / (sign + n[..., 2])
+    c = n[..., 0] * n[..., 1] * a
+    t = np.stack([1 + sign * n[..., 0] ** 2 * a, sign * c, -sign * n[..., 0]], axis=-1)
+    b = np.stack([c, sign + n[..., 1] ** 2 * a, -n[..., 1]], axis=-1)
+    return t, b

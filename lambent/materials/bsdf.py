@@ -1,0 +1,115 @@
+"""A whole material as a BSDF: diffuse terms plus lobes, one mixture for eval, sample and pdf.
+
+Same array-library rule as lobes.py: directions are component tuples, `ops` names the library.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.materials import lobes
+from lambent.materials.document import Material
+from lambent.materials.lobes import COS_MIN, NUMPY, Vector
+
+Floats = NDArray[np.floating]
+
+
+def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Vector:
+    """f in 1/sr per RGB channel, without the cosine (3.6)."""
+    same, across = wi[2] * wo[2] > 0, wi[2] * wo[2] < 0
+    value = [
+        ops.select(same, material.kd[c] / np.pi, 0.0) + ops.select(across, material.kt_d[c] / np.pi, 0.0)
+        for c in range(3)
+    ]
+    for lobe in material.lobes:
+        value = [v + f for v, f in zip(value, lobes.evaluate(wi, wo, lobe, ops), strict=True)]
+    return value[0], value[1], value[2]
+
+
+def _mean(rgb: tuple[float, float, float]) -> float:
+    return sum(rgb) / 3
+
+
+def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
+    """Probability of each component at `wo`: diffuse reflection, diffuse transmission, then the lobes.
+
+    A function of wo alone, roughly the energy each component returns, so the mixture pdf stays exact.
+    """
+    cos_o = ops.abs(wo[2])
+    weights: list[Any] = [_mean(material.kd) + 0 * cos_o, _mean(material.kt_d) + 0 * cos_o]
+    for lobe in material.lobes:
+        f = lobes.fresnel(cos_o, _mean(lobe.r0), ops)
+        weights.append(_mean(lobe.k) * (f if lobe.side == "reflection" else 1 - f))
+    total = sum(weights[1:], weights[0])
+    scale = ops.select(total > 0, 1 / ops.maximum(total, 1e-12), 0.0)
+    return [w * scale for w in weights]
+
+
+def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
+    """Density in 1/sr of `sample`."""
+    chosen = selection(wo, material, ops)
+    cosine = ops.abs(wi[2]) / np.pi
+    value = ops.select(wi[2] * wo[2] > 0, chosen[0] * cosine, 0.0)
+    value = value + ops.select(wi[2] * wo[2] < 0, chosen[1] * cosine, 0.0)
+    for p, lobe in zip(chosen[2:], material.lobes, strict=True):
+        value = value + p * lobes.pdf(wi, wo, lobe, ops)
+    return ops.select(ops.abs(wo[2]) > COS_MIN, value, 0.0)
+
+
+def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops: Any = NUMPY) -> Vector:
+    """wi of the mixture; u_* uniform in [0, 1). Directions of zero value come back with pdf or value 0."""
+    chosen = selection(wo, material, ops)
+    side = ops.select(wo[2] > 0, 1.0, -1.0)
+    r, phi = ops.sqrt(u1), 2 * np.pi * u2
+    x, y, z = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(ops.maximum(1 - u1, 0.0))
+    up_to = chosen[0]
+    z = ops.select(u_select < up_to, z, -z) * side
+    up_to = up_to + chosen[1]
+    for p, lobe in zip(chosen[2:], material.lobes, strict=True):
+        lx, ly, lz = lobes.sample(wo, u1, u2, lobe, ops)
+        here = u_select >= up_to
+        x, y, z = ops.select(here, lx, x), ops.select(here, ly, y), ops.select(here, lz, z)
+        up_to = up_to + p
+    return x, y, z
+
+
+def components(w: Floats) -> Vector:
+    """(..., 3) array as a component tuple."""
+    return w[..., 0], w[..., 1], w[..., 2]
+
+
+class MaterialBSDF:
+    """The array face of a material: (..., 3) arrays in, arrays out; float64 inside."""
+
+    def __init__(self, material: Material) -> None:
+        self.material = material
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr, without the cosine."""
+        return np.stack(evaluate(components(wi), components(wo), self.material), axis=-1)
+
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        """Density (...) in 1/sr of `sample` given wo."""
+        value: Floats = np.asarray(pdf(components(wi), components(wo), self.material))
+        return value
+
+    def sample(self, wo: Floats, u: Floats) -> Floats:
+        """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1)."""
+        return np.stack(sample(components(wo), u[..., 0], u[..., 1], u[..., 2], self.material), axis=-1)
+
+    def albedo(self, wo: Floats, samples: int = 4096, seed: int = 0) -> Floats:
+        """Directional albedo (..., 3) of wo (..., 3): the integral of f |cos| over all wi, by importance sampling."""
+        u = np.random.default_rng(seed).random((samples, 3))
+        wo_all = np.broadcast_to(wo[..., None, :], (*wo.shape[:-1], samples, 3))
+        wi = self.sample(wo_all, np.broadcast_to(u, wo_all.shape))
+        p = self.pdf(wi, wo_all)
+        weight = np.divide(np.abs(wi[..., 2]), p, out=np.zeros_like(p), where=p > 0)
+        return np.asarray((self.eval(wi, wo_all) * weight[..., None]).mean(axis=-2))
+
+
+def specular_only(material: Material) -> Material:
+    """The material without its diffuse terms."""
+    return material.model_copy(update={"kd": (0.0, 0.0, 0.0), "kt_d": (0.0, 0.0, 0.0)})

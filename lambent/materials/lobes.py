@@ -1,0 +1,136 @@
+"""The Kurt lobe: eval, sample, pdf. One truth for numpy and for the JIT path tracer; lobes.wgsl is its sibling.
+
+Every function takes directions as (x, y, z) component tuples and `ops`, the array library they belong to: `NUMPY`
+here, or any module with the same names (drjit has them). So the maths stands once and traces in the path tracer.
+
+Sources: Kurt, Szirmay-Kalos & Krivanek 2010, "An anisotropic BRDF model for fitting and Monte Carlo rendering";
+thesis M ("Real-time rendering of measured materials"), equations in parentheses. GGX: Walter et al. 2007, eq. 33.
+
+Hazard: tan^2(theta_h) and 1 - cos^2(theta_h) cancel in float32 at low roughness; everything here is built from
+hx^2, hy^2 and hz of the half vector instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lambent.materials.document import Lobe
+
+Vector = tuple[Any, Any, Any]  # components x, y, z: floats or arrays of one shape
+COS_MIN = 1e-4  # directions closer to the horizon than this carry no lobe (the cosine power diverges there)
+
+
+@dataclass(frozen=True)
+class ArrayOps:
+    """The few array functions the maths needs, under drjit's names."""
+
+    exp: Callable[..., Any]
+    log: Callable[..., Any]
+    sqrt: Callable[..., Any]
+    sin: Callable[..., Any]
+    cos: Callable[..., Any]
+    power: Callable[..., Any]
+    abs: Callable[..., Any]
+    maximum: Callable[..., Any]
+    minimum: Callable[..., Any]
+    select: Callable[..., Any]
+
+
+NUMPY = ArrayOps(np.exp, np.log, np.sqrt, np.sin, np.cos, np.power, np.abs, np.maximum, np.minimum, np.where)
+
+
+def dot(a: Vector, b: Vector) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def half_vector(wi: Vector, wo: Vector, ops: Any = NUMPY) -> Vector:
+    """normalize(wi + wo); of opposite directions the result is finite but has no meaning."""
+    x, y, z = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
+    scale = 1 / ops.sqrt(ops.maximum(x * x + y * y + z * z, 1e-20))
+    return x * scale, y * scale, z * scale
+
+
+def fresnel(cos_d: Any, r0: Any, ops: Any = NUMPY) -> Any:
+    """Schlick's approximation (2.9); cos_d in [0, 1]."""
+    m = ops.maximum(1 - cos_d, 0.0)
+    m2 = m * m
+    return r0 + (1 - r0) * (m2 * m2 * m)
+
+
+def distribution(h: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
+    """Microfacet density D(h), 1/sr: Beckmann (3.3) or anisotropic GGX."""
+    hz2 = ops.maximum(h[2] * h[2], 1e-12)
+    slope2 = ((h[0] / lobe.mx) * (h[0] / lobe.mx) + (h[1] / lobe.my) * (h[1] / lobe.my)) / hz2
+    peak = 1 / (np.pi * lobe.mx * lobe.my * hz2 * hz2)
+    if lobe.distribution == "ggx":
+        return peak / ((1 + slope2) * (1 + slope2))
+    return peak * ops.exp(-slope2)
+
+
+def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
+    """h with density D(h) h_z from u1, u2 in [0, 1): (4.5, 4.6) in slopes, so that no quadrant can go wrong."""
+    u1 = ops.minimum(u1, 1 - 1e-7)
+    r = ops.sqrt(u1 / (1 - u1)) if lobe.distribution == "ggx" else ops.sqrt(-ops.log(1 - u1))
+    x = r * lobe.mx * ops.cos(2 * np.pi * u2)
+    y = r * lobe.my * ops.sin(2 * np.pi * u2)
+    scale = 1 / ops.sqrt(x * x + y * y + 1)
+    return x * scale, y * scale, scale
+
+
+def _same_side(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> tuple[Vector, Vector, Any]:
+    """wi and wo turned to the upper side (wi mirrored at the surface for transmission), and whether the lobe sees them.
+
+    The sheet is two-sided: a pair seen from below is the same pair seen from above.
+    """
+    across = lobe.side == "transmission"
+    same = wi[2] * wo[2] > 0
+    valid = (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN) & (~same if across else same)
+    return (wi[0], wi[1], ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2])), valid
+
+
+def shape(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> tuple[Any, Any]:
+    """The lobe without its Fresnel factor, D/(4 (wo.h) (cos_i cos_o)^alpha) in 1/sr, and cos_d = wo.h."""
+    wi, wo, valid = _same_side(wi, wo, lobe, ops)
+    h = half_vector(wi, wo, ops)
+    cos_d = dot(wo, h)
+    cosines = ops.power(ops.maximum(wi[2] * wo[2], 1e-12), lobe.alpha)
+    value = distribution(h, lobe, ops) / (4 * ops.maximum(cos_d, 1e-6) * cosines)
+    return ops.select(valid, value, 0.0), cos_d
+
+
+def tint(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
+    """k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5)."""
+    f = fresnel(cos_d, lobe.r0[channel], ops)
+    return lobe.k[channel] * (f if lobe.side == "reflection" else 1 - f)
+
+
+def evaluate(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
+    """f of one lobe in 1/sr per RGB channel, without the cosine (3.4, 3.5)."""
+    value, cos_d = shape(wi, wo, lobe, ops)
+    red, green, blue = (value * tint(cos_d, lobe, c, ops) for c in range(3))
+    return red, green, blue
+
+
+def sample(wo: Vector, u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
+    """wi = 2 (wo.h) h - wo (4.8), mirrored to the far side for transmission.
+
+    A direction that ends on the wrong side of the surface is returned as it is; `pdf` and `evaluate` are 0 there.
+    """
+    h = sample_half_vector(u1, u2, lobe, ops)
+    up = (wo[0], wo[1], ops.abs(wo[2]))
+    twice = 2 * dot(up, h)
+    x, y, z = twice * h[0] - up[0], twice * h[1] - up[1], twice * h[2] - up[2]
+    side = ops.select(wo[2] > 0, 1.0, -1.0) * (-1.0 if lobe.side == "transmission" else 1.0)
+    return x, y, z * side
+
+
+def pdf(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
+    """Density of `sample` in 1/sr: D h_z / (4 (wo.h)) (4.9)."""
+    wi, wo, valid = _same_side(wi, wo, lobe, ops)
+    h = half_vector(wi, wo, ops)
+    value = distribution(h, lobe, ops) * h[2] / (4 * ops.maximum(dot(wo, h), 1e-6))
+    return ops.select(valid, value, 0.0)

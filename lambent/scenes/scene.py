@@ -1,0 +1,136 @@
+"""What is there: the scene as every loader produces it and every bake consumes it.
+
+Conventions: world space is right-handed, y up, metres. Meshes are stored in world space (loaders apply transforms).
+Faces are counter-clockwise seen from the outside; normals unit; uv with v up. Radiance in W/(sr m^2), linear Rec.709.
+All dataclasses are frozen; arrays are not to be written to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.materials.document import Material
+
+Array = NDArray[np.floating]
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles. positions, normals (V, 3) float32; uv (V, 2) float32; tangents (V, 3) float32; faces (T, 3) uint32.
+
+    `tangents` is the brushing direction t of the shading frame, unit, at right angles to the normal (b = n x t).
+    """
+
+    positions: Array
+    normals: Array
+    tangents: Array
+    uv: Array
+    faces: NDArray[np.uint32]
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """A named thing: a mesh, the name of its material, and the radiance it emits (one-sided, along the normal)."""
+
+    name: str
+    mesh: Mesh
+    material: str
+    emission: Triple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SunSky:
+    """Clear daylight by Mitsuba's `sunsky` (Hosek-Wilkie), turned so that up is +y."""
+
+    sun_direction: Triple  # unit, towards the sun
+    turbidity: float = 3.0
+    albedo: float = 0.3
+    sun_scale: float = 1.0
+    sky_scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class ImageEnvironment:
+    """A lat-long HDR picture; its top is +y, its middle column looks along -z."""
+
+    file: Path
+    scale: float = 1.0
+    rotation_deg: float = 0.0  # about +y
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """Radiant intensity W/sr; `direction` and cone half-angles make it a spot."""
+
+    position: Triple
+    intensity: Triple
+    direction: Triple | None = None
+    inner_deg: float = 0.0
+    outer_deg: float = 180.0
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Irradiance W/m^2 on a surface that faces it; `direction` is the way the light travels."""
+
+    direction: Triple
+    irradiance: Triple
+
+
+Light = PointLight | DirectionalLight
+Environment = SunSky | ImageEnvironment
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Pinhole. `fov_y_deg` is the full vertical field of view; up is +y unless said."""
+
+    name: str
+    position: Triple
+    target: Triple
+    up: Triple = (0.0, 1.0, 0.0)
+    fov_y_deg: float = 45.0
+
+
+@dataclass(frozen=True)
+class CameraPath:
+    """Key cameras, passed at constant speed per segment along a smooth curve."""
+
+    name: str
+    keys: tuple[Camera, ...]
+    seconds: float = 20.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything a bake needs. `sources` are the files it was read from: a bake hashes them to notice a change."""
+
+    name: str
+    objects: tuple[SceneObject, ...]
+    materials: Mapping[str, Material]
+    environment: Environment | None = None
+    lights: tuple[Light, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    paths: tuple[CameraPath, ...] = ()
+    exposure_ev: float = 0.0
+    sources: tuple[Path, ...] = ()
+    warnings: tuple[str, ...] = ()
+    probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        lows, highs = zip(*(o.mesh.bounds for o in self.objects), strict=True)
+        return np.min(lows, axis=0), np.max(highs, axis=0)
+
+    def object(self, name: str) -> SceneObject:
+        return next(o for o in self.objects if o.name == name)

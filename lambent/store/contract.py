@@ -1,0 +1,103 @@
+"""What bakes write and the interactive side reads, by name.
+
+    geometry/positions, normals, tangents  (V, 3) float32, world space
+    geometry/uv, uv2                       (V, 2) float32; uv2 in [0, 1] is the light map's
+    geometry/faces                         (T, 3) uint32, sorted by object: ObjectRecord says which range is whose
+    light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; texel (row, column) has its
+                                           centre at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
+    light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
+    environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] with OBJECT left out
+    probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
+    probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
+
+The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from lambent.materials.document import Material
+from lambent.store.store import Store
+
+FAR = 1.0e4  # metres: distance of what is not hit
+SCENE = "scene"
+TIMINGS = "timings"
+Triple = tuple[float, float, float]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ObjectRecord(_Record):
+    """One object: its faces are geometry/faces[first_face : first_face + face_count]."""
+
+    name: str
+    material: str
+    first_face: int
+    face_count: int
+    emission: Triple = (0.0, 0.0, 0.0)
+    bounds: tuple[Triple, Triple]
+    probe: bool = False  # wants probe/NAME/*
+
+
+class CameraRecord(_Record):
+    """See scenes.scene.Camera."""
+
+    name: str
+    position: Triple
+    target: Triple
+    up: Triple = (0.0, 1.0, 0.0)
+    fov_y_deg: float = 45.0
+
+
+class PathRecord(_Record):
+    """See scenes.scene.CameraPath."""
+
+    name: str
+    keys: tuple[CameraRecord, ...]
+    seconds: float
+
+
+class SceneRecord(_Record):
+    """What the interactive side needs to know of a scene besides its arrays."""
+
+    name: str
+    objects: tuple[ObjectRecord, ...]
+    materials: dict[str, Material]
+    cameras: tuple[CameraRecord, ...]
+    paths: tuple[PathRecord, ...] = ()
+    exposure_ev: float = 0.0
+    bounds: tuple[Triple, Triple]
+    warnings: tuple[str, ...] = ()
+
+
+def probe_name(object_name: str, part: str) -> str:
+    """Name of a probe's array; `part` is radiance, distance or planes."""
+    return f"probe/{object_name}/{part}"
+
+
+def needs_probe(material: Material) -> bool:
+    """Whether a surface of this material shows a directional lobe."""
+    return any(max(lobe.k) > 0 for lobe in material.lobes)
+
+
+def is_two_sided(material: Material) -> bool:
+    """Whether light on the far side shows on this side, so that both sides need irradiance."""
+    return material.transmits
+
+
+def scene_record(store: Store) -> SceneRecord:
+    """The scene record of a baked store."""
+    if SCENE not in store.documents:
+        store.artefact("geometry/positions")  # raises the clear error of an unbaked store
+    return SceneRecord.model_validate(store.documents[SCENE])
+
+
+def write_scene_record(store: Store, record: SceneRecord) -> None:
+    value: dict[str, Any] = record.model_dump(mode="json")
+    store.set_document(SCENE, value)
