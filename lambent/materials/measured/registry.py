@@ -1,0 +1,65 @@
+"""Find the reader of a measured file by its content.
+
+A reader is a module of this package that has `NAME` (str), `recognise(head: bytes, size: int) -> bool` and
+`read(path: Path) -> MeasuredTable`. Endings are never looked at: three formats share `.bsdf`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from pathlib import Path
+from typing import Protocol, cast
+
+import lambent.materials.measured as package
+from lambent.core.errors import UserError
+from lambent.materials.measured.protocol import MeasuredTable
+
+HEAD_BYTES = 1 << 16
+
+
+class Reader(Protocol):
+    """What a format's module offers."""
+
+    NAME: str
+
+    def recognise(self, head: bytes, size: int) -> bool:
+        """Whether a file of `size` bytes that begins with `head` claims to be of this format."""
+        ...
+
+    def read(self, path: Path) -> MeasuredTable:
+        """The table, or a `UserError`."""
+        ...
+
+
+@cache
+def readers() -> tuple[Reader, ...]:
+    """Every reader found in the package, by name."""
+    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
+    found = [cast(Reader, m) for m in modules if hasattr(m, "recognise") and hasattr(m, "read")]
+    return tuple(sorted(found, key=lambda reader: reader.NAME))
+
+
+def load(path: Path | str) -> MeasuredTable:
+    """Read a measured material, in whichever known format it is.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, of no known format, or broken.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError as error:
+        raise UserError(f"cannot be read ({error.strerror})", file=path) from error
+    if not size:
+        raise UserError("file is empty", file=path)
+    for reader in readers():
+        if reader.recognise(head, size):
+            return reader.read(path)
+    known = ", ".join(reader.NAME for reader in readers())
+    raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
