@@ -1,0 +1,250 @@
+"""The path tracing engine: the only file that chooses a Mitsuba variant.
+
+Why a subprocess: with LLVM 15 to 18 Dr.Jit loads and then aborts the whole process at its first real kernel, which
+nothing can catch. So each candidate renders a few pixels in a process of its own, and only what rendered is taken.
+A positive answer is kept in the user's cache folder, so that only the first command on a machine pays for it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.files import write_text
+
+LLVM_OLDEST = 19  # 14 is refused by Dr.Jit, 15 to 18 abort
+LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
+VARIANT_VARIABLE = "LAMBENT_VARIANT"
+VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
+PROBE_SECONDS = 300  # the first OptiX start compiles for a minute or more on some drivers
+MEND = (
+    "install LLVM 19 or newer (Debian and Ubuntu: apt-get install libllvm19; macOS: brew install llvm), "
+    f"or set {LIBRARY_VARIABLE} to its library"
+)
+
+_PROBE = """
+import json, sys
+import drjit as dr
+import mitsuba as mi
+mi.set_variant(sys.argv[1])
+scene = mi.cornell_box()
+scene["sensor"]["film"]["width"] = scene["sensor"]["film"]["height"] = 4
+image = mi.render(mi.load_dict(scene), spp=1)
+dr.eval(image)
+total = float(dr.sum(image.array)[0])
+if not 0 < total < 1e6:
+    raise SystemExit(f"rendered a sum of {total}")
+llvm = dr.detail.llvm_version() if sys.argv[1].startswith("llvm") else None
+print("lambent-probe " + json.dumps({"llvm_version": llvm and ".".join(map(str, llvm)), "threads": dr.thread_count()}))
+"""
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A variant that has rendered on this machine. `llvm_library` is None where Dr.Jit finds LLVM by itself."""
+
+    variant: str
+    llvm_version: str | None
+    threads: int
+    llvm_library: str | None = None
+
+
+@dataclass(frozen=True)
+class EngineProbe:
+    """What was tried. `engine` is None where nothing renders; `failures` says why, one line per attempt."""
+
+    engine: Engine | None
+    failures: tuple[str, ...]
+    cached: bool = False
+
+
+@functools.cache
+def engine() -> Engine:
+    """Choose and set the Mitsuba variant: CUDA if it renders, else LLVM. Further calls cost nothing.
+
+    The environment variable LAMBENT_VARIANT names one variant to use instead.
+
+    Raises
+    ------
+    UserError
+        Where neither renders, with what to install.
+    """
+    probe = probe_engine()
+    if probe.engine is None:
+        raise UserError(f"no path tracing engine works here ({'; '.join(probe.failures)})", hint=MEND)
+    chosen = probe.engine
+    if chosen.llvm_library is not None:
+        os.environ[LIBRARY_VARIABLE] = chosen.llvm_library
+    os.environ.update(_kernel_cache_without_home())
+
+    import mitsuba as mi
+
+    if mi.variant() != chosen.variant:
+        mi.set_variant(chosen.variant)
+    return chosen
+
+
+def probe_engine(*, use_cache: bool = True) -> EngineProbe:
+    """Find an engine without setting anything in this process and without raising; for `lambent doctor`."""
+    names = _wanted_variants()
+    library = find_llvm()
+    key = _cache_key(names, library)
+    cached = _read_cache(key) if use_cache else None
+    if cached is not None:
+        return EngineProbe(cached, (), cached=True)
+    failures: list[str] = []
+    for name in names:
+        if name.startswith("cuda") and _cuda_driver() is None:
+            failures.append(f"{name}: no CUDA driver")
+            continue
+        found = _try(name, library if name.startswith("llvm") else None)
+        if isinstance(found, Engine):
+            _write_cache(key, found)
+            return EngineProbe(found, tuple(failures))
+        failures.append(f"{name}: {found}")
+    return EngineProbe(None, tuple(failures))
+
+
+def find_llvm() -> Path | None:
+    """The LLVM library to use: the user's DRJIT_LIBLLVM_PATH, else the oldest that is new enough in the usual places.
+
+    The oldest, because Dr.Jit is tested with it, and a newer one may have changed its C interface.
+    """
+    named = os.environ.get(LIBRARY_VARIABLE)
+    if named:
+        return Path(named)
+    numbered = [(number, path) for path in _llvm_files() if (number := _llvm_number(path)) >= LLVM_OLDEST]
+    return min(numbered)[1] if numbered else None
+
+
+def _llvm_files() -> Iterator[Path]:
+    for folder, pattern in (
+        ("/usr/lib", "*-linux-gnu/libLLVM*.so*"),
+        ("/usr/lib", "llvm-*/lib/libLLVM*.so*"),
+        ("/usr/lib", "llvm*/lib64/libLLVM*.so*"),
+        ("/usr/lib64", "libLLVM*.so*"),
+        ("/usr/lib64", "llvm*/lib*/libLLVM*.so*"),
+        ("/usr/local/lib", "libLLVM*.so*"),
+        ("/opt/homebrew/opt", "llvm*/lib/libLLVM*.dylib"),
+        ("/usr/local/opt", "llvm*/lib/libLLVM*.dylib"),
+    ):
+        yield from sorted(Path(folder).glob(pattern))
+
+
+def _llvm_number(path: Path) -> int:
+    """Major version from the resolved file name (libLLVM-19.so, libLLVM.so.19.1) or its folder (llvm-19, llvm@19)."""
+    for text in (path.name, path.resolve().name, str(path.parent), str(path.resolve().parent)):
+        found = re.search(r"(?:llvm[-@/]?|\.so\.)(\d+)", text, flags=re.IGNORECASE)
+        if found:
+            return int(found[1])
+    return 0
+
+
+def _wanted_variants() -> tuple[str, ...]:
+    wanted = os.environ.get(VARIANT_VARIABLE)
+    return (wanted,) if wanted else VARIANTS
+
+
+@functools.cache
+def _cuda_driver() -> int | None:
+    """Version number of the CUDA driver, or None. Looking spares the machines without one a failing probe."""
+    try:
+        library = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+        number = ctypes.c_int()
+        return number.value if library.cuDriverGetVersion(ctypes.byref(number)) == 0 else None
+    except (OSError, AttributeError):
+        return None
+
+
+def _try(name: str, library: Path | None) -> Engine | str:
+    """Render a few pixels with variant `name` in a subprocess: the engine, or one line that says what went wrong."""
+    environment = os.environ | _kernel_cache_without_home()
+    if library is not None:
+        environment[LIBRARY_VARIABLE] = str(library)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE, name],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=PROBE_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"did not render within {PROBE_SECONDS} s"
+    except OSError as error:
+        return f"cannot start a probe ({error.strerror})"
+    answer = next((line for line in done.stdout.splitlines() if line.startswith("lambent-probe ")), None)
+    if done.returncode != 0 or answer is None:
+        return _reason(done.returncode, done.stderr, library)
+    facts = json.loads(answer.removeprefix("lambent-probe "))
+    return Engine(name, facts["llvm_version"], facts["threads"], str(library) if library is not None else None)
+
+
+def _reason(code: int, stderr: str, library: Path | None) -> str:
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    with_library = f" with {library}" if library is not None else ""
+    if code < 0:
+        return f"aborted by signal {-code}{with_library} (LLVM older than {LLVM_OLDEST} does that)"
+    return (lines[-1][:300] if lines else f"exit code {code}") + with_library
+
+
+def _cache_key(names: tuple[str, ...], library: Path | None) -> str:
+    """Everything the answer depends on: a new Mitsuba, LLVM, driver or graphics card asks again."""
+    stamp = library.stat().st_mtime_ns if library is not None and library.exists() else None
+    cards = sorted(path.name for path in Path("/dev").glob("nvidia[0-9]*"))
+    facts = [names, version("mitsuba"), version("drjit"), sys.executable, str(library), stamp]
+    facts += [_cuda_driver(), cards, os.environ.get("CUDA_VISIBLE_DEVICES"), os.cpu_count()]
+    return hashlib.sha256(json.dumps(facts).encode()).hexdigest()
+
+
+def _cache_file() -> Path | None:
+    """Where positive answers are kept, or None on an account without a home."""
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA")
+    elif sys.platform == "darwin":
+        base = str(Path("~/Library/Caches").expanduser())
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
+    return Path(base) / "lambent" / "engine.json" if base and not base.startswith("~") else None
+
+
+def _read_cache(key: str) -> Engine | None:
+    """The kept engine, or None; a cache that cannot be read or has another shape is simply asked again."""
+    file = _cache_file()
+    if file is None:
+        return None
+    try:
+        kept = json.loads(file.read_text(encoding="utf-8"))
+        return Engine(**kept["engine"]) if kept["key"] == key else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _write_cache(key: str, found: Engine) -> None:
+    file = _cache_file()
+    if file is None:
+        return
+    try:
+        write_text(file, json.dumps({"key": key, "engine": asdict(found)}))
+    except OSError:
+        return  # a read-only home costs the probe's seconds every time and nothing else
+
+
+def _kernel_cache_without_home() -> dict[str, str]:
+    """Dr.Jit keeps compiled kernels below HOME and stops where there is none: the variable that names another place."""
+    if sys.platform == "win32" or "HOME" in os.environ or "DRJIT_CACHE_DIR" in os.environ:
+        return {}
+    return {"DRJIT_CACHE_DIR": str(Path(tempfile.gettempdir()) / f"drjit-{os.getuid()}")}
