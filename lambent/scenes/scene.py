@@ -40,12 +40,16 @@ class Mesh:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """A named thing: a mesh, the name of its material, and the radiance it emits (one-sided, along the normal)."""
+    """A named thing: a mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
+
+    `light_map_scale` multiplies the texels per metre it gets of the light map: small for what is never seen.
+    """
 
     name: str
     mesh: Mesh
     material: str
     emission: Triple = (0.0, 0.0, 0.0)
+    light_map_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,7 @@ class Scene:
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
+    probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
 
     @property
     def bounds(self) -> tuple[Array, Array]:
