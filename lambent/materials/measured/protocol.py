@@ -4,6 +4,7 @@ Conventions: directions are unit vectors (..., 3) in the local frame with n = +z
 to the light, `wo` to the viewer. f is in 1/sr per channel and holds no cosine; the transfer probability is
 p(wo|wi) = f |cos theta_o| (2.4), and a reader converts what its file holds to f. One channel is grey; three are linear
 RGB with Rec.709 primaries.
+"""
 
 from __future__ import annotations
 
