@@ -1,0 +1,76 @@
+"""Colour: linear Rec.709 RGB (the colour space of every array in Lambent), XYZ, L*a*b*, and what a display shows.
+
+All functions take and return arrays (..., 3) and keep the dtype of floating input. White is D65 (Y = 1 at RGB 1, 1, 1).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.floating[Any]]
+
+# IEC 61966-2-1. The inverse is computed, not quoted, so that the round trip is exact to rounding.
+RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
+WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
+_LAB_EDGE = 6 / 29
+
+
+def luminance(rgb: Floats) -> Floats:
+    """Y (...) of linear RGB (..., 3)."""
+    return np.asarray(rgb @ RGB_TO_XYZ[1].astype(rgb.dtype))
+
+
+def rgb_to_xyz(rgb: Floats) -> Floats:
+    """Linear RGB to CIE XYZ."""
+    return np.asarray(rgb @ RGB_TO_XYZ.T.astype(rgb.dtype))
+
+
+def xyz_to_rgb(xyz: Floats) -> Floats:
+    """CIE XYZ to linear RGB; colours outside Rec.709 come out negative."""
+    return np.asarray(xyz @ XYZ_TO_RGB.T.astype(xyz.dtype))
+
+
+def rgb_to_lab(rgb: Floats) -> Floats:
+    """Linear RGB to CIE L*a*b* (D65); L* of white is 100."""
+    t = rgb_to_xyz(rgb) / WHITE_XYZ.astype(rgb.dtype)
+    f = np.where(t > _LAB_EDGE**3, np.cbrt(t), t / (3 * _LAB_EDGE**2) + 4 / 29)
+    x, y, z = f[..., 0], f[..., 1], f[..., 2]
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def lab_to_rgb(lab: Floats) -> Floats:
+    """CIE L*a*b* (D65) to linear RGB."""
+    y = (lab[..., 0] + 16) / 116
+    f = np.stack([y + lab[..., 1] / 500, y, y - lab[..., 2] / 200], axis=-1)
+    t = np.where(f > _LAB_EDGE, f**3, 3 * _LAB_EDGE**2 * (f - 4 / 29))
+    return xyz_to_rgb(t * WHITE_XYZ.astype(t.dtype))
+
+
+def srgb_encode(linear: Floats) -> Floats:
+    """Linear values to sRGB, clipped to [0, 1]."""
+    x = np.clip(linear, 0, 1)
+    # The power is taken of max(x, edge) because np.where evaluates both sides.
+    curve = 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(x <= 0.0031308, 12.92 * x, curve).astype(x.dtype)
+
+
+def srgb_decode(encoded: Floats) -> Floats:
+    """sRGB values in [0, 1] to linear."""
+    curve = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(encoded <= 0.04045, encoded / 12.92, curve).astype(encoded.dtype)
+
+
+def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:
+    """Scene radiance to display-linear [0, 1] by a filmic curve: toe, straight part, shoulder.
+
+    The rational fit of Narkowicz 2015, "ACES filmic tone mapping curve", per channel. Encode the result with
+    `srgb_encode`.
+    """
+    x = np.maximum(linear, 0) * np.asarray(2.0**exposure_ev, linear.dtype)
+    x = np.minimum(x, 1e4)  # the curve is flat there; squares of larger half floats would overflow
+    curve = np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0, 1)
+    return np.asarray(curve, linear.dtype)

@@ -1,0 +1,104 @@
+"""Pictures in and out: float32, linear Rec.709, (H, W, 3), row 0 at the top.
+
+Reading goes by content, not by name: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
+promises more than `MAX_PIXELS`, or more than its file can hold, is refused before anything is allocated.
+Writing goes by the suffix: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core import exr, rgbe
+from lambent.core.colour import srgb_decode, srgb_encode
+from lambent.core.errors import UserError
+from lambent.core.files import atomic_path, read_bytes
+
+Image = NDArray[np.float32]
+MAX_PIXELS = 1 << 26  # 8192 x 8192: 800 MB as float32 RGB
+LIMIT_BYTES = 2 << 30
+HDR_SUFFIXES = (".exr", ".hdr")
+WRITABLE = (".exr", ".hdr", ".png")
+
+
+def read_image(path: Path) -> Image:
+    """Linear RGB (H, W, 3) float32 of an EXR, HDR, PNG or JPEG file; an alpha channel is left out.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, of another kind, cut off, too large, or holds values that are not finite.
+    """
+    path = Path(path)
+    data = read_bytes(path, LIMIT_BYTES)
+    if data.startswith(exr.MAGIC):
+        image = exr.decode(data, path, MAX_PIXELS)
+    elif data.startswith(rgbe.MAGICS):
+        image = rgbe.decode(data, path, MAX_PIXELS)
+    elif data.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
+        image = srgb_decode(read_encoded(path)[..., :3])
+    else:
+        raise UserError("not a picture Lambent reads", file=path, got=repr(data[:4]), expected="EXR, HDR, PNG or JPEG")
+    bad = image.size - np.count_nonzero(np.isfinite(image))
+    if bad:
+        raise UserError("picture holds values that are not finite", file=path, got=f"{bad} of {image.size} values")
+    return image
+
+
+def read_encoded(path: Path) -> Image:
+    """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as they stand in the file: for normal maps, masks and alpha."""
+    from PIL import Image as Pillow
+
+    data = read_bytes(Path(path), LIMIT_BYTES)
+    try:
+        with Pillow.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
+            if picture.width * picture.height > MAX_PIXELS:
+                got = f"{picture.width}x{picture.height}"
+                raise UserError("picture size", file=path, got=got, expected=f"at most {MAX_PIXELS} pixels")
+            return _values(picture)
+    except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
+        raise UserError("picture is damaged or cut off", file=path, hint="copy or export it again") from error
+
+
+def write_image(path: Path, image: NDArray[Any]) -> None:
+    """Write linear RGB (H, W, 3), atomically, in the format of the suffix: .exr, .hdr or .png.
+
+    PNG values are clipped to [0, 1] and sRGB-encoded: apply `colour.filmic` first to scene radiance.
+    """
+    path = Path(path)
+    rgb = np.asarray(image, np.float32)
+    assert rgb.ndim == 3 and rgb.shape[2] == 3, f"not (H, W, 3): {rgb.shape}"
+    check_writable(path)
+    with atomic_path(path) as beside:
+        if path.suffix.lower() == ".exr":
+            exr.encode(rgb, beside)
+        elif path.suffix.lower() == ".hdr":
+            beside.write_bytes(rgbe.encode(rgb))
+        else:
+            from PIL import Image as Pillow
+
+            Pillow.fromarray(to_bytes(srgb_encode(rgb))).save(beside, format="PNG")
+
+
+def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
+    """`UserError` where the suffix of a picture to write is not one of `suffixes`: to ask before long work."""
+    if Path(path).suffix.lower() not in suffixes:
+        raise UserError("unknown kind of file", file=path, got=Path(path).suffix or None, expected=", ".join(suffixes))
+
+
+def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:
+    """Encoded values in [0, 1] as rounded bytes; what is not finite becomes 0."""
+    return np.asarray(np.clip(np.nan_to_num(encoded), 0, 1) * 255 + 0.5, np.uint8)
+
+
+def _values(picture: Any) -> Image:
+    if picture.mode.startswith("I"):  # 16-bit grey
+        grey = np.asarray(picture, np.float32) / np.float32(65535)
+        return np.repeat(grey[..., None], 3, axis=-1)
+    alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+    return np.asarray(picture.convert("RGBA" if alpha else "RGB"), np.float32) / np.float32(255)

@@ -1,0 +1,91 @@
+"""How far two pictures are apart. A mean hides a hole: the worst 16x16 tile always stands beside it.
+
+Pictures are linear RGB (H, W, 3) unless `encoded`, which is what a display gets: sRGB values in [0, 1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.colour import rgb_to_lab
+
+Floats = NDArray[np.floating[Any]]
+TILE = 16  # pixels
+
+
+@dataclass(frozen=True)
+class Flip:
+    """FLIP error (Andersson et al. 2020): 0 no difference a viewer sees, 1 the largest."""
+
+    error: Floats  # (H, W)
+    picture: Floats  # (H, W, 3) encoded, in false colour: black no error, yellow-white 1
+
+    @property
+    def mean(self) -> float:
+        return float(self.error.mean())
+
+    @property
+    def worst_tile(self) -> float:
+        """Largest mean over a 16x16 tile."""
+        return float(tile_means(self.error).max())
+
+    @property
+    def worst_tile_at(self) -> tuple[int, int]:
+        """Row and column of the worst tile's upper left pixel."""
+        means = tile_means(self.error)
+        row, column = np.unravel_index(int(means.argmax()), means.shape)
+        return int(row) * TILE, int(column) * TILE
+
+
+def psnr(reference: Floats, test: Floats, peak: float = 1.0) -> float:
+    """Peak signal-to-noise ratio in dB over all values; infinite where the pictures are equal."""
+    mse = float(np.mean((np.asarray(reference, np.float64) - test) ** 2))
+    return 10 * float(np.log10(peak**2 / mse)) if mse > 0 else float("inf")
+
+
+def rmse_rgb(reference: Floats, test: Floats) -> Floats:
+    """Root mean square error (3,) per channel."""
+    return np.asarray(np.sqrt(np.mean((np.asarray(reference, np.float64) - test) ** 2, axis=(0, 1))))
+
+
+def rmse_lab(reference: Floats, test: Floats) -> Floats:
+    """Root mean square error (3,) in L*, a*, b* of linear RGB."""
+    return rmse_rgb(rgb_to_lab(np.asarray(reference, np.float64)), rgb_to_lab(np.asarray(test, np.float64)))
+
+
+def flip(reference: Floats, test: Floats) -> Flip:
+    """FLIP of two encoded pictures at 67 pixels per degree (a desktop display at arm's length)."""
+    import flip_evaluator
+
+    pair = [np.ascontiguousarray(np.clip(picture, 0, 1), np.float32) for picture in (reference, test)]
+    error, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)
+    picture, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=True, computeMeanError=False)
+    return Flip(np.asarray(error)[..., 0] if np.ndim(error) == 3 else np.asarray(error), np.asarray(picture))
+
+
+def tile_means(error: Floats, tile: int = TILE) -> Floats:
+    """Means of the tiles of (H, W), (ceil H/tile, ceil W/tile); tiles at the lower and right border may be smaller."""
+    rows, columns = np.arange(0, error.shape[0], tile), np.arange(0, error.shape[1], tile)
+    sums = np.add.reduceat(np.add.reduceat(error.astype(np.float64), rows, axis=0), columns, axis=1)
+    heights, widths = np.diff([*rows, error.shape[0]]), np.diff([*columns, error.shape[1]])
+    return np.asarray(sums / np.outer(heights, widths))
+
+
+def display_pair(reference: Floats, test: Floats, mean: float = 0.3) -> tuple[Floats, Floats]:
+    """Two pictures of radiance as encoded ones: clip(e L)^(1/2.2), e such that the reference has mean `mean`.
+
+    One e for both, found by bisection because clipping makes the mean a monotone, not linear, function of e.
+    """
+    low, high = -40.0, 40.0  # stops
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _shown(reference, middle).mean() < mean else (low, middle)
+    return _shown(reference, low), _shown(test, low)
+
+
+def _shown(radiance: Floats, exposure_ev: float) -> Floats:
+    return np.asarray(np.clip(np.asarray(radiance, np.float64) * 2.0**exposure_ev, 0, 1) ** (1 / 2.2))

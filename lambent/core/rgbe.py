@@ -1,0 +1,131 @@
+"""Radiance pictures (.hdr): shared-exponent RGB, flat or run-length encoded.
+
+Source: G. Ward, "Real pixels", Graphics Gems II (1991), and Radiance's file format notes. A pixel (m, e) stands for
+m 2^(e - 136); rows run from the top unless the resolution line says otherwise.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.colour import xyz_to_rgb
+from lambent.core.errors import UserError
+
+Image = NDArray[np.float32]
+MAGICS = (b"#?RADIANCE", b"#?RGBE")
+_RESOLUTION = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
+_MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel
+
+
+def decode(data: bytes, file: Path, max_pixels: int) -> Image:
+    """Linear RGB (H, W, 3) of a whole file's bytes; `file` is named in errors."""
+    header_end = data.find(b"\n\n", 0, 1 << 16)
+    match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
+    if match is None:
+        raise UserError("Radiance header has no '-Y height +X width' line", file=file)
+    height, width = int(match[2]), int(match[4])
+    if not 0 < width * height <= max_pixels:
+        raise UserError("picture size", file=file, got=f"{width}x{height}", expected=f"at most {max_pixels} pixels")
+    header = data[:header_end]
+    pixels = _pixels(data, match.end(), height, width, file)
+    scale = np.ldexp(1.0, pixels[..., 3].astype(np.int32) - 136) * (pixels[..., 3] > 0)
+    image = (pixels[..., :3] * scale[..., None]).astype(np.float32)
+    for exposure in re.findall(rb"^EXPOSURE=\s*([-+.\deE]+)\s*$", header, re.MULTILINE):
+        image /= _positive(exposure, file)
+    if b"32-bit_rle_xyze" in header:
+        image = xyz_to_rgb(image).astype(np.float32)
+    return np.ascontiguousarray(image[:: 1 if match[1] == b"-" else -1, :: 1 if match[3] == b"+" else -1])
+
+
+def encode(image: Image) -> bytes:
+    """Bytes of a flat (not run-length encoded) file of linear RGB (H, W, 3); negative values become 0."""
+    rgb = np.maximum(image, 0)
+    _, exponent = np.frexp(rgb.max(axis=-1))
+    mantissa = np.minimum(np.rint(np.ldexp(rgb, 8 - exponent[..., None])), 255)
+    exponent = np.clip(np.where(rgb.max(axis=-1) > 0, exponent + 128, 0), 0, 255)
+    pixels = np.concatenate([mantissa, exponent[..., None]], axis=-1).astype(np.uint8)
+    height, width = image.shape[:2]
+    return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + pixels.tobytes()
+
+
+def _positive(text: bytes, file: Path) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise UserError("not a positive number", file=file, field="EXPOSURE", got=text.decode("ascii", "replace"))
+    return value
+
+
+def _pixels(data: bytes, at: int, height: int, width: int, file: Path) -> NDArray[np.uint8]:
+    """(H, W, 4) bytes. Sizes are checked against the file before anything is allocated."""
+    truncated = UserError("file is truncated", file=file, got=f"{len(data)} bytes", hint="copy or download it again")
+    marked = data[at : at + 2] == b"\x02\x02" and data[at + 2 : at + 3] < b"\x80"
+    run_length = marked and _MIN_RUN_WIDTH <= width <= _MAX_RUN_WIDTH
+    # A run covers at most 127 bytes with 2: less than this cannot hold the picture.
+    if run_length and len(data) - at < height * (4 + 4 * 2 * -(-width // 127)):
+        raise truncated
+    if not run_length and b"\x01\x01\x01" not in data[at:]:  # flat
+        if len(data) - at < height * width * 4:
+            raise truncated
+        return np.frombuffer(data, np.uint8, height * width * 4, at).reshape(height, width, 4)
+    try:
+        if run_length:
+            return _run_length(data, at, height, width)
+        return _old_run_length(data, at, height * width).reshape(height, width, 4)
+    except IndexError:
+        raise truncated from None
+    except ValueError as error:
+        raise UserError(f"run-length data is damaged ({error})", file=file) from error
+
+
+def _run_length(data: bytes, at: int, height: int, width: int) -> NDArray[np.uint8]:
+    rows = np.empty((height, 4, width), np.uint8)
+    for row in rows:
+        if data[at : at + 2] != b"\x02\x02" or (data[at + 2] << 8 | data[at + 3]) != width:
+            raise ValueError("row does not begin with its width")
+        at += 4
+        for channel in row:
+            column = 0
+            while column < width:
+                count = data[at]
+                run = count > 128
+                count = count - 128 if run else count
+                end = column + count
+                if count == 0 or end > width:
+                    raise ValueError("run leaves its row")
+                if run:
+                    channel[column:end] = data[at + 1]
+                    at += 2
+                else:
+                    if at + 1 + count > len(data):
+                        raise IndexError
+                    channel[column:end] = np.frombuffer(data, np.uint8, count, at + 1)
+                    at += 1 + count
+                column = end
+    return rows.transpose(0, 2, 1)
+
+
+def _old_run_length(data: bytes, at: int, count: int) -> NDArray[np.uint8]:
+    """Before 1991: a pixel (1, 1, 1, n) repeats the last one n times; several in a row are the digits, low first."""
+    pixels = np.empty((count, 4), np.uint8)
+    done, digit = 0, 0
+    while done < count:
+        if at + 4 > len(data):
+            raise IndexError
+        if data[at : at + 3] == b"\x01\x01\x01":
+            repeat = data[at + 3] << (8 * digit)
+            if done == 0 or done + repeat > count:
+                raise ValueError("run leaves the picture")
+            pixels[done : done + repeat] = pixels[done - 1]
+            done, digit = done + repeat, digit + 1
+        else:
+            pixels[done] = np.frombuffer(data, np.uint8, 4, at)
+            done, digit = done + 1, 0
+        at += 4
+    return pixels

@@ -1,0 +1,164 @@
+"""Pictures survive the round trip; damaged ones end in one clear error and never in a large allocation."""
+
+from __future__ import annotations
+
+import struct
+import tracemalloc
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lambent.core import exr, rgbe
+from lambent.core.errors import UserError
+from lambent.core.images import read_encoded, read_image, write_image
+
+RNG = np.random.default_rng(7)
+PICTURE = (RNG.random((20, 37, 3)) ** 4 * 50).astype(np.float32)
+
+
+def test_exr_keeps_every_bit(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.exr", PICTURE)
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), PICTURE)
+
+
+def test_hdr_is_within_half_a_mantissa_step(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.hdr", PICTURE)
+    error = np.abs(read_image(tmp_path / "a.hdr") - PICTURE) / PICTURE.max(axis=-1, keepdims=True)
+    assert error.max() <= 1 / 255
+
+
+def test_png_is_within_half_a_byte(tmp_path: Path) -> None:
+    encoded = RNG.integers(0, 256, (9, 8, 3)) / 255
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    write_image(tmp_path / "a.png", linear)
+    np.testing.assert_allclose(read_encoded(tmp_path / "a.png"), encoded, atol=1e-6)
+    np.testing.assert_allclose(read_image(tmp_path / "a.png"), linear, atol=1e-6)
+
+
+def test_kind_is_found_by_content_not_by_name(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.exr", PICTURE)
+    (tmp_path / "a.exr").rename(tmp_path / "a.png")
+    np.testing.assert_array_equal(read_image(tmp_path / "a.png"), PICTURE)
+
+
+def test_rgbe_known_pixels() -> None:
+    """(128, 64, 32, 129) is 128 2^-7, 64 2^-7, 32 2^-7; exponent 0 is black."""
+    data = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + bytes([128, 64, 32, 129, 9, 9, 9, 0])
+    np.testing.assert_array_equal(rgbe.decode(data, Path("x"), 100), [[[1, 0.5, 0.25], [0, 0, 0]]])
+
+
+def test_rgbe_run_lengths_new_and_old() -> None:
+    """A row of 8: red in one run, green in a literal, blue and exponent in runs. And the scheme before 1991."""
+    row = bytes([2, 2, 0, 8, 136, 128, 8, *range(128, 136), 136, 0, 136, 129])
+    image = rgbe.decode(b"#?RADIANCE\n\n-Y 1 +X 8\n" + row, Path("x"), 100)
+    np.testing.assert_array_equal(image[0, :, 0], np.ones(8))
+    np.testing.assert_array_equal(image[0, :, 1], np.arange(128, 136) / 128)
+    old = bytes([128, 0, 0, 129, 1, 1, 1, 3])
+    image = rgbe.decode(b"#?RADIANCE\n\n-Y 2 +X 2\n" + old, Path("x"), 100)
+    np.testing.assert_array_equal(image[..., 0], np.ones((2, 2)))
+
+
+def test_rgbe_rows_from_below_and_exposure() -> None:
+    data = b"#?RADIANCE\nEXPOSURE=2\n\n+Y 2 +X 1\n" + bytes([128, 0, 0, 129, 0, 128, 0, 129])
+    np.testing.assert_array_equal(rgbe.decode(data, Path("x"), 100), [[[0, 0.5, 0]], [[0.5, 0, 0]]])
+
+
+def _refused(path: Path) -> str:
+    with pytest.raises(UserError) as caught:
+        read_image(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".hdr", ".png"])
+def test_every_truncation_is_refused(tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
+    whole = tmp_path / f"whole{suffix}"
+    write_image(whole, PICTURE)
+    data, cut = whole.read_bytes(), tmp_path / f"cut{suffix}"
+    # A PNG may lose its end marker (12 bytes) and checksum and still hold every pixel.
+    for length in np.unique(np.linspace(0, len(data) - (1 if suffix != ".png" else 40), 60).astype(int)):
+        cut.write_bytes(data[:length])
+        _refused(cut)
+    assert capfd.readouterr() == ("", "")
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(at=st.integers(0, 400), value=st.integers(0, 255), suffix=st.sampled_from([".exr", ".hdr", ".png"]))
+def test_a_wrong_byte_is_read_or_refused(tmp_path: Path, at: int, value: int, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_image(path, PICTURE)
+    data = bytearray(path.read_bytes())
+    data[at] = value
+    path.write_bytes(data)
+    try:
+        assert np.isfinite(read_image(path)).all()
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+def _png_header(width: int, height: int) -> bytes:
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+
+
+def _exr_with_window(width: int, height: int, path: Path) -> bytes:
+    write_image(path, PICTURE)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    data[at : at + 16] = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    return bytes(data)
+
+
+def test_absurd_headers_cost_no_memory(tmp_path: Path) -> None:
+    path = tmp_path / "huge"
+    huge = [
+        b"#?RADIANCE\n\n-Y 999999999 +X 999999999\n" + bytes(64),
+        b"#?RADIANCE\n\n-Y 8000 +X 8000\n" + bytes(64),
+        b"#?RADIANCE\n\n-Y 8000 +X 8000\n\x02\x02\x1f\x40" + bytes(64),
+        _png_header(2_000_000_000, 2_000_000_000),
+        _png_header(20_000, 20_000),
+        _exr_with_window(2_000_000_000, 2_000_000_000, tmp_path / "a.exr"),
+        _exr_with_window(8000, 8000, tmp_path / "a.exr"),
+        _exr_with_window(-5, 10, tmp_path / "a.exr"),
+    ]
+    tracemalloc.start()
+    for data in huge:
+        path.write_bytes(data)
+        _refused(path)
+    assert tracemalloc.get_traced_memory()[1] < 10 << 20
+    tracemalloc.stop()
+
+
+def test_not_finite_and_not_a_picture(tmp_path: Path) -> None:
+    bad = PICTURE.copy()
+    bad[3, 4, 1] = np.nan
+    write_image(tmp_path / "nan.exr", bad)
+    assert "1 of 2220 values" in _refused(tmp_path / "nan.exr")
+    (tmp_path / "text.exr").write_text("hello")
+    assert "expected EXR, HDR, PNG or JPEG" in _refused(tmp_path / "text.exr")
+    assert "cannot be read" in _refused(tmp_path / "absent.exr")
+    assert "cannot be read" in _refused(tmp_path)
+
+
+def test_unknown_suffix_writes_nothing(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"expected \.exr, \.hdr, \.png"):
+        write_image(tmp_path / "a.gif", PICTURE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_header_of_an_exr_names_its_size(tmp_path: Path) -> None:
+    write_image(tmp_path / "a.exr", PICTURE)
+    header = exr._header((tmp_path / "a.exr").read_bytes())
+    assert (header.size, header.channels) == ((20, 37), 3)
+
+
+def test_real_environments(shared_data: Path) -> None:
+    image = read_image(shared_data / "environments" / "grace_probe_latlong.hdr")
+    assert image.shape == (512, 1024, 3) and image.max() > 100 and image.min() >= 0

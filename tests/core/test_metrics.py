@@ -1,0 +1,101 @@
+"""Colour and picture metrics against values computed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lambent.core import colour, metrics
+
+
+def test_white_and_black_in_lab() -> None:
+    np.testing.assert_allclose(colour.rgb_to_lab(np.ones(3)), [100, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(colour.rgb_to_lab(np.zeros(3)), [0, 0, 0], atol=1e-9)
+
+
+def test_middle_grey_in_lab() -> None:
+    """L* of Y = .18 is 116 * .18^(1/3) - 16 = 49.496."""
+    np.testing.assert_allclose(colour.rgb_to_lab(np.full(3, 0.18)), [49.496, 0, 0], atol=1e-3)
+
+
+def test_red_in_lab() -> None:
+    """Red of sRGB is L*a*b* (53.24, 80.09, 67.20)."""
+    np.testing.assert_allclose(colour.rgb_to_lab(np.array([1.0, 0, 0])), [53.24, 80.09, 67.20], atol=0.03)
+
+
+unit = st.floats(0, 1)
+
+
+@given(st.tuples(unit, unit, unit))
+def test_round_trips(rgb: tuple[float, float, float]) -> None:
+    value = np.array(rgb)
+    np.testing.assert_allclose(colour.lab_to_rgb(colour.rgb_to_lab(value)), value, atol=1e-9)
+    np.testing.assert_allclose(colour.xyz_to_rgb(colour.rgb_to_xyz(value)), value, atol=1e-9)
+    np.testing.assert_allclose(colour.srgb_decode(colour.srgb_encode(value)), value, atol=1e-6)
+
+
+def test_srgb_known_values() -> None:
+    np.testing.assert_allclose(colour.srgb_encode(np.array([0.0, 0.0021404, 0.2140411, 1, 7])), [0, 0.02765, 0.5, 1, 1],
+                               atol=1e-4)  # fmt: skip
+
+
+def test_luminance_is_the_middle_row_of_xyz() -> None:
+    assert colour.luminance(np.array([0.0, 1, 0])) == pytest.approx(0.7152)
+
+
+def test_filmic_is_monotone_and_bounded() -> None:
+    x = np.concatenate([[0], np.logspace(-5, 6, 400)]).astype(np.float32)
+    y = colour.filmic(x)
+    assert y[0] == 0 and y[-1] == 1 and (np.diff(y) >= 0).all() and y.dtype == np.float32
+    assert colour.filmic(np.array([0.25])) == colour.filmic(np.array([0.125]), exposure_ev=1)
+
+
+def test_psnr_by_hand() -> None:
+    """A difference of .1 everywhere is 20 dB."""
+    a = np.full((4, 4, 3), 0.5)
+    assert metrics.psnr(a, a + 0.1) == pytest.approx(20)
+    assert metrics.psnr(a, a) == float("inf")
+    assert metrics.psnr(a * 100, a * 100 + 10, peak=100) == pytest.approx(20)
+
+
+def test_rmse_by_hand() -> None:
+    a = np.zeros((2, 2, 3))
+    b = a.copy()
+    b[0, 0] = [2, 0, 4]
+    np.testing.assert_allclose(metrics.rmse_rgb(a, b), [1, 0, 2])
+    white = np.ones((2, 2, 3))
+    np.testing.assert_allclose(metrics.rmse_lab(a, white), [100, 0, 0], atol=1e-9)
+
+
+def test_tile_means_with_a_border() -> None:
+    error = np.zeros((20, 33))
+    error[16:, 32:] = 1
+    means = metrics.tile_means(error)
+    np.testing.assert_allclose(means, [[0, 0, 0], [0, 0, 1]])
+
+
+def test_a_hole_hides_in_the_mean_and_not_in_the_worst_tile() -> None:
+    picture = np.full((256, 256, 3), 0.7)
+    hole = picture.copy()
+    hole[100:110, 100:110] = 0
+    result = metrics.flip(picture, hole)
+    assert result.mean == pytest.approx(0.002, abs=0.001)
+    assert result.worst_tile > 0.4
+    assert result.worst_tile_at == (96, 96)
+    assert result.picture.shape == (256, 256, 3)
+
+
+def test_flip_of_equal_pictures_is_zero_even_for_one_pixel() -> None:
+    for shape in [(1, 1, 3), (40, 17, 3)]:
+        picture = np.random.default_rng(1).random(shape)
+        assert metrics.flip(picture, picture).mean == 0
+
+
+def test_display_pair_brings_the_reference_to_the_mean() -> None:
+    radiance = np.random.default_rng(2).exponential(40, (32, 32, 3))
+    reference, test = metrics.display_pair(radiance, radiance * 2)
+    assert reference.mean() == pytest.approx(0.3, abs=1e-6)
+    assert test.mean() > reference.mean()
+    assert reference.max() <= 1
