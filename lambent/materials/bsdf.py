@@ -15,6 +15,7 @@ from lambent.materials.document import Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
 
 Floats = NDArray[np.floating]
+SELECTION_FLOOR = 0.02  # share of k: Fresnel at wo can vanish (r0 = 0, wo = n) where at the half vector it does not
 
 
 def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Vector:
@@ -42,7 +43,8 @@ def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
     weights: list[Any] = [_mean(material.kd) + 0 * cos_o, _mean(material.kt_d) + 0 * cos_o]
     for lobe in material.lobes:
         f = lobes.fresnel(cos_o, _mean(lobe.r0), ops)
-        weights.append(_mean(lobe.k) * (f if lobe.side == "reflection" else 1 - f))
+        f = f if lobe.side == "reflection" else 1 - f
+        weights.append(_mean(lobe.k) * ops.maximum(f, SELECTION_FLOOR))
     total = sum(weights[1:], weights[0])
     scale = ops.select(total > 0, 1 / ops.maximum(total, 1e-12), 0.0)
     return [w * scale for w in weights]
@@ -60,7 +62,11 @@ def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
 
 
 def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops: Any = NUMPY) -> Vector:
-    """wi of the mixture; u_* uniform in [0, 1). Directions of zero value come back with pdf or value 0."""
+    """wi of the mixture; u_* uniform in [0, 1).
+
+    A lobe sample that crosses the horizon comes back with wi.z = 0, where value and pdf are 0: on the far side the
+    other components' pdf would accept it, and the estimate would be too bright.
+    """
     chosen = selection(wo, material, ops)
     side = ops.select(wo[2] > 0, 1.0, -1.0)
     r, phi = ops.sqrt(u1), 2 * np.pi * u2
@@ -70,6 +76,8 @@ def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops:
     up_to = up_to + chosen[1]
     for p, lobe in zip(chosen[2:], material.lobes, strict=True):
         lx, ly, lz = lobes.sample(wo, u1, u2, lobe, ops)
+        towards = -side if lobe.side == "transmission" else side
+        lz = ops.select(lz * towards > 0, lz, 0.0)
         here = u_select >= up_to
         x, y, z = ops.select(here, lx, x), ops.select(here, ly, y), ops.select(here, lz, z)
         up_to = up_to + p
@@ -77,7 +85,8 @@ def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops:
 
 
 def components(w: Floats) -> Vector:
-    """(..., 3) array as a component tuple."""
+    """(..., 3) array as a component tuple, in float64."""
+    w = np.asarray(w, np.float64)
     return w[..., 0], w[..., 1], w[..., 2]
 
 
