@@ -1,0 +1,157 @@
+"""The material as a Mitsuba BSDF, so that the path tracer renders exactly what materials/bsdf.py says.
+
+    register_material_plugin()
+    scene["floor"]["bsdf"] = material_dict(material)
+
+Conventions: Mitsuba's `si.wi` is the viewer's side (our wo) and its sampled `wo` is our wi; its eval includes the
+cosine. A material is a thin two-sided sheet without refraction, so radiance and importance scatter alike.
+
+Brushing direction: if the shape has a mesh attribute `vertex_tangent` (3 floats, world space, need not be exactly
+perpendicular to the normal), t is its projection onto the shading plane and b = n x t. Without it, t is the s axis of
+`si.sh_frame`, which Mitsuba derives from the uv's (dp/du), or arbitrarily for a mesh that has none.
+Isotropic materials never look.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from typing import Any
+
+from lambent.bake.engine import engine
+from lambent.materials import bsdf
+from lambent.materials.document import Material, material_from
+
+PLUGIN = "lambent_material"
+TANGENT_ATTRIBUTE = "vertex_tangent"
+
+
+def material_dict(material: Material, *, diffuse: bool = True, lobes: bool = True) -> dict[str, Any]:
+    """The dictionary for `mi.load_dict`; `diffuse` and `lobes` switch the two parts of the material."""
+    return {"type": PLUGIN, "material": material.model_dump_json(), "diffuse": diffuse, "lobes": lobes}
+
+
+def register_material_plugin() -> None:
+    """Choose the engine and make `lambent_material` known to it; further calls cost nothing."""
+    _register(engine().variant)
+
+
+@functools.cache
+def _register(variant: str) -> None:
+    """The class must be made after the variant is set: it derives from that variant's mi.BSDF."""
+    import drjit as dr
+    import mitsuba as mi
+
+    class MaterialBSDF(mi.BSDF):  # type: ignore[misc, name-defined]
+        """Diffuse terms and lobes; component i of Mitsuba is component i of `bsdf.selection`."""
+
+        def __init__(self, props: Any) -> None:
+            mi.BSDF.__init__(self, props)
+            given = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
+            self.material = _without(given, diffuse=props.get("diffuse", True), lobes=props.get("lobes", True))
+            self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
+            names = _component_names(self.material)
+            self.kinds = [getattr(mi.BSDFFlags, kind) for kind, *_ in names]
+            self.m_components = [_flags(mi, name) for name in names]
+            self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            material = self._enabled(ctx)
+            tangent = self._tangent(si, active)
+            wo = _turned(si.wi, tangent)
+            wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, dr)
+            density = bsdf.pdf(wi, wo, material, dr)
+            active &= density > 0
+            value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
+
+            bs = mi.BSDFSample3f()
+            bs.wo = mi.Vector3f(_turned(wi, (tangent[0], -tangent[1])))
+            bs.pdf = dr.select(active, density, 0.0)
+            bs.eta = 1.0
+            bs.sampled_component, bs.sampled_type = self._component(sample1, wo, material)
+            return bs, dr.select(active, value * (dr.abs(wi[2]) / density), 0.0)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            material = self._enabled(ctx)
+            tangent = self._tangent(si, active)
+            viewer, light = _turned(si.wi, tangent), _turned(wo, tangent)
+            value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
+            density = bsdf.pdf(light, viewer, material, dr)
+            return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
+
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            return dr.select(active, mi.Color3f(self.material.kd), 0.0)
+
+        def to_string(self) -> str:
+            return f"{PLUGIN}[{self.material.model_dump_json()}]"
+
+        def _enabled(self, ctx: Any) -> Material:
+            """The material with the components that `ctx` leaves out at coefficient zero."""
+            on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
+            return self.material if all(on) else _masked(self.material, on)
+
+        def _tangent(self, si: Any, active: Any) -> tuple[Any, Any]:
+            """Cosine and sine of the angle from the s axis of the shading frame to the brushing direction."""
+            if not self.anisotropic:
+                return 1.0, 0.0
+            brushed = active & si.shape.has_attribute(TANGENT_ATTRIBUTE)
+            t = si.to_local(si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, si, brushed))
+            length = dr.sqrt(t.x * t.x + t.y * t.y)
+            brushed &= length > 1e-6
+            return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
+
+        def _component(self, sample1: Any, wo: Any, material: Material) -> tuple[Any, Any]:
+            """Index and flags of the component that `bsdf.sample` chose."""
+            index, flags = mi.UInt32(0), mi.UInt32(self.m_components[0])
+            up_to = mi.Float(0)
+            for i, share in enumerate(bsdf.selection(wo, material, dr)):
+                here = sample1 >= up_to
+                index = dr.select(here, mi.UInt32(i), index)
+                flags = dr.select(here, mi.UInt32(self.m_components[i]), flags)
+                up_to += share
+            return index, flags
+
+    mi.register_bsdf(PLUGIN, MaterialBSDF)
+
+
+def _turned(w: Any, angle: tuple[Any, Any]) -> tuple[Any, Any, Any]:
+    """Components of `w` in a frame turned about n by the angle of this cosine and sine."""
+    c, s = angle
+    return c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]
+
+
+def _without(material: Material, *, diffuse: bool, lobes: bool) -> Material:
+    if not diffuse:
+        material = bsdf.specular_only(material)
+    return material if lobes else material.model_copy(update={"lobes": ()})
+
+
+def _masked(material: Material, on: list[bool]) -> Material:
+    black = (0.0, 0.0, 0.0)
+    lobes = [
+        lobe if keep else lobe.model_copy(update={"k": black})
+        for lobe, keep in zip(material.lobes, on[2:], strict=True)
+    ]
+    update = {"kd": material.kd if on[0] else black, "kt_d": material.kt_d if on[1] else black, "lobes": tuple(lobes)}
+    return material.model_copy(update=update)
+
+
+def _component_names(material: Material) -> list[list[str]]:
+    """Mitsuba's flag names per component, in the order of `bsdf.selection`."""
+    names = [["DiffuseReflection"], ["DiffuseTransmission"]]
+    for lobe in material.lobes:
+        names.append(["GlossyReflection" if lobe.side == "reflection" else "GlossyTransmission"])
+        if lobe.mx != lobe.my:
+            names[-1].append("Anisotropic")
+    return names
+
+
+def _flags(mi: Any, names: list[str]) -> int:
+    both = ("FrontSide", "BackSide")
+    return functools.reduce(lambda a, b: a | b, (int(getattr(mi.BSDFFlags, name)) for name in (*names, *both)))

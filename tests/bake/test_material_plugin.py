@@ -1,0 +1,247 @@
+"""The plugin scatters like the numpy model, and a renderer that uses it finds the answers known by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.bake.engine import engine
+from lambent.bake.material_plugin import PLUGIN, material_dict, register_material_plugin
+from lambent.core.errors import UserError
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+
+BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
+MATERIALS = {
+    "diffuse": Material(kd=(0.2, 0.1, 0.3), kt_d=0.4),
+    "beckmann": Material(lobes=(BRUSHED,)),
+    "ggx": Material(lobes=(BRUSHED.model_copy(update={"distribution": "ggx"}),)),
+    "transmission": Material(lobes=(BRUSHED.model_copy(update={"side": "transmission"}),)),
+    "mixture": Material(
+        kd=(0.1, 0.2, 0.3),
+        kt_d=0.1,
+        lobes=(BRUSHED, Lobe(side="transmission", distribution="ggx", mx=0.2, my=0.4, k=0.5, r0=0.1, alpha=0.2)),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def mi():
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    register_material_plugin()
+    import mitsuba
+
+    return mitsuba
+
+
+def interaction(mi, wo):
+    """Surface interactions in the canonical frame with the viewer at `wo` (N, 3)."""
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.wi = mi.Vector3f(wo.T)
+    return si
+
+
+def random_directions(n, seed, lowest_cosine=0.02):
+    rng = np.random.default_rng(seed)
+    cosine = rng.uniform(lowest_cosine, 1, n) * rng.choice([-1, 1], n)
+    return direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, n))
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_eval_and_pdf_equal_numpy(mi, name):
+    material = MATERIALS[name]
+    plugin, model = mi.load_dict(material_dict(material)), MaterialBSDF(material)
+    wo = random_directions(20_000, 1).astype(np.float32)
+    wi = random_directions(20_000, 2).astype(np.float32)
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    expected = model.eval(wi, wo) * np.abs(wi[:, 2:])
+    assert expected.max() > 0.01
+    np.testing.assert_allclose(np.array(value).T, expected, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(np.array(density), model.pdf(wi, wo), rtol=1e-4, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_sample_agrees_with_eval_pdf_and_numpy(mi, name):
+    material = MATERIALS[name]
+    plugin = mi.load_dict(material_dict(material))
+    wo = random_directions(20_000, 3).astype(np.float32)
+    u = np.random.default_rng(4).random((20_000, 3)).astype(np.float32)
+    si = interaction(mi, wo)
+    bs, weight = plugin.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+    value, density = plugin.eval_pdf(mi.BSDFContext(), si, bs.wo)
+    density, weight, value = np.array(density), np.array(weight).T, np.array(value).T
+    good = np.array(bs.pdf) > 1e-3
+    assert good.mean() > 0.5
+    np.testing.assert_allclose(np.array(bs.pdf)[good], density[good], rtol=1e-3)
+    np.testing.assert_allclose(weight[good] * density[good, None], value[good], rtol=2e-3, atol=1e-6)
+    same = np.linalg.norm(np.array(bs.wo).T - MaterialBSDF(material).sample(wo, u), axis=-1) < 1e-4
+    assert same.mean() > 0.998  # float32 may choose another component where u_select lies on the border
+
+
+@pytest.mark.parametrize("name", ["beckmann", "ggx", "mixture"])
+def test_chi_square(mi, name, tmp_path, monkeypatch):
+    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+
+    plugin = mi.load_dict(material_dict(MATERIALS[name]))
+    context, wo = mi.BSDFContext(), direction(np.radians(50), 0.4)
+
+    def sample_func(u):
+        n = u.shape[1]
+        bs, _ = plugin.sample(context, interaction(mi, np.tile(wo, (n, 1))), u[0], mi.Point2f(u[1], u[2]))
+        return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
+
+    def pdf_func(w):
+        import drjit as dr
+
+        return plugin.pdf(context, interaction(mi, np.tile(wo, (dr.width(w), 1))), w)
+
+    test = ChiSquareTest(
+        SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, res=101, ires=8
+    )
+    monkeypatch.chdir(tmp_path)  # a failing test writes its data to the working folder
+    assert test.run(), test.messages
+
+
+def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
+    scene = closed(material_dict(Material(kd=0.5)), 0.5, mi)
+    image = np.array(mi.render(scene, spp=256))
+    assert image.mean() == pytest.approx(1.0, abs=0.003)
+
+
+def test_furnace_of_a_mirror_like_sphere_shows_the_models_albedo(mi):
+    """A sphere in uniform light of radiance 1 shows the directional albedo at its centre and is black nowhere."""
+    material = Material(kd=0.2, lobes=(Lobe(mx=0.2, my=0.2, k=0.9, r0=0.6, alpha=0.3),))
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 2},
+            "sensor": {
+                "type": "perspective",
+                "fov": 1.0,
+                "to_world": mi.ScalarTransform4f().look_at([0, 0, 20], [0, 0, 0], [0, 1, 0]),
+                "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
+            },
+            "light": {"type": "constant", "radiance": 1.0},
+            "ball": {"type": "sphere", "bsdf": material_dict(material)},
+        }
+    )
+    seen = np.array(mi.render(scene, spp=20_000)).mean()
+    half_width = 19 * np.tan(np.radians(0.5))  # of the square that is seen, on a sphere of radius 1
+    cosine = 1 - half_width**2 / 3  # its mean
+    expected = MaterialBSDF(material).albedo(direction(np.arccos(cosine), 0.0), samples=200_000).mean()
+    assert seen == pytest.approx(expected, rel=0.005)
+
+
+def closed(bsdf, radiance, mi):
+    """A cube seen from inside, its sides emitting inwards."""
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 40, "rr_depth": 100},
+            "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+            "box": {
+                "type": "cube",
+                "flip_normals": True,
+                "bsdf": bsdf,
+                "emitter": {"type": "area", "radiance": radiance},
+            },
+        }
+    )
+
+
+def square_with_tangent(mi, folder, tangent):
+    mesh = mi.Mesh("square", 4, 2)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
+    parameters["faces"] = [0, 1, 2, 0, 2, 3]
+    parameters.update()
+    mesh.add_attribute("vertex_tangent", 3, list(tangent) * 4)
+    file = folder / "square.ply"
+    mesh.write_ply(str(file))
+    return {"type": "ply", "filename": str(file)}
+
+
+@pytest.mark.parametrize("degrees", [0.0, 90.0, 30.0, -120.0])
+def test_vertex_tangent_is_the_brushing_direction(mi, tmp_path, degrees):
+    """Evaluated on a mesh with that tangent, the plugin equals numpy in the frame (t, n x t, n)."""
+    material = MATERIALS["mixture"]
+    angle = np.radians(degrees)
+    t, b, n = (
+        np.array([np.cos(angle), np.sin(angle), 0]),
+        np.array([-np.sin(angle), np.cos(angle), 0]),
+        np.array([0, 0, 1.0]),
+    )
+    scene = mi.load_dict(
+        {"type": "scene", "square": square_with_tangent(mi, tmp_path, t) | {"bsdf": material_dict(material)}}
+    )
+    wo_world, wi_world = direction(0.5, 1.0), direction(0.4, 3.9)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo_world * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo_world)))
+    assert si.is_valid()[0]
+    frame = np.stack([t, b, n])
+    expected = MaterialBSDF(material).eval(frame @ wi_world, frame @ wo_world) * (frame @ wi_world)[2]
+    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi_world)))
+    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-4)
+
+    bs, _ = si.bsdf().sample(mi.BSDFContext(), si, mi.Float(0.9), mi.Point2f(0.3, 0.4))
+    sampled = frame @ np.array(si.to_world(bs.wo)).ravel()
+    wanted = MaterialBSDF(material).sample(frame @ wo_world, np.array([0.9, 0.3, 0.4]))
+    np.testing.assert_allclose(sampled, wanted, atol=1e-5)
+
+
+def test_without_tangents_the_frame_is_used(mi):
+    material = MATERIALS["mixture"]
+    scene = mi.load_dict({"type": "scene", "square": {"type": "rectangle", "bsdf": material_dict(material)}})
+    wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2), mi.Vector3f(-wo)))
+    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
+    frame = np.stack([np.array(v).ravel() for v in (si.sh_frame.s, si.sh_frame.t, si.sh_frame.n)])
+    expected = MaterialBSDF(material).eval(frame @ wi, frame @ wo) * wi[2]
+    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-4)
+
+
+def test_flags_components_and_switches(mi):
+    flags = mi.BSDFFlags
+    plugin = mi.load_dict(material_dict(MATERIALS["mixture"]))
+    assert plugin.component_count() == 4
+    for flag in (flags.DiffuseReflection, flags.DiffuseTransmission, flags.GlossyReflection, flags.GlossyTransmission):
+        assert mi.has_flag(plugin.flags(), flag)
+    wo, wi = random_directions(1000, 5), random_directions(1000, 6)
+    si, whole = interaction(mi, wo), mi.BSDFContext()
+
+    def value(bsdf, context=whole):
+        return np.array(bsdf.eval(context, si, mi.Vector3f(wi.T)))
+
+    only_diffuse = mi.load_dict(material_dict(MATERIALS["mixture"], lobes=False))
+    only_lobes = mi.load_dict(material_dict(MATERIALS["mixture"], diffuse=False))
+    np.testing.assert_allclose(value(only_diffuse) + value(only_lobes), value(plugin), rtol=1e-4, atol=1e-9)
+    parts = []
+    for i in range(4):
+        context = mi.BSDFContext()
+        context.component = i
+        parts.append(value(plugin, context))
+    np.testing.assert_allclose(sum(parts), value(plugin), rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(parts[0] + parts[1], value(only_diffuse), rtol=1e-4, atol=1e-9)
+
+
+def test_sampled_type_names_the_component(mi):
+    plugin = mi.load_dict(material_dict(MATERIALS["mixture"]))
+    n = 1000
+    wo = np.tile(direction(0.3, 0.2), (n, 1))
+    u = (np.arange(n) + 0.5) / n
+    bs, _ = plugin.sample(mi.BSDFContext(), interaction(mi, wo), mi.Float(u), mi.Point2f(0.3, 0.7))
+    index, kind = np.array(bs.sampled_component), np.array(bs.sampled_type)
+    assert set(index) == {0, 1, 2, 3} and (np.diff(index.astype(int)) >= 0).all()
+    below = np.array(bs.wo).T[:, 2] < 0
+    assert (below == ((kind & int(mi.BSDFFlags.Transmission)) != 0)).all()
+
+
+def test_a_bad_document_is_refused(mi):
+    with pytest.raises(Exception, match="roughnes"):
+        mi.load_dict({"type": PLUGIN, "material": '{"roughnes": 1}'})
