@@ -1,0 +1,141 @@
+"""How a camera answers the mouse and the keys: pure functions from one camera to the next.
+
+Two modes. Orbit turns the camera about its target. Walking stands on the floor: the eye is `EYE_HEIGHT_M` above what is
+under it, and never leaves the scene's bounds. In both the horizon stays level (up is +y) and the pitch stays short of
+the poles. Angles in radians, lengths in metres, mouse distances in pixels of the window (x right, y down).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Set as AbstractSet
+
+import numpy as np
+
+from lambent.store.contract import CameraRecord, Triple
+
+Bounds = tuple[Triple, Triple]
+
+EYE_HEIGHT_M = 1.6
+WALK_M_S, FAST = 1.4, 3.0
+PITCH_LIMIT_RAD = math.radians(85)
+TURN_RAD_PX = math.radians(0.3)
+ZOOM_PER_STEP = 0.88
+NEAREST_M = 0.02
+WALL_M = 0.15  # the eye keeps this distance from the scene's bounds
+SETTLE_S = 0.12  # time constant with which the eye follows the floor
+LONGEST_STEP_S = 0.25  # a stalled frame does not carry the walker across the room
+
+KEYS = {
+    "w": (0, 0, 1), "ArrowUp": (0, 0, 1), "s": (0, 0, -1), "ArrowDown": (0, 0, -1),
+    "d": (1, 0, 0), "ArrowRight": (1, 0, 0), "a": (-1, 0, 0), "ArrowLeft": (-1, 0, 0),
+    "e": (0, 1, 0), " ": (0, 1, 0), "q": (0, -1, 0), "c": (0, -1, 0),
+}  # fmt: skip
+
+
+def yaw_pitch(camera: CameraRecord) -> tuple[float, float]:
+    """Heading (0 looks along -z, positive to the right) and elevation of the line of sight."""
+    x, y, z = _sight(camera)
+    return math.atan2(x, -z), math.atan2(y, math.hypot(x, z))
+
+
+def orbit(camera: CameraRecord, dx_px: float, dy_px: float) -> CameraRecord:
+    """Turned about the target: the picture follows the mouse."""
+    yaw, pitch = yaw_pitch(camera)
+    sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
+    return _placed(camera, np.array(camera.target) - sight * _distance(camera), camera.target)
+
+
+def pan(camera: CameraRecord, dx_px: float, dy_px: float, height_px: float) -> CameraRecord:
+    """Shifted in the picture plane, so that the target stays under the mouse."""
+    yaw, pitch = yaw_pitch(camera)
+    right = np.array([math.cos(yaw), 0, math.sin(yaw)])
+    up = np.cross(right, _direction(yaw, pitch))
+    metres_px = 2 * _distance(camera) * math.tan(math.radians(camera.fov_y_deg) / 2) / height_px
+    shift = (dy_px * up - dx_px * right) * metres_px
+    return _placed(camera, np.array(camera.position) + shift, np.array(camera.target) + shift)
+
+
+def zoom(camera: CameraRecord, steps: float, bounds: Bounds) -> CameraRecord:
+    """`steps` of the wheel nearer to the target (negative: away), never past it nor out of sight of the scene."""
+    farthest = 20 * math.dist(*bounds)
+    distance = min(max(_distance(camera) * ZOOM_PER_STEP**steps, NEAREST_M), farthest)
+    return _placed(camera, np.array(camera.target) - _direction(*yaw_pitch(camera)) * distance, camera.target)
+
+
+def look(camera: CameraRecord, dx_px: float, dy_px: float) -> CameraRecord:
+    """Turned on the spot, in the direction the mouse is dragged."""
+    yaw, pitch = yaw_pitch(camera)
+    sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
+    return _placed(camera, camera.position, np.array(camera.position) + sight * _distance(camera))
+
+
+def walk(
+    camera: CameraRecord,
+    keys: AbstractSet[str],
+    dt_s: float,
+    *,
+    bounds: Bounds,
+    floor_y: float | None,
+    flying: bool = False,
+    fast: bool = False,
+) -> CameraRecord:
+    """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
+
+    On foot the eye moves level and settles at eye height above `floor_y` (the scene's lowest point where it is None).
+    Flying, it moves along the line of sight, and up and down by the keys for it.
+    """
+    right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
+    if not (right or forward or (up and flying)):
+        return camera
+    dt_s = min(dt_s, LONGEST_STEP_S)
+    yaw, pitch = yaw_pitch(camera)
+    step = right * np.array([math.cos(yaw), 0, math.sin(yaw)]) + forward * _direction(yaw, pitch if flying else 0.0)
+    step = step + np.array([0, up if flying else 0, 0])
+    length = float(np.linalg.norm(step))
+    if length > 0:
+        step = step / length
+    eye = np.array(camera.position) + step * speed_m_s(bounds, fast) * dt_s
+    if not flying:
+        eye_y = (bounds[0][1] if floor_y is None else floor_y) + eye_height_m(bounds)
+        eye[1] += (eye_y - eye[1]) * (1 - math.exp(-dt_s / SETTLE_S))
+    eye = confined(eye, camera.position, bounds)
+    return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))
+
+
+def eye_height_m(bounds: Bounds) -> float:
+    """`EYE_HEIGHT_M`, or 60 % of the height of a scene that is too low to stand in."""
+    height = bounds[1][1] - bounds[0][1]
+    return EYE_HEIGHT_M if height >= EYE_HEIGHT_M + 2 * WALL_M else 0.6 * height
+
+
+def speed_m_s(bounds: Bounds, fast: bool) -> float:
+    """Walking speed, slower in a small model in proportion to the eye height."""
+    return WALK_M_S * eye_height_m(bounds) / EYE_HEIGHT_M * (FAST if fast else 1.0)
+
+
+def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
+    """`eye` kept inside the bounds; where `before` was outside already, it gets no farther out."""
+    low, high = np.array(bounds)
+    margin = np.minimum(WALL_M, 0.1 * (high - low))
+    return np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before))
+
+
+def _sight(camera: CameraRecord) -> np.ndarray:
+    return np.subtract(camera.target, camera.position)
+
+
+def _distance(camera: CameraRecord) -> float:
+    return max(math.dist(camera.target, camera.position), NEAREST_M)
+
+
+def _direction(yaw: float, pitch: float) -> np.ndarray:
+    pitch = min(max(pitch, -PITCH_LIMIT_RAD), PITCH_LIMIT_RAD)
+    return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), -math.cos(yaw) * math.cos(pitch)])
+
+
+def _placed(camera: CameraRecord, position: np.ndarray | Triple, target: np.ndarray | Triple) -> CameraRecord:
+    (px, py, pz), (tx, ty, tz) = map(float, position), map(float, target)
+    return CameraRecord(
+        name="free", position=(px, py, pz), target=(tx, ty, tz), up=(0.0, 1.0, 0.0), fov_y_deg=camera.fov_y_deg
+    )

@@ -1,0 +1,70 @@
+"""When to draw the picture, how large, and with which integrator.
+
+While anything the picture shows changes: the few-sample integrator, on fewer pixels where the adapter is too slow for
+them. `REST_S` after the last change: every frame adds samples of `qmc` to the picture, up to a stated count; then
+nothing is drawn any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+REST_S = 0.25
+BUDGET_S = 1 / 15  # a frame in motion should take no longer
+SCALES = (1.0, 0.75, 0.5, 0.35, 0.25)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One picture to draw: its size relative to the window, and its index in the accumulation (None: few samples)."""
+
+    scale: float
+    accumulate: int | None
+
+
+class Pacer:
+    """Tells what to draw next. Everything it knows it is told: the time, what changed, what a frame cost."""
+
+    def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
+        self.accumulate_to = accumulate_to
+        self.moving_scale = 0.5 if slow_adapter else 1.0
+        self._shown: Hashable = None
+        self._changed_s = 0.0
+        self._accumulated = 0
+        self._last: Plan | None = None
+
+    @property
+    def accumulated(self) -> int:
+        return self._accumulated
+
+    def plan(self, picture: Hashable, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
+        """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
+        if picture != self._shown:
+            self._shown, self._changed_s, self._accumulated = picture, now_s, 0
+            return Plan(self.moving_scale if adaptive else 1.0, None)
+        return self._next(refine) if now_s - self._changed_s >= REST_S else None
+
+    def wait_s(self, now_s: float, *, refine: bool) -> float | None:
+        """Seconds until the next picture is due although nothing changes; None: never."""
+        return None if self._next(refine) is None else max(0.0, self._changed_s + REST_S - now_s)
+
+    def _next(self, refine: bool) -> Plan | None:
+        """What a resting camera still lacks."""
+        if refine:
+            return Plan(1.0, self._accumulated) if self._accumulated < self.accumulate_to else None
+        return None if self._last == Plan(1.0, None) else Plan(1.0, None)
+
+    def drawn(self, plan: Plan) -> None:
+        self._last = plan
+        self._accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
+
+    def cost(self, plan: Plan, seconds: float) -> None:
+        """Learn what a frame in motion took, and choose the size of the next."""
+        if plan.accumulate is not None:
+            return
+        full_s = seconds / plan.scale**2  # two thirds of the cost is texture filtering, so pixels are what counts
+        fits = next((s for s in SCALES if full_s * s * s <= BUDGET_S), SCALES[-1])
+        larger_fits_well = fits > self.moving_scale and full_s * fits * fits <= 0.7 * BUDGET_S
+        if fits < self.moving_scale or larger_fits_well:
+            self.moving_scale = fits

@@ -1,0 +1,185 @@
+"""The one state of the window. Panels and event handlers read and write only this; the window draws what it says."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+
+Mode = Literal["orbit", "walk"]
+MESSAGE_S = 6.0
+UNDO_LIMIT = 200
+
+
+@dataclass
+class MaterialEdits:
+    """Materials that differ from the scene's, with undo and redo.
+
+    A stroke is what one drag of a slider does: any number of `change`, then one `end_stroke`. It is undone as a whole.
+    """
+
+    scene: Mapping[str, Material]
+    edited: dict[str, Material] = field(default_factory=dict)
+    _undo: list[dict[str, Material]] = field(default_factory=list)
+    _redo: list[dict[str, Material]] = field(default_factory=list)
+    _before: dict[str, Material] | None = None  # what the open stroke started from
+
+    def current(self, name: str) -> Material:
+        return self.edited.get(name, self.scene[name])
+
+    def change(self, name: str, material: Material) -> None:
+        if self._before is None:
+            self._before = dict(self.edited)
+        self.edited[name] = material
+        if material == self.scene[name]:
+            del self.edited[name]
+
+    def end_stroke(self) -> None:
+        before, self._before = self._before, None
+        if before is not None and before != self.edited:
+            self._undo = [*self._undo, before][-UNDO_LIMIT:]
+            self._redo.clear()
+
+    def reset(self, name: str) -> None:
+        """Back to the scene's material, as a stroke of its own."""
+        self.end_stroke()
+        self.change(name, self.scene[name])
+        self.end_stroke()
+
+    @property
+    def can_undo(self) -> bool:
+        return bool(self._undo) or self._before is not None
+
+    @property
+    def can_redo(self) -> bool:
+        return bool(self._redo)
+
+    def undo(self) -> None:
+        self.end_stroke()
+        if self._undo:
+            self._redo.append(self.edited)
+            self.edited = self._undo.pop()
+
+    def redo(self) -> None:
+        self.end_stroke()
+        if self._redo:
+            self._undo.append(self.edited)
+            self.edited = self._redo.pop()
+
+
+@dataclass
+class PathPlay:
+    """A camera path being shown."""
+
+    path: PathRecord
+    time_s: float = 0.0
+    playing: bool = True
+
+
+@dataclass
+class Message:
+    text: str
+    until_s: float
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What the last frame cost. Times in ms; `gpu_ms` is empty where the adapter has no timers."""
+
+    adapter: str = ""
+    frame_ms: float = 0.0
+    gpu_ms: Mapping[str, float] = field(default_factory=dict)
+    draw_calls: int = 0
+    resolution: tuple[int, int] = (0, 0)
+    samples: int = 0  # per pixel, of the frame
+    accumulated: int = 0  # per pixel, since the camera rests
+    accumulate_to: int = 0
+
+
+@dataclass
+class ViewerState:
+    """See the module. `folder` is where pictures and materials are saved; `clock` gives seconds."""
+
+    scene: SceneRecord
+    camera: CameraRecord
+    edits: MaterialEdits
+    mode: Mode = "walk"
+    flying: bool = False
+    exposure_ev: float = 0.0
+    view_transform: str = "filmic"
+    integrator: str = "rings"
+    n: int | None = None  # samples per lobe; None: chosen per material from its roughness
+    show: str = "full"
+    lookup: str = "planes"
+    selected: str | None = None  # object name
+    path: PathPlay | None = None
+    refine: bool = True  # accumulate while nothing moves
+    adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
+    panels_shown: bool = True
+    screenshot_wanted: bool = False
+    statistics: Statistics = field(default_factory=Statistics)
+    messages: list[Message] = field(default_factory=list)
+    folder: Path = field(default_factory=Path)
+    clock: Callable[[], float] = time.monotonic
+
+    @classmethod
+    def of(cls, scene: SceneRecord, mode: Mode, **options: object) -> ViewerState:
+        """State at the scene's first camera, or, where it has none, at one that sees the whole scene."""
+        camera = scene.cameras[0] if scene.cameras else overview(scene)
+        edits = MaterialEdits(scene.materials)
+        return cls(scene, camera, edits, mode, exposure_ev=scene.exposure_ev, **options)  # type: ignore[arg-type]
+
+    def say(self, text: str) -> None:
+        """Show a message for `MESSAGE_S` seconds."""
+        self.messages.append(Message(text, self.clock() + MESSAGE_S))
+
+    def drop_old_messages(self) -> None:
+        now = self.clock()
+        self.messages = [m for m in self.messages if m.until_s > now]
+
+    def jump(self, camera: CameraRecord) -> None:
+        self.camera, self.path = camera, None
+
+    def move(self, camera: CameraRecord) -> None:
+        """Take a camera the user moved; that ends a path being shown."""
+        if camera != self.camera:
+            self.jump(camera)
+
+    @property
+    def selected_object(self) -> ObjectRecord | None:
+        return next((o for o in self.scene.objects if o.name == self.selected), None)
+
+    @property
+    def selected_material(self) -> str | None:
+        chosen = self.selected_object
+        return chosen.material if chosen else None
+
+    def save_material(self, name: str, file_name: str) -> None:
+        """Write the material as it is now into `folder`, and say so, or say why not."""
+        try:
+            self.edits.current(name).save(file_in(self.folder, file_name))
+        except (UserError, OSError) as error:
+            self.say(f"not saved: {error}")
+        else:
+            self.say(f"saved {file_name}")
+
+
+def file_in(folder: Path, file_name: str) -> Path:
+    """`folder / file_name` for a bare `*.json` name, else a `UserError`."""
+    if not file_name.endswith(".json") or file_name == ".json" or Path(file_name).name != file_name:
+        raise UserError("not a file name", got=file_name, expected="a name like walnut.json")
+    return folder / file_name
+
+
+def overview(scene: SceneRecord) -> CameraRecord:
+    """A camera in front of the scene that sees all of it."""
+    (x0, y0, z0), (x1, y1, z1) = scene.bounds
+    centre = ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2)
+    away = 1.3 * max(x1 - x0, y1 - y0) + (z1 - z0) / 2
+    return CameraRecord(name="overview", position=(centre[0], centre[1], centre[2] + away), target=centre)

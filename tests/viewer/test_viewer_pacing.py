@@ -1,0 +1,67 @@
+"""What the window draws when: quick in motion, better at rest, then nothing."""
+
+import pytest
+
+from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Pacer, Plan
+
+
+def pacer(**options):
+    return Pacer(**{"accumulate_to": 4, "slow_adapter": False, **options})
+
+
+def step(pacer, picture, now_s, refine=True, adaptive=True):
+    plan = pacer.plan(picture, now_s, refine=refine, adaptive=adaptive)
+    if plan:
+        pacer.drawn(plan)
+    return plan
+
+
+def test_motion_then_rest_then_idle():
+    p = pacer()
+    assert step(p, "a", 0.0) == Plan(1.0, None)
+    assert step(p, "a", 0.1) is None
+    assert p.wait_s(0.1, refine=True) == pytest.approx(REST_S - 0.1)
+    assert [step(p, "a", 1.0 + k).accumulate for k in range(4)] == [0, 1, 2, 3]
+    assert p.accumulated == 4
+    assert step(p, "a", 9.0) is None
+    assert p.wait_s(9.0, refine=True) is None
+
+
+def test_motion_returns_to_few_samples_at_once():
+    p = pacer()
+    step(p, "a", 0.0)
+    assert step(p, "a", 1.0) == Plan(1.0, 0)
+    assert step(p, "b", 1.01) == Plan(1.0, None)
+    assert step(p, "b", 2.0) == Plan(1.0, 0)
+
+
+def test_without_refinement_a_slow_adapter_sharpens_once():
+    p = pacer(slow_adapter=True)
+    assert step(p, "a", 0.0, refine=False) == Plan(0.5, None)
+    assert step(p, "a", 1.0, refine=False) == Plan(1.0, None)
+    assert step(p, "a", 2.0, refine=False) is None
+    assert p.wait_s(2.0, refine=False) is None
+
+
+def test_full_resolution_on_request():
+    assert step(pacer(slow_adapter=True), "a", 0.0, adaptive=False) == Plan(1.0, None)
+
+
+def test_the_size_in_motion_meets_the_budget():
+    p = pacer()
+    p.cost(Plan(1.0, None), 10 * BUDGET_S)
+    assert p.moving_scale == 0.25
+    p.cost(Plan(0.25, None), BUDGET_S / 8)
+    assert p.moving_scale == 0.5  # larger only when it fits with room to spare
+    p.cost(Plan(0.5, None), BUDGET_S * 0.9)
+    assert p.moving_scale == 0.5
+    p.cost(Plan(0.5, None), BUDGET_S / 100)
+    assert p.moving_scale == 1.0
+    p.cost(Plan(1.0, None), 1e3)
+    assert p.moving_scale == SCALES[-1]
+
+
+def test_accumulated_frames_do_not_count_as_motion():
+    p = pacer()
+    p.cost(Plan(1.0, 3), 10.0)
+    assert p.moving_scale == 1.0

@@ -1,0 +1,58 @@
+"""Rays of the mouse and of the feet."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lambent.store.contract import CameraRecord
+from lambent.viewer.picking import Geometry, first_hit, ray_through
+
+TOP = CameraRecord(name="top", position=(0, 3, 0), target=(0, 0, 0), up=(0, 0, -1), fov_y_deg=90)
+
+
+@pytest.fixture
+def geometry(scene):
+    def square(half, y):
+        return [(-half, y, -half), (-half, y, half), (half, y, half), (half, y, -half)]
+
+    positions = np.array(square(4, 0.0) + square(1, 1.0), np.float32)
+    faces = np.array([(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)], np.uint32)
+    return Geometry(positions, faces, scene.objects)
+
+
+def test_the_nearest_object_is_picked(geometry):
+    assert geometry.pick(*ray_through(TOP, 0.5, 0.5, 1.5)).name == "table"
+    assert geometry.pick(*ray_through(TOP, 0.95, 0.5, 1.0)).name == "floor"
+    assert geometry.pick(np.array([0.0, 3, 0]), np.array([0.0, 1, 0])) is None
+
+
+def test_picture_points_are_right_side_up():
+    eye = CameraRecord(name="eye", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
+    _, right = ray_through(eye, 1.0, 0.5, 2.0)
+    _, top = ray_through(eye, 0.5, 0.0, 2.0)
+    assert right == pytest.approx(np.array([2, 0, -1]) / np.sqrt(5))
+    assert top == pytest.approx(np.array([0, 1, -1]) / np.sqrt(2))
+
+
+def test_floors_and_tables(geometry):
+    assert geometry.floor_below((3, 1.6, 3), 1.6) == pytest.approx(0)
+    assert geometry.floor_below((0, 1.6, 0), 1.6) == pytest.approx(0)  # the table is no stair
+    assert geometry.floor_below((0, 2.4, 0), 1.6) == pytest.approx(1)  # but one can stand on it
+    assert geometry.floor_below((9, 1.6, 0), 1.6) is None
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_points_inside_a_triangle_are_hit_at_their_distance(seed):
+    rng = np.random.default_rng(seed)
+    triangle = rng.normal(size=(1, 3, 3))
+    weights = rng.dirichlet((2, 2, 2))
+    point, origin = weights @ triangle[0], rng.normal(size=3) * 3
+    distance = np.linalg.norm(point - origin)
+    normal = np.cross(triangle[0, 1] - triangle[0, 0], triangle[0, 2] - triangle[0, 0])
+    if abs(normal @ (point - origin)) < 1e-3 * np.linalg.norm(normal) * distance:
+        return  # edge-on
+    assert first_hit(origin, (point - origin) / distance, triangle) == pytest.approx(distance, rel=1e-5)
+    outside = triangle[0, 0] + 1.2 * (triangle[0, 1] - triangle[0, 0]) + 0.2 * (triangle[0, 2] - triangle[0, 0])
+    direction = (outside - origin) / np.linalg.norm(outside - origin)
+    assert first_hit(origin, direction, triangle) == np.inf

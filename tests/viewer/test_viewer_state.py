@@ -1,0 +1,109 @@
+"""The state of the window: edits with undo, selection, messages, saving."""
+
+import pytest
+
+from lambent.materials.document import load_material
+from lambent.viewer.state import MESSAGE_S, PathPlay, ViewerState
+
+
+@pytest.fixture
+def state(scene, tmp_path):
+    return ViewerState.of(scene, "walk", folder=tmp_path)
+
+
+def rougher(material, mx):
+    return material.model_copy(update={"lobes": (material.lobes[0].model_copy(update={"mx": mx}),)})
+
+
+def test_it_starts_at_the_first_camera_with_the_scenes_exposure(state, scene):
+    assert state.camera == scene.cameras[0]
+    assert state.exposure_ev == 1.5
+
+
+def test_a_scene_without_cameras_is_seen_whole(scene):
+    camera = ViewerState.of(scene.model_copy(update={"cameras": ()}), "orbit").camera
+    assert camera.target == pytest.approx((0, 1.3, 0))
+    assert camera.position[2] > 4
+
+
+def test_a_stroke_is_undone_as_a_whole(state):
+    edits, brass = state.edits, state.scene.materials["brass"]
+    for mx in (0.2, 0.25, 0.3):
+        edits.change("brass", rougher(brass, mx))
+    edits.end_stroke()
+    edits.change("brass", rougher(brass, 0.5))
+    edits.end_stroke()
+    edits.undo()
+    assert edits.current("brass").lobes[0].mx == 0.3
+    edits.undo()
+    assert edits.edited == {} and not edits.can_undo
+    edits.redo()
+    edits.redo()
+    assert edits.current("brass").lobes[0].mx == 0.5 and not edits.can_redo
+
+
+def test_a_new_stroke_forgets_what_was_undone(state):
+    edits, brass = state.edits, state.scene.materials["brass"]
+    edits.change("brass", rougher(brass, 0.2))
+    edits.undo()
+    edits.change("brass", rougher(brass, 0.4))
+    edits.end_stroke()
+    assert not edits.can_redo
+    edits.redo()
+    assert edits.current("brass").lobes[0].mx == 0.4
+
+
+def test_a_stroke_that_ends_where_it_began_is_none(state):
+    state.edits.change("brass", rougher(state.scene.materials["brass"], 0.2))
+    state.edits.change("brass", state.scene.materials["brass"])
+    state.edits.end_stroke()
+    assert not state.edits.can_undo
+
+
+def test_reset_can_be_undone(state):
+    edited = rougher(state.scene.materials["brass"], 0.2)
+    state.edits.change("brass", edited)
+    state.edits.reset("brass")
+    assert state.edits.current("brass") == state.scene.materials["brass"]
+    state.edits.undo()
+    assert state.edits.current("brass") == edited
+
+
+def test_selection_leads_to_the_material(state):
+    assert state.selected_material is None
+    state.selected = "table"
+    assert state.selected_material == "brass"
+
+
+def test_moving_the_camera_ends_the_path(state, scene):
+    state.path = PathPlay(scene.paths[0])
+    state.move(state.camera)
+    assert state.path is not None
+    state.move(scene.cameras[1])
+    assert state.path is None and state.camera == scene.cameras[1]
+
+
+def test_messages_go(state):
+    now = [0.0]
+    state.clock = lambda: now[0]
+    state.say("hello")
+    state.drop_old_messages()
+    assert [m.text for m in state.messages] == ["hello"]
+    now[0] = MESSAGE_S
+    state.drop_old_messages()
+    assert state.messages == []
+
+
+def test_a_material_is_saved_as_it_is_now(state, tmp_path):
+    edited = rougher(state.scene.materials["brass"], 0.2)
+    state.edits.change("brass", edited)
+    state.save_material("brass", "new brass.json")
+    assert load_material(tmp_path / "new brass.json") == edited
+    assert state.messages[-1].text == "saved new brass.json"
+
+
+@pytest.mark.parametrize("name", ["../brass.json", "brass", ".json", "/tmp/brass.json", ""])
+def test_a_material_is_saved_nowhere_else(state, tmp_path, name):
+    state.save_material("brass", name)
+    assert "not saved" in state.messages[-1].text
+    assert list(tmp_path.iterdir()) == []
