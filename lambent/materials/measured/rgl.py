@@ -1,0 +1,207 @@
+"""RGL material database (Dupuy & Jakob 2018): BRDF over a warp of the square that follows the material's own lobe.
+
+The file gives f cos(theta_o) = spectra(u) D(u_m) / (4 sigma(u_i)), with u the point that the
+distribution of visible normals warps to the half vector's u_m. Mappings: u_theta = sqrt(2 theta / pi),
+u_phi = (phi + pi) / (2 pi). Isotropic files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may
+cover half or a quarter of the circle of phi_i, the rest follows by mirroring.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, direction, normalize, reflect
+from lambent.materials.measured.marginal import Corners, Warp, bilinear
+from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
+from lambent.materials.measured.spectral import rgb_of_spectra
+from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values
+from lambent.materials.measured.tensor_file import MAGIC, read_tensors
+
+NAME = "RGL tensor file"
+_DIMENSIONS = {"phi_i": 1, "theta_i": 1, "ndf": 2, "sigma": 2, "vndf": 4}
+_QUERIES_AT_ONCE = 1 << 17
+
+Tensors = dict[str, NDArray[np.generic]]
+
+
+def recognise(head: bytes, size: int) -> bool:
+    """Whether the file begins with the container's magic."""
+    return head.startswith(MAGIC)
+
+
+def read(path: Path) -> RglTable:
+    """The table of an RGL file, RGB or spectral.
+
+    Raises
+    ------
+    UserError
+        Where the container or a tensor in it is broken, or no value is usable.
+    """
+    tensors = read_tensors(path)
+    for name, dimensions in _DIMENSIONS.items():
+        _require(name in tensors, path, name, "is missing")
+        tensor = tensors[name]
+        _require(tensor.dtype == np.float32 and tensor.ndim == dimensions, path, name, "has the wrong shape or type")
+        _require(bool(np.isfinite(tensor.astype(np.float32)).all()), path, name, "holds values that are not finite")
+    phi, theta = (tensors[name].astype(np.float64) for name in ("phi_i", "theta_i"))
+    for name, nodes, low, high in (("phi_i", phi, -np.pi, np.pi), ("theta_i", theta, 0, np.pi / 2)):
+        ordered = len(nodes) > 0 and bool((np.diff(nodes) > 0).all())
+        inside = ordered and low - 1e-4 <= nodes[0] and nodes[-1] <= high + 1e-4
+        _require(inside, path, name, "is not an increasing list of angles in radians")
+    ndf, sigma, vndf = (tensors[name].astype(np.float32) for name in ("ndf", "sigma", "vndf"))
+    for name, table in (("ndf", ndf), ("sigma", sigma), ("vndf", vndf)):
+        _require(min(table.shape[-2:]) >= 2, path, name, "is too small")
+        _require(bool((table >= 0).all()), path, name, "holds negative values")
+    _require(vndf.shape[:2] == (len(phi), len(theta)), path, "vndf", "does not fit phi_i and theta_i")
+    _require(bool((vndf.sum(axis=(2, 3)) > 0).all()), path, "vndf", "is zero for an incident direction")
+    _require(bool((sigma > 0).any()), path, "sigma", "is zero")
+    return RglTable(tensors, _values_rgb(tensors, path), path)
+
+
+def _require(holds: bool, path: Path, field: str, what: str) -> None:
+    if not holds:
+        raise UserError(what, file=path, field=field)
+
+
+def _values_rgb(tensors: Tensors, path: Path) -> Floats:
+    """(phi, theta, rows, columns, 3) linear RGB of the file's `rgb` or `spectra`."""
+    name = "rgb" if "rgb" in tensors else "spectra"
+    _require(name in tensors, path, "rgb", "is missing, and so is spectra")
+    values = tensors[name]
+    incident = tensors["vndf"].shape[:2]
+    usual = values.ndim == 5 and values.dtype == np.float32 and values.shape[:2] == incident
+    _require(usual and min(values.shape) > 0 and min(values.shape[3:]) >= 2, path, name, "has a wrong shape or type")
+    channels_last = np.moveaxis(values.astype(np.float32), 2, -1)
+    if name == "rgb":
+        _require(channels_last.shape[-1] == 3, path, name, "does not have three channels")
+        return channels_last
+    wavelengths = tensors.get("wavelengths", np.empty(0)).astype(np.float64)
+    usable = wavelengths.shape == channels_last.shape[-1:] and bool((np.diff(wavelengths) > 0).all())
+    _require(usable, path, "wavelengths", "does not name the wavelength of every spectral value, increasing")
+    return np.asarray(channels_last @ rgb_of_spectra(wavelengths).T.astype(np.float32))
+
+
+class RglTable(IntegratedTable):
+    """BRDF of an RGL file, evaluated as the renderers that read the format do, then divided by cos(theta_o).
+
+    Parameters
+    ----------
+    tensors : dict
+        The file's checked tensors.
+    values : (phi, theta, rows, columns, 3)
+        Linear RGB at the nodes of the warped square, as stored: negative and not finite values included.
+    path : Path
+    """
+
+    def __init__(self, tensors: Tensors, values: Floats, path: Path) -> None:
+        self._phi, self._theta = (tensors[name].astype(np.float64) for name in ("phi_i", "theta_i"))
+        self._isotropic = len(self._phi) <= 2
+        self._reduction = 1 if self._isotropic else round(2 * np.pi / (self._phi[-1] - self._phi[0]))
+        self._with_jacobian = bool(np.any(tensors.get("jacobian", np.ones(1))))
+        self._raw = values
+        finite = np.asarray(np.isfinite(values).all(axis=-1))
+        usable = np.asarray(finite & (values >= 0).all(axis=-1))
+        require_values(values, usable, path)
+        slices = (-1, *values.shape[2:])
+        self._values = fill_holes(values, finite).reshape(slices).astype(np.float64)
+        self._warp = Warp(tensors["vndf"].astype(np.float64).reshape(-1, *tensors["vndf"].shape[2:]))
+        self._ndf, self._sigma = (tensors[name].astype(np.float64)[None] for name in ("ndf", "sigma"))
+        negative = int((values < 0).sum())
+        notes = [f"{negative} of {values.size} stored values are negative; eval takes them as 0"] if negative else []
+        if not finite.all():
+            notes.append(f"{int((~finite).sum())} nodes are not finite; eval takes the nearest node")
+        self.info = TableInfo(
+            file=Path(path).name,
+            format=NAME,
+            isotropic=self._isotropic,
+            transmits=False,
+            channels=3,
+            stored="f_cos",
+            sizes=dict(zip(("phi_i", "theta_i", "rows", "columns"), values.shape[:4], strict=True)),
+            notes=tuple(notes),
+        )
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr; negative values become 0; 0 where wi or wo is below the surface."""
+        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
+        f = np.zeros((len(flat_i), 3))
+        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
+        for start in range(0, len(above), _QUERIES_AT_ONCE):
+            part = above[start : start + _QUERIES_AT_ONCE]
+            f[part] = self._eval_above(flat_i[part], flat_o[part])
+        return f.reshape(wi.shape)
+
+    def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
+        cos_o = wo[:, 2:]
+        wi, wo = self._reduced(wi, wo)
+        theta_i, phi_i = _elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])
+        m = normalize(wi + wo)
+        phi_m = np.arctan2(m[:, 1], m[:, 0]) - (phi_i if self._isotropic else 0)
+        u_m = np.stack([_u_of_theta(_elevation(m)), _u_of_phi(phi_m) % 1.0], axis=-1)
+        corners = Corners((self._phi, self._theta), (phi_i, theta_i))
+        u, _ = self._warp.invert(corners, u_m)
+        value = bilinear(self._values, corners, u) * self._factor(u_m, theta_i, phi_i)
+        return np.maximum(value, 0) / cos_o
+
+    def _factor(self, u_m: Floats, theta_i: Floats, phi_i: Floats) -> Floats:
+        """(N, 1) D / (4 sigma), or 1 of a file that stores f cos itself."""
+        if not self._with_jacobian:
+            return np.ones((len(u_m), 1))
+        whole = Corners((np.zeros(1), np.zeros(1)), (theta_i, phi_i))
+        u_i = np.stack([_u_of_theta(theta_i), _u_of_phi(phi_i)], axis=-1)
+        sigma = bilinear(self._sigma, whole, u_i)
+        factor: Floats = np.divide(bilinear(self._ndf, whole, u_m), 4 * sigma, out=np.zeros(len(u_m)), where=sigma > 0)
+        return factor[:, None]
+
+    def _reduced(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
+        """The pair mirrored into the part of the circle that the file covers."""
+        if self._reduction < 2:
+            return wi, wo
+        flip_y = np.where(wi[:, 1] > 0, -1.0, 1.0)
+        flip_x = np.where(wi[:, 0] > 0, -1.0, 1.0) if self._reduction == 4 else flip_y
+        flip = np.stack([flip_x, flip_y, np.ones_like(flip_y)], axis=-1)
+        return wi * flip, wo * flip
+
+    def samples(self, max_count: int | None = None) -> MeasuredSamples:
+        """One tuple per node of the warped square; nodes whose wo is below the surface count as shadowed.
+
+        The weight is the node's share of the square times d_wo/du, in sr.
+        """
+        phi, theta, rows, columns = self._raw.shape[:4]
+        i, j, y, x = (a.ravel() for a in np.meshgrid(*map(np.arange, (phi, theta, rows, columns)), indexing="ij"))
+        corners = Corners((self._phi, self._theta), (self._phi[i], self._theta[j]))
+        u = np.stack([x / (columns - 1), y / (rows - 1)], axis=-1)
+        u_m, density = self._warp.sample(corners, u)
+        theta_m, phi_m = u_m[:, 0] ** 2 * np.pi / 2, (2 * u_m[:, 1] - 1) * np.pi
+        wi = direction(self._theta[j], self._phi[i])
+        m = direction(theta_m, phi_m + (self._phi[i] if self._isotropic else 0))
+        wo = reflect(wi, m)
+        value = self._raw.reshape(-1, 3) * self._factor(u_m, self._theta[j], self._phi[i])
+        below: Flags = (wo[:, 2] <= 0) | (density <= 0)
+        f = np.divide(value, wo[:, 2:], out=np.zeros_like(value, dtype=float), where=~below[:, None])
+        jacobian = 2 * np.pi**2 * u_m[:, 0] * np.sin(theta_m) * 4 * np.sum(wi * m, axis=-1)
+        share = _share(x, columns) * _share(y, rows)
+        weight = np.divide(share * jacobian, density, out=np.zeros(len(f)), where=~below)
+        return collect(wi, wo, f, weight, self.info, below, max_count)
+
+
+def _share(index: NDArray[np.integer], count: int) -> Floats:
+    """Share of [0, 1] that a node of an even grid stands for: half of it at the ends."""
+    return np.where((index == 0) | (index == count - 1), 0.5, 1.0) / (count - 1)
+
+
+def _elevation(w: Floats) -> Floats:
+    return np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])
+
+
+def _u_of_theta(theta: Floats) -> Floats:
+    return np.asarray(np.sqrt(theta * (2 / np.pi)))
+
+
+def _u_of_phi(phi: Floats) -> Floats:
+    return np.asarray((phi + np.pi) / (2 * np.pi))

@@ -1,0 +1,108 @@
+"""What tables of every format share: albedos by quadrature, filled holes, and the refusal of files without values."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats
+from lambent.core.sequences import radical_inverse
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo
+
+# The quadrature draws from a mixture that is nowhere much narrower or wider than a measured lobe can be.
+_WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
+_PROPOSAL = Material(
+    kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
+)
+_QUADRATURE_POINTS = 4096
+
+
+class IntegratedTable(ABC):
+    """Base of the tables: `eval` and `samples` are the format's, reflectivity and transmissivity follow from `eval`."""
+
+    info: TableInfo
+
+    @abstractmethod
+    def eval(self, wi: Floats, wo: Floats) -> Floats: ...
+
+    @abstractmethod
+    def samples(self, max_count: int | None = None) -> MeasuredSamples: ...
+
+    def reflectivity(self, wi: Floats) -> Floats:
+        """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % of a smooth table."""
+        return self._integral(wi, 1.0)
+
+    def transmissivity(self, wi: Floats) -> Floats:
+        """t (..., C): the integral of f |cos theta_o| over the far side (2.8); 0 of an opaque table."""
+        if not self.info.transmits:
+            return np.zeros((*wi.shape[:-1], self.info.channels))
+        return self._integral(wi, -1.0)
+
+    def albedo(self, wi: Floats) -> Floats:
+        """r + t (..., C)."""
+        return np.asarray(self.reflectivity(wi) + self.transmissivity(wi))
+
+    def _integral(self, wi: Floats, side: float) -> Floats:
+        flat = np.asarray(wi, dtype=float).reshape(-1, 3)
+        value = [self._integral_of_one(w, side) for w in flat]
+        return np.array(value).reshape(*wi.shape[:-1], self.info.channels)
+
+    def _integral_of_one(self, wi: Floats, side: float) -> Floats:
+        proposal, u = MaterialBSDF(_PROPOSAL), _quadrature()
+        all_wi = np.broadcast_to(wi, u.shape)
+        wo = proposal.sample(all_wi, u)
+        pdf = proposal.pdf(wo, all_wi)
+        inside = (pdf > 0) & (wo[:, 2] * wi[2] > 0)
+        weight = np.abs(wo[inside, 2]) / pdf[inside]
+        f = self.eval(all_wi[inside], wo[inside] * (1, 1, side))
+        return np.asarray((f * weight[:, None]).sum(axis=0) / len(u))
+
+
+@cache
+def _quadrature() -> Floats:
+    """Low-discrepancy points of the unit cube: the first coordinate chooses the component, so it is stratified."""
+    k = np.arange(_QUADRATURE_POINTS)
+    return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
+
+
+def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:
+    """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, in cells.
+
+    Parameters
+    ----------
+    values : (grid..., C)
+    measured : (grid...) bool, with at least one True
+    periodic_axis : int, optional
+        Axis of the grid that wraps round.
+    """
+    if measured.all():
+        return values
+    from scipy.ndimage import distance_transform_edt
+
+    axis = periodic_axis
+    pad = [(0, 0)] * measured.ndim
+    if axis is not None:
+        pad[axis] = (measured.shape[axis] // 2,) * 2
+    padded = np.pad(~measured, pad, mode="wrap")
+    nearest = distance_transform_edt(padded, return_distances=False, return_indices=True)
+    if axis is not None:
+        inner = [slice(None)] * measured.ndim
+        inner[axis] = slice(pad[axis][0], pad[axis][0] + measured.shape[axis])
+        nearest = nearest[(slice(None), *inner)]
+        nearest[axis] = (nearest[axis] - pad[axis][0]) % measured.shape[axis]
+    return np.asarray(values[tuple(nearest)])
+
+
+def require_values(values: Floats, measured: Flags, file: Path | str) -> None:
+    """`UserError` where no cell of values (grid..., C) was measured; the message counts what is there instead."""
+    if measured.any():
+        return
+    finite = np.isfinite(values)
+    got = f"{values.size} values, {int((~finite).sum())} not finite, {int((values[finite] < 0).sum())} negative"
+    raise UserError("holds no measured value", file=file, got=got)
