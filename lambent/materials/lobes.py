@@ -134,3 +134,14 @@ def pdf(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
     h = half_vector(wi, wo, ops)
     value = distribution(h, lobe, ops) * h[2] / (4 * ops.maximum(dot(wo, h), 1e-6))
     return ops.select(valid, value, 0.0)
+
+
+def weight(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
+    """f |cos theta_i| / pdf of a direction made by `sample`, RGB; D, which under- and overflows, is cancelled."""
+    wi, wo, valid = _same_side(wi, wo, lobe, ops)
+    h = half_vector(wi, wo, ops)
+    cos_d = dot(wo, h)
+    cosines = ops.power(ops.maximum(wi[2] * wo[2], 1e-12), lobe.alpha)
+    value = ops.select(valid, wi[2] / (ops.maximum(h[2], 1e-6) * cosines), 0.0)
+    red, green, blue = (value * tint(cos_d, lobe, c, ops) for c in range(3))
+    return red, green, blue

@@ -1,0 +1,133 @@
+// The Kurt lobe for shaders: eval, sample, pdf. Sibling of lobes.py, which is the truth; tests compare the two.
+//
+// Conventions (those of lobes.py): local shading frame (t, b, n), n = +z; unit directions away from the surface;
+// wi to the light, wo to the viewer. f is in 1/sr and without the cosine. The sheet is thin and two-sided: a pair of
+// directions seen from below is the same pair seen from above; for transmission wi is mirrored at the surface.
+// No bindings, no entry points: a pure include. Every name begins with lambent_ / Lambent / LAMBENT_.
+//
+// Sources: Kurt, Szirmay-Kalos & Krivanek 2010; thesis M, equations in parentheses; GGX: Walter et al. 2007, eq. 33.
+//
+// Hazards in float32: 1 - (n.h)^2 and tan^2(theta_h) cancel at low roughness, so everything is built from hx^2, hy^2,
+// hz^2. The half vector itself carries an absolute error of 6e-8, so f of a lobe of slope m carries a relative error
+// of about 1e-7 tan(theta_h) / m^2: harmless at m = .05, a few per cent at the foot of a lobe of m = .001.
+// Never divide f by pdf: both hold D, which under- and overflows. lambent_weight is that quotient with D cancelled.
+
+const LAMBENT_PI: f32 = 3.14159265358979;
+const LAMBENT_COS_MIN: f32 = 1e-4;
+const LAMBENT_REFLECTION: u32 = 0u;
+const LAMBENT_TRANSMISSION: u32 = 1u;
+const LAMBENT_BECKMANN: u32 = 0u;
+const LAMBENT_GGX: u32 = 1u;
+
+// 48 bytes in a buffer; packed by lambent.materials.shader_layout.
+struct LambentLobe {
+    k: vec3f,           // RGB coefficient
+    mx: f32,            // slope roughness along t
+    r0: vec3f,          // Fresnel reflectance at normal incidence, RGB
+    my: f32,            // slope roughness along b
+    alpha: f32,         // exponent of the cosine product, 0..1
+    side: u32,          // LAMBENT_REFLECTION or LAMBENT_TRANSMISSION
+    distribution: u32,  // LAMBENT_BECKMANN or LAMBENT_GGX
+    unused: u32,
+}
+
+// normalize(wi + wo); of opposite directions finite but without meaning.
+fn lambent_half_vector(wi: vec3f, wo: vec3f) -> vec3f {
+    let sum = wi + wo;
+    return sum * inverseSqrt(max(dot(sum, sum), 1e-20));
+}
+
+// Schlick's approximation (2.9); cos_d in [0, 1].
+fn lambent_fresnel(cos_d: f32, r0: vec3f) -> vec3f {
+    let m = max(1.0 - cos_d, 0.0);
+    let m2 = m * m;
+    return r0 + (1.0 - r0) * (m2 * m2 * m);
+}
+
+// Microfacet density D(h) in 1/sr: Beckmann (3.3) or anisotropic GGX.
+fn lambent_distribution(h: vec3f, lobe: LambentLobe) -> f32 {
+    let hz2 = max(h.z * h.z, 1e-12);
+    let slope = h.xy / vec2f(lobe.mx, lobe.my);
+    let slope2 = dot(slope, slope) / hz2;
+    let peak = 1.0 / (LAMBENT_PI * lobe.mx * lobe.my * hz2 * hz2);
+    if lobe.distribution == LAMBENT_GGX {
+        return peak / ((1.0 + slope2) * (1.0 + slope2));
+    }
+    return peak * exp(-slope2);
+}
+
+// h with density D(h) h.z from u in [0, 1)^2 (4.5, 4.6), in slopes.
+fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
+    let u1 = min(u.x, 1.0 - 1e-7);
+    var r = sqrt(-log(1.0 - u1));
+    if lobe.distribution == LAMBENT_GGX {
+        r = sqrt(u1 / (1.0 - u1));
+    }
+    let phi = 2.0 * LAMBENT_PI * u.y;
+    let slope = r * vec2f(lobe.mx * cos(phi), lobe.my * sin(phi));
+    return vec3f(slope, 1.0) * inverseSqrt(dot(slope, slope) + 1.0);
+}
+
+// Whether the lobe sees this pair: on one side for reflection, on both for transmission, not at the horizon.
+fn lambent_sees(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> bool {
+    let same = wi.z * wo.z > 0.0;
+    return min(abs(wi.z), abs(wo.z)) > LAMBENT_COS_MIN && same == (lobe.side == LAMBENT_REFLECTION);
+}
+
+fn lambent_up(w: vec3f) -> vec3f {
+    return vec3f(w.xy, abs(w.z));
+}
+
+fn lambent_cosine_power(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
+    return pow(max(abs(wi.z * wo.z), 1e-12), lobe.alpha);
+}
+
+// k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5).
+fn lambent_tint(cos_d: f32, lobe: LambentLobe) -> vec3f {
+    let f = lambent_fresnel(cos_d, lobe.r0);
+    return lobe.k * select(f, 1.0 - f, lobe.side == LAMBENT_TRANSMISSION);
+}
+
+// x: the lobe without its Fresnel factor, D / (4 (wo.h) (cos_i cos_o)^alpha) in 1/sr; y: cos_d = wo.h.
+fn lambent_shape(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec2f {
+    let up = lambent_up(wo);
+    let h = lambent_half_vector(lambent_up(wi), up);
+    let cos_d = dot(up, h);
+    let value = lambent_distribution(h, lobe) / (4.0 * max(cos_d, 1e-6) * lambent_cosine_power(wi, wo, lobe));
+    return vec2f(select(0.0, value, lambent_sees(wi, wo, lobe)), cos_d);
+}
+
+// f of one lobe in 1/sr, RGB, without the cosine (3.4, 3.5).
+fn lambent_evaluate(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
+    let shape = lambent_shape(wi, wo, lobe);
+    return shape.x * lambent_tint(shape.y, lobe);
+}
+
+// wi = 2 (wo.h) h - wo (4.8) for a given half vector on the upper side, mirrored to the far side for transmission.
+fn lambent_scattered(wo: vec3f, h: vec3f, lobe: LambentLobe) -> vec3f {
+    let up = lambent_up(wo);
+    let wi = 2.0 * dot(up, h) * h - up;
+    let below = (wo.z > 0.0) == (lobe.side == LAMBENT_TRANSMISSION);
+    return vec3f(wi.xy, select(wi.z, -wi.z, below));
+}
+
+// wi from u in [0, 1)^2. A direction on the wrong side of the surface comes back as it is: pdf, f and weight are 0.
+fn lambent_sample(wo: vec3f, u: vec2f, lobe: LambentLobe) -> vec3f {
+    return lambent_scattered(wo, lambent_sample_half_vector(u, lobe), lobe);
+}
+
+// Density of lambent_sample in 1/sr: D h.z / (4 (wo.h)) (4.9).
+fn lambent_pdf(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
+    let up = lambent_up(wo);
+    let h = lambent_half_vector(lambent_up(wi), up);
+    let value = lambent_distribution(h, lobe) * h.z / (4.0 * max(dot(up, h), 1e-6));
+    return select(0.0, value, lambent_sees(wi, wo, lobe));
+}
+
+// f |cos theta_i| / pdf of a direction made by lambent_sample, with D cancelled.
+fn lambent_weight(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
+    let up = lambent_up(wo);
+    let h = lambent_half_vector(lambent_up(wi), up);
+    let value = lambent_tint(dot(up, h), lobe) * (abs(wi.z) / (max(h.z, 1e-6) * lambent_cosine_power(wi, wo, lobe)));
+    return select(vec3f(0.0), value, lambent_sees(wi, wo, lobe));
+}

@@ -1,0 +1,1 @@
+"""Reusable checks for tests: chi-square, furnace, reciprocity, shader parity, z-test."""
