@@ -1,0 +1,78 @@
+"""What commands share: the result on stdout, the progress bar on stderr, sizes and triples as a user types them."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+
+
+def show(result: Mapping[str, Any], text: str, as_json: bool) -> None:
+    """Print the result of a command: `text` for people, `result` for machines."""
+    typer.echo(json.dumps(plain(result), indent=1, allow_nan=False) if as_json else text)
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON knows it: arrays and tuples as lists, paths as text, what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # numpy
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    """Rows of words as aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
+                     for row in rows)  # fmt: skip
+
+
+@contextmanager
+def progress_bar() -> Iterator[Progress]:
+    """A bar with the time left on stderr, where that is a terminal; otherwise nothing is shown."""
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    console = Console(stderr=True)
+    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+        tasks: dict[str, Any] = {}
+
+        def update(done: float, total: float, what: str) -> None:
+            if what not in tasks:
+                for other in tasks.values():
+                    bars.update(other, visible=False)
+                tasks[what] = bars.add_task(what, total=total)
+            bars.update(tasks[what], completed=done, total=total, visible=True)
+
+        yield update
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """(width, height) in pixels of "1280x720"."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal() and 0 < int(width) <= 16384 and 0 < int(height) <= 16384):
+        raise UserError("not a picture size", field="--size", got=text, expected="WIDTHxHEIGHT, each 1 to 16384")
+    return int(width), int(height)
+
+
+def say(text: str) -> None:
+    """A line on stderr that is not part of the result."""
+    sys.stderr.write(text + "\n")

@@ -1,0 +1,86 @@
+"""`lambent`: finds the commands and says what went wrong.
+
+Every module of this folder with a function `command` is a command of the module's name; nothing else to register.
+Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part); 2 wrong input; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+import lambent
+from lambent import cli
+from lambent.core.errors import UserError
+from lambent.core.progress import Cancelled
+
+INTERRUPTED = 130
+
+
+def build_app() -> typer.Typer:
+    """The application with every command found."""
+    app = typer.Typer(
+        name="lambent",
+        help="Measured materials where they will live: fit, place, bake, walk.",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    )
+    app.callback()(_options)
+    for info in pkgutil.iter_modules(cli.__path__):
+        module = importlib.import_module(f"lambent.cli.{info.name}")
+        if hasattr(module, "command"):
+            app.command(info.name)(module.command)
+    return app
+
+
+def main() -> None:
+    """Entry point of the `lambent` command."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line and return its exit code; faults of the user are one line on stderr."""
+    try:
+        code = build_app()(arguments or ["--help"], prog_name="lambent", standalone_mode=False) or 0
+    except UserError as error:
+        return _fail(str(error))
+    except TyperException as error:  # unknown commands and options, missing arguments
+        return _fail(error.format_message())
+    except (Cancelled, KeyboardInterrupt):
+        code = INTERRUPTED
+    except BrokenPipeError:
+        sys.stdout = None  # whoever read the output is gone; so nothing is left to flush
+        return 1
+    if code == INTERRUPTED:
+        sys.stderr.write("lambent: interrupted; what was finished is kept\n")
+    return int(code)
+
+
+def _fail(message: str) -> int:
+    sys.stderr.write(f"lambent: error: {' '.join(message.split())}\n")
+    return 2
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(lambent.__version__)
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+if __name__ == "__main__":
+    main()

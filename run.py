@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+"""Sets Lambent up beside itself and runs it. Needs nothing but Python 3.11 or newer.
+
+    python3 run.py demo [ARGS]     the whole flow: measure, fit, bake, walk
+    python3 run.py lambent ARGS    any command, e.g. `python3 run.py lambent doctor`
+    python3 run.py test [ARGS]     style, types and tests; with ARGS, pytest alone with these
+
+The first run makes .venv here, installs the versions named in constraints.txt, and asks `lambent doctor` what the
+system lacks; on Debian and Ubuntu it installs that, elsewhere it prints the one command. Later runs start at once
+and need no network.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HOME = Path(__file__).resolve().parent
+VENV = HOME / ".venv"
+PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+STAMP = VENV / "lambent-ready.json"
+OLDEST = (3, 11)
+WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
+
+
+class Stop(Exception):
+    """Ends the program with one message."""
+
+
+def main(arguments):
+    if sys.version_info < OLDEST:
+        found = "{}.{}".format(*sys.version_info[:2])
+        raise Stop(f"Lambent needs Python 3.11 or newer; this is {found} ({sys.executable}).")
+    tasks = {"demo": run_demo, "lambent": run_lambent, "test": run_tests}
+    if not arguments or arguments[0] not in tasks:
+        print(__doc__)
+        return 0 if arguments[:1] in (["-h"], ["--help"]) else 2
+    os.environ["PYTHONUTF8"] = "1"
+    with runtime_folder():
+        set_up(for_tests=arguments[0] == "test")
+        return tasks[arguments[0]](arguments[1:])
+
+
+def run_demo(arguments):
+    return run_lambent(["demo", *arguments])
+
+
+def run_lambent(arguments):
+    return subprocess.call([PYTHON, "-m", "lambent.cli.main", *arguments])
+
+
+def run_tests(arguments):
+    if arguments:
+        return subprocess.call([PYTHON, "-m", "pytest", *arguments], cwd=HOME)
+    failed = []
+    for command in (["ruff", "format", "--check"], ["ruff", "check"], ["mypy"], ["pytest", "-q", "-n", "auto"]):
+        say(f"-- {' '.join(command)}")
+        if subprocess.call([PYTHON, "-m", *command], cwd=HOME) != 0:
+            failed.append(command[0])
+    say(f"failed: {', '.join(failed)}" if failed else "all passed")
+    return 1 if failed else 0
+
+
+def set_up(for_tests):
+    """Bring .venv and the system to what this version needs; do nothing where they already are."""
+    wanted = fingerprint()
+    ready = read_stamp()
+    if ready.get("wanted") == wanted and (ready.get("tests") or not for_tests) and PYTHON.exists():
+        return
+    # Whatever happens from here on, an unfinished .venv is not taken for a finished one.
+    STAMP.unlink(missing_ok=True)
+    make_venv()
+    install_package(for_tests)
+    install_system_parts(for_tests)
+    STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
+
+
+def fingerprint():
+    """Changes whenever the installation has to be done again: requirements, Python, or the place of this folder."""
+    parts = [(HOME / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")]
+    parts += [sys.version.encode(), str(HOME).encode()]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()
+
+
+def read_stamp():
+    try:
+        return json.loads(STAMP.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def make_venv():
+    if works([PYTHON, "-m", "pip", "--version"]) and same_python():
+        return
+    say(f"making {VENV}")
+    if VENV.exists():
+        shutil.rmtree(VENV)
+    # Debian and Ubuntu ship Python without ensurepip, in a package of its own.
+    if not works([sys.executable, "-c", "import ensurepip, venv"]):
+        package = "python{}.{}-venv".format(*sys.version_info[:2])
+        if not apt_install([package]):
+            raise Stop(f"This Python cannot make environments. Run: sudo apt-get install -y {package}")
+    call([sys.executable, "-m", "venv", VENV], "the environment could not be made")
+
+
+def same_python():
+    answer = subprocess.run([PYTHON, "-c", "import sys; print(sys.version)"], capture_output=True, text=True)
+    return answer.stdout.strip() == sys.version
+
+
+def install_package(for_tests):
+    say("installing Lambent and what it needs (about 1 GB; a few minutes the first time)")
+    what = f"{HOME}[test]" if for_tests else str(HOME)
+    pip = [PYTHON, "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
+    pip += [] if sys.stderr.isatty() else ["--quiet"]
+    call([*pip, "-c", HOME / "constraints.txt", "-e", what], "installation failed; is there a network connection?")
+
+
+def install_system_parts(for_tests):
+    """Install what `lambent doctor` misses where we may, otherwise stop with its one command."""
+    say("looking at this machine")
+    report = doctor()
+    wanted = list(report["packages"])
+    if for_tests and sys.platform.startswith("linux"):
+        wanted += [package for program, package in WINDOW_TEST_PACKAGES.items() if not shutil.which(program)]
+    if wanted and apt_install(wanted):
+        report = doctor()
+    if not report["ok"]:
+        found = "; ".join(f"{c['name']}: {c['found']}" for c in report["checks"] if c["essential"] and not c["ok"])
+        raise Stop(f"Something is missing ({found}). Run: {report['mend']}")
+
+
+def doctor():
+    command = [PYTHON, "-m", "lambent.cli.main", "doctor", "--json"]
+    answer = subprocess.run(command, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+    try:
+        return json.loads(answer.stdout)
+    except ValueError:
+        raise Stop(f"`lambent doctor` failed with exit code {answer.returncode}") from None
+
+
+def apt_install(packages):
+    """Install Debian packages, "a|b" meaning the first there is; False where this is not possible without asking."""
+    if not shutil.which("apt-get"):
+        return False
+    as_root = [] if os.geteuid() == 0 else ["sudo", "-n"]
+    if as_root and not works(["sudo", "-n", "true"]):
+        return False
+    say(f"installing system packages: {' '.join(packages)}")
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    # A foreign source that does not answer makes `update` fail; the packages may be known all the same.
+    subprocess.call([*as_root, "apt-get", "update", "-qq"], env=environment)
+    chosen = [first_known(package.split("|")) for package in packages]
+    command = [*as_root, "apt-get", "install", "-y", "-qq", "--no-install-recommends", *chosen]
+    return subprocess.call(command, env=environment, stdout=subprocess.DEVNULL) == 0
+
+
+def first_known(names):
+    return next((name for name in names if works(["apt-cache", "show", name])), names[0])
+
+
+@contextlib.contextmanager
+def runtime_folder():
+    """XDG_RUNTIME_DIR for graphics drivers, which complain where a login manager has not set it."""
+    if not sys.platform.startswith("linux") or os.environ.get("XDG_RUNTIME_DIR"):
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="lambent-") as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        yield
+
+
+def works(command):
+    """Whether a command exists and succeeds, quietly."""
+    try:
+        return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+    except OSError:
+        return False
+
+
+def call(command, message):
+    if subprocess.call(command) != 0:
+        raise Stop(message)
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    if hasattr(signal, "SIGTERM"):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that temporary folders go
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except Stop as stop:
+        say(f"run.py: {stop}")
+        sys.exit(1)
+    except KeyboardInterrupt:
+        say("interrupted")
+        sys.exit(130)
