@@ -1,0 +1,147 @@
+"""What the mouse and the keys do to the state, over the picture. The panels are Dear ImGui's own business.
+
+Events are rendercanvas dictionaries, positions in logical pixels of the window.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lambent.viewer import cameras
+from lambent.viewer.picking import Geometry, ray_through
+from lambent.viewer.state import ViewerState
+
+CLICK_PX = 4.0  # a press that moves less than this is a click, not a drag
+LEFT, RIGHT, MIDDLE = 1, 2, 3
+
+SHORTCUTS = (
+    ("W A S D, arrows", "walk; with Shift faster"),
+    ("E, Space / Q, C", "up / down, while flying"),
+    ("F", "fly, or stand on the floor"),
+    ("O", "orbit the target, or walk"),
+    ("left drag", "look around; in orbit turn about the target"),
+    ("right, middle drag", "shift the view (orbit)"),
+    ("wheel", "nearer to the target, or away (orbit)"),
+    ("click", "select the object under the mouse"),
+    ("Esc", "select nothing"),
+    ("1 ... 9", "jump to a camera of the scene"),
+    ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
+    ("P", "save the picture (PNG and EXR)"),
+    ("Tab", "hide or show the panels"),
+)
+
+
+@dataclass(frozen=True)
+class Rect:
+    """The picture's place in the window."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def holds(self, x: float, y: float) -> bool:
+        return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
+
+
+@dataclass
+class Input:
+    """Carries events into the state."""
+
+    geometry: Geometry
+    picture: Rect
+    held: set[str] = field(default_factory=set)
+    _fast: bool = False
+    _button: int | None = None  # of the drag that began over the picture
+    _at: tuple[float, float] = (0.0, 0.0)
+    _moved_px: float = 0.0
+
+    @property
+    def walking(self) -> bool:
+        return any(key in cameras.KEYS for key in self.held)
+
+    def handle(self, state: ViewerState, event: Mapping[str, Any], *, ui_has_mouse: bool, ui_has_keys: bool) -> None:
+        """Apply one event. What begins over the interface belongs to it, even where it ends over the picture."""
+        kind = event["event_type"]
+        if kind == "pointer_down" and not ui_has_mouse and self.picture.holds(event["x"], event["y"]):
+            self._press(event)
+        elif kind == "pointer_move" and self._button is not None:
+            self._drag(state, event)
+        elif kind == "pointer_up" and event["button"] == self._button:
+            self._release(state, event)
+        elif kind == "wheel" and not ui_has_mouse and self.picture.holds(event["x"], event["y"]):
+            if state.mode == "orbit":
+                state.move(cameras.zoom(state.camera, -event["dy"] / 100, state.scene.bounds))
+        elif kind == "key_up":
+            self.held.discard(event["key"].lower() if len(event["key"]) == 1 else event["key"])
+            self._fast = "Shift" in event["modifiers"]
+        elif kind == "key_down":
+            self._fast = "Shift" in event["modifiers"]
+            if ui_has_keys:
+                self.held.clear()
+            else:
+                self._key(state, event["key"], event["modifiers"])
+
+    def walk(self, state: ViewerState, dt_s: float) -> None:
+        """Let the held keys carry the eye for `dt_s` seconds."""
+        if not self.walking or state.mode != "walk":
+            return
+        bounds = state.scene.bounds
+        floor_y = (
+            None if state.flying else self.geometry.floor_below(state.camera.position, cameras.eye_height_m(bounds))
+        )
+        state.move(
+            cameras.walk(
+                state.camera, self.held, dt_s, bounds=bounds, floor_y=floor_y, flying=state.flying, fast=self._fast
+            )
+        )
+
+    def _press(self, event: Mapping[str, Any]) -> None:
+        if self._button is None:
+            self._button, self._at, self._moved_px = event["button"], (event["x"], event["y"]), 0.0
+
+    def _drag(self, state: ViewerState, event: Mapping[str, Any]) -> None:
+        dx, dy = event["x"] - self._at[0], event["y"] - self._at[1]
+        if self._moved_px < CLICK_PX and math.hypot(dx, dy) < CLICK_PX:
+            return  # not yet a drag
+        self._at, self._moved_px = (event["x"], event["y"]), self._moved_px + math.hypot(dx, dy)
+        if state.mode == "walk":
+            state.move(cameras.look(state.camera, dx, dy))
+        elif self._button == LEFT:
+            state.move(cameras.orbit(state.camera, dx, dy))
+        else:
+            state.move(cameras.pan(state.camera, dx, dy, self.picture.height))
+
+    def _release(self, state: ViewerState, event: Mapping[str, Any]) -> None:
+        was_click = self._button == LEFT and self._moved_px < CLICK_PX
+        self._button = None
+        if was_click:
+            x = (event["x"] - self.picture.x) / self.picture.width
+            y = (event["y"] - self.picture.y) / self.picture.height
+            found = self.geometry.pick(*ray_through(state.camera, x, y, self.picture.width / self.picture.height))
+            state.selected = found.name if found else None
+
+    def _key(self, state: ViewerState, key: str, modifiers: tuple[str, ...]) -> None:
+        letter = key.lower() if len(key) == 1 else key
+        if "Control" in modifiers or "Meta" in modifiers:
+            if letter == "y" or (letter == "z" and "Shift" in modifiers):
+                state.edits.redo()
+            elif letter == "z":
+                state.edits.undo()
+        elif letter in cameras.KEYS:
+            self.held.add(letter)
+        elif letter == "f":
+            state.flying = not state.flying
+        elif letter == "o":
+            state.mode = "walk" if state.mode == "orbit" else "orbit"
+        elif letter == "p":
+            state.screenshot_wanted = True
+        elif key == "Tab":
+            state.panels_shown = not state.panels_shown
+        elif key == "Escape":
+            state.selected = None
+        elif letter in "123456789" and int(letter) <= len(state.scene.cameras):
+            state.jump(state.scene.cameras[int(letter) - 1])
