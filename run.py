@@ -133,7 +133,7 @@ def install_system_parts(for_tests):
         report = doctor()
     if not report["ok"]:
         found = "; ".join(f"{c['name']}: {c['found']}" for c in report["checks"] if c["essential"] and not c["ok"])
-        raise Stop(f"Something is missing ({found}). Run: {report['mend']}")
+        raise Stop(f"Something is missing: {found}." + (f"\nRun: {report['mend']}" if report["mend"] else ""))
 
 
 def doctor():
