@@ -1,0 +1,151 @@
+"""A scene as Mitsuba sees it.
+
+Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mitsuba mesh with the object's name as id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
+from lambent.core.images import read_image
+from lambent.scenes.scene import (
+    DirectionalLight,
+    Environment,
+    ImageEnvironment,
+    Light,
+    PointLight,
+    Scene,
+    SceneObject,
+    SunSky,
+)
+
+Array = NDArray[np.floating]
+UV2_ATTRIBUTE = "vertex_uv2"
+
+
+class SceneBuilder:
+    """Makes Mitsuba scenes of one scene: whole, or with objects left out; meshes are shared between them.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to build.
+    uv2 : mapping, optional
+        Light map coordinates (V, 2) per object name; they become the mesh attribute `vertex_uv2` (third component 0).
+    diffuse : bool
+        False takes the diffuse terms out of all materials (for tracing with a light map).
+    """
+
+    def __init__(self, scene: Scene, uv2: Mapping[str, Array] | None = None, *, diffuse: bool = True) -> None:
+        import mitsuba as mi
+
+        register_material_plugin()
+        self.scene = scene
+        used = {o.material for o in scene.objects}
+        bsdfs = {n: mi.load_dict(material_dict(m, diffuse=diffuse)) for n, m in scene.materials.items() if n in used}
+        self.meshes = {o.name: _mesh(o, bsdfs[o.material], (uv2 or {}).get(o.name)) for o in scene.objects}
+        self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
+        self._environment = mi.load_dict(environment_dict(scene.environment)) if scene.environment else None
+
+    def build(self, leave_out: Collection[str] = ()) -> Any:
+        """mi.Scene without the named objects (their emission goes with them)."""
+        import mitsuba as mi
+
+        parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
+        parts |= {f"light_{i}": light for i, light in enumerate(self._lights)}
+        if self._environment is not None:
+            parts["environment"] = self._environment
+        if not self._lights and self._environment is None and not any(any(o.emission) for o in self.scene.objects):
+            parts["darkness"] = {"type": "constant", "radiance": 0.0}  # Mitsuba warns about a scene without light
+        return mi.load_dict({"type": "scene", **parts}, optimize=False)
+
+    def object_numbers(self) -> Any:
+        """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's place in the scene."""
+        import drjit as dr
+        import mitsuba as mi
+
+        ids = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh))[0]) for mesh in self.meshes.values()]
+        table = np.zeros(max(ids) + 1, np.uint32)
+        table[ids] = np.arange(len(ids))
+        return mi.UInt32(table)
+
+
+def _mesh(o: SceneObject, bsdf: Any, uv2: Array | None) -> Any:
+    import mitsuba as mi
+
+    props = mi.Properties()
+    props["mesh_bsdf"] = bsdf
+    if any(o.emission):
+        props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(o.emission)})
+    vertices, faces = len(o.mesh.positions), len(o.mesh.faces)
+    mesh = mi.Mesh(o.name, vertices, faces, props=props, has_vertex_normals=True, has_vertex_texcoords=True)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(o.mesh.positions.astype(np.float32).ravel())
+    parameters["vertex_normals"] = mi.Float(o.mesh.normals.astype(np.float32).ravel())
+    parameters["vertex_texcoords"] = mi.Float(o.mesh.uv.astype(np.float32).ravel())
+    parameters["faces"] = mi.UInt32(o.mesh.faces.astype(np.uint32).ravel())
+    parameters.update()
+    mesh.add_attribute(TANGENT_ATTRIBUTE, 3, o.mesh.tangents.astype(np.float32).ravel())
+    if uv2 is not None:
+        padded = np.concatenate([uv2, np.zeros((vertices, 1))], axis=1)
+        mesh.add_attribute(UV2_ATTRIBUTE, 3, padded.astype(np.float32).ravel())
+    return mesh
+
+
+def _rgb(value: tuple[float, float, float]) -> dict[str, Any]:
+    return {"type": "rgb", "value": list(value)}
+
+
+def light_dict(light: Light) -> dict[str, Any]:
+    """Mitsuba's dictionary of a light."""
+    import mitsuba as mi
+
+    if isinstance(light, DirectionalLight):
+        return {"type": "directional", "direction": list(light.direction), "irradiance": _rgb(light.irradiance)}
+    assert isinstance(light, PointLight)
+    if light.direction is None:
+        return {"type": "point", "position": list(light.position), "intensity": _rgb(light.intensity)}
+    origin = np.asarray(light.position, float)
+    aside = [0.0, 0.0, 1.0] if abs(light.direction[1]) > 0.9 * np.linalg.norm(light.direction) else [0.0, 1.0, 0.0]
+    frame = mi.ScalarTransform4f().look_at(origin.tolist(), (origin + light.direction).tolist(), aside)
+    return {
+        "type": "spot",
+        "to_world": frame,
+        "intensity": _rgb(light.intensity),
+        "cutoff_angle": light.outer_deg,
+        "beam_width": min(light.inner_deg, light.outer_deg),
+    }
+
+
+def environment_dict(environment: Environment) -> dict[str, Any]:
+    """Mitsuba's dictionary of an environment.
+
+    Mitsuba's sky has z up: it is turned by -90 degrees about x, and the sun's direction with it. Mitsuba's picture
+    environment looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
+    """
+    import mitsuba as mi
+
+    turn = mi.ScalarTransform4f()
+    if isinstance(environment, SunSky):
+        return {
+            "type": "sunsky",
+            "to_world": turn.rotate([1, 0, 0], -90),
+            "sun_direction": list(environment.sun_direction),
+            "turbidity": environment.turbidity,
+            "albedo": environment.albedo,
+            "sun_scale": environment.sun_scale,
+            "sky_scale": environment.sky_scale,
+        }
+    assert isinstance(environment, ImageEnvironment)
+    picture = read_image(environment.file)[..., :3].astype(np.float32)
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(np.ascontiguousarray(picture)),
+        "scale": environment.scale,
+        "to_world": turn.rotate([0, 1, 0], 180 + environment.rotation_deg),
+    }

@@ -1,0 +1,132 @@
+"""Path tracing: radiance along rays and irradiance at points, one vectorised loop for every bake.
+
+Multiple importance sampling between emitter sampling and BSDF sampling (Veach 1997, balance heuristic), Russian
+roulette from the fifth bounce on. The path starts at a vertex the caller has sampled, of whose density it tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+ROULETTE_DEPTH = 5
+Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
+
+
+@dataclass
+class Start:
+    """Where paths start: `ray`, the interaction it leaves, and the density it was sampled with.
+
+    pdf (sr^-1) is that of the direction, for weighting emitters it meets; `direct` is whether such emitters count in
+    full, because nothing else samples them.
+    """
+
+    ray: Any
+    origin: Any
+    pdf: Any
+    direct: bool
+
+
+def camera_start(ray: Any) -> Start:
+    """Start of paths that nothing samples but the camera."""
+    return Start(ray, dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o)), mi.Float(1.0), True)
+
+
+def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cache | None = None) -> Any:
+    """Radiance (mi.Color3f) that arrives along rays, W/(sr m^2).
+
+    Parameters
+    ----------
+    max_depth : int
+        Vertices on a path, the last emitter not counted: 1 sees emitters and, with a cache, diffuse surfaces.
+    cache : callable, optional
+        Diffuse radiance at a surface from baked light; the scene's materials must then be without diffuse terms.
+    """
+    return _trace(
+        scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
+        mi.Bool(start.direct), max_depth, cache or _nothing,
+    )  # fmt: skip
+
+
+def _nothing(si: Any, active: Any) -> Any:
+    return mi.Color3f(0.0)
+
+
+@dr.syntax
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache):  # type: ignore[no-untyped-def]
+    width = dr.width(ray.o)
+    result = dr.zeros(mi.Color3f, width)
+    throughput = dr.ones(mi.Color3f, width)
+    depth = dr.zeros(mi.UInt32, width)
+    active = dr.full(mi.Bool, True, width)
+    ctx = mi.BSDFContext()
+    while active:
+        si = scene.ray_intersect(ray, active)
+        ds = mi.DirectionSample3f(scene, si, origin)
+        emitter = si.emitter(scene)
+        pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
+        weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
+        result += dr.select(active, throughput * emitter.eval(si, active) * weight, 0.0)
+        active &= si.is_valid() & (depth < max_depth)
+        result += dr.select(active, throughput * cache(si, active), 0.0)
+
+        bsdf = si.bsdf(ray)
+        lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        ds, value = scene.sample_emitter_direction(si, sampler.next_2d(lit), True, lit)
+        lit &= ds.pdf > 0
+        wo = si.to_local(ds.d)
+        f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
+            ctx, si, wo, sampler.next_1d(active), sampler.next_2d(active), active
+        )
+        weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, pdf_bsdf))
+        result += dr.select(lit, throughput * f * value * weight, 0.0)
+
+        throughput *= f_sample
+        origin = mi.SurfaceInteraction3f(si)
+        pdf = mi.Float(sample.pdf)
+        direct = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        ray = si.spawn_ray(si.to_world(sample.wo))
+        depth += 1
+        brightest = dr.max(throughput)
+        active &= (brightest > 0) & (pdf > 0)
+        survive = dr.select(depth >= ROULETTE_DEPTH, dr.minimum(brightest, 0.95), 1.0)
+        active &= sampler.next_1d(active) < survive
+        throughput *= dr.rcp(dr.maximum(survive, 1e-6))
+    return result
+
+
+def _balance(a: Any, b: Any) -> Any:
+    return dr.select(a > 0, a / (a + b), 0.0)
+
+
+@dataclass
+class Points:
+    """Points on surfaces, one per thread: position, shading normal and triangle normal on the lit side."""
+
+    position: Any
+    normal: Any
+    flat: Any
+
+
+def irradiance(scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int) -> Any:
+    """One sample of irradiance (mi.Color3f) at each point, W/m^2, all bounces.
+
+    Parameters
+    ----------
+    u_bsdf, u_emitter : mi.Point2f
+        In [0, 1)^2: they choose a cosine distributed direction and a point on an emitter. Stratify them.
+    """
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
+    si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
+    local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
+    ray = si.spawn_ray(si.to_world(local))
+    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth)
+    ds, value = scene.sample_emitter_direction(si, u_emitter, True)
+    cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
+    weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
+    direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)
+    return dr.pi * arriving + direct
