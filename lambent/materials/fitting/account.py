@@ -1,0 +1,118 @@
+"""What a fit has to say for itself: reference errors and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Material
+from lambent.materials.fitting.grid import Candidate
+from lambent.materials.fitting.metrics import METRICS, Metric
+from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
+from lambent.materials.fitting.scale import Channel, solve_scale
+from lambent.materials.measured.protocol import MeasuredSamples
+
+Floats = NDArray[np.floating]
+
+AT_BOUND = 0.005  # of the interval
+UNDERSHOOT = 0.7  # of the measured peak
+ENERGY_TOLERANCE = 0.01
+PEAK_SHARE = 0.001  # of the tuples, the brightest
+SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach for r0 and ks to be told apart
+
+
+def lambertian_errors(samples: MeasuredSamples) -> dict[str, float]:
+    """E of the best Lambertian surface under each metric, each with its own coefficient per side and channel."""
+    return {name: metric.error(samples, best_lambertian(samples, metric)) for name, metric in METRICS.items()}
+
+
+def best_lambertian(samples: MeasuredSamples, metric: Metric) -> Floats:
+    """f (N, C) of the Lambertian surface that minimises the metric."""
+    w, c = metric.terms(samples)
+    model = np.zeros_like(samples.f)
+    for here in (samples.transmitted, ~samples.transmitted):
+        if here.any():
+            basis = np.full((1, int(here.sum())), 1 / np.pi)
+            for channel in range(samples.f.shape[1]):
+                part = Channel(samples.f[here, channel], np.zeros(basis.shape[1]), w[here], c[here])
+                k, _ = solve_scale(metric, part, basis, steps=40)
+                model[here, channel] = k[0] / np.pi
+    return model
+
+
+def warnings_of(
+    samples: MeasuredSamples,
+    material: Material,
+    model: Floats,
+    found: Mapping[Side, Sequence[Candidate]],
+    boxes: Mapping[Side, Sequence[Box]],
+    metric: str,
+) -> tuple[str, ...]:
+    """One line per doubt about a fit; `model` is its f (N, C) at the tuples."""
+    lines = [line for side, lobes in found.items() for line in _bounds(side, lobes, boxes[side])]
+    lines += _peaks(samples, model, metric)
+    lines += _energy(material)
+    lines += _ambiguity(samples, found)
+    return tuple(lines)
+
+
+def restrictions(fix: Fixed, ranges: Ranges) -> list[str]:
+    """The user's restrictions, for the provenance."""
+    return [f"{name} fixed at {value}" for name, value in fix.items()] + [
+        f"{name} sought in {lo:g}..{hi:g}" for name, (lo, hi) in ranges.items()
+    ]
+
+
+def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> list[str]:
+    lines = []
+    for index, (lobe, box) in enumerate(zip(lobes, boxes, strict=False)):
+        for axis, base in enumerate(SHAPE):
+            extent = box.hi[axis] - box.lo[axis]
+            if extent == 0 or (base == "my" and box.tied):
+                continue
+            for bound, word in ((box.lo, "lower"), (box.hi, "upper")):
+                if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent:
+                    value = from_search(bound)[axis]
+                    lines.append(f"{parameter(side, base, index)} is at its {word} bound {value:.3g}")
+        if not np.any(lobe.k > 0):
+            lines.append(f"{parameter(side, 'k', index)} is 0: the lobe explains nothing")
+    return lines
+
+
+def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
+    measured = samples.p.mean(axis=1)
+    fitted = (model * np.abs(samples.wo[:, 2:])).mean(axis=1)
+    brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]
+    share = float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
+    if share >= UNDERSHOOT:
+        return []
+    hint = "; more lobes or the l2_ngan metric follow it better" if metric != "l2_ngan" else "; try more lobes"
+    return [f"the model reaches {share:.2f} of the measured peak{hint}"]
+
+
+def _energy(material: Material) -> list[str]:
+    theta = np.radians([0.0, 30.0, 45.0, 60.0, 75.0, 80.0])
+    phi = np.radians([0.0, 90.0])
+    albedo = MaterialBSDF(material).albedo(direction(theta[:, None], phi[None, :]), samples=1024)
+    highest = np.unravel_index(np.argmax(albedo), albedo.shape)
+    if albedo[highest] <= 1 + ENERGY_TOLERANCE:
+        return []
+    at = f"theta {np.degrees(theta[highest[0]]):.0f} deg"
+    return [f"scatters more than it receives: albedo {albedo[highest]:.2f} at {at}"]
+
+
+def _ambiguity(samples: MeasuredSamples, found: Mapping[Side, Sequence[Candidate]]) -> list[str]:
+    lines = []
+    if found.get("transmission"):
+        lines.append("transmission: only kt (1 - r0) can be measured")
+    if found.get("reflection"):
+        cos_d = np.sqrt(np.maximum((1 + np.sum(samples.wi * samples.wo, axis=1)) / 2, 0))
+        near = ~samples.transmitted
+        brightest = np.argsort(samples.f[near].mean(axis=1))[-max(int(0.02 * near.sum()), 10) :]
+        if ((1 - cos_d[near][brightest]) ** 5).max() < SCHLICK_SPAN:
+            lines.append("ks and r0: only their product is well determined, no bright tuple is near grazing")
+    return lines

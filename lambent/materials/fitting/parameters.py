@@ -1,0 +1,183 @@
+"""Names, ranges and the user's restrictions of what is fitted.
+
+Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From the second lobe of a side on
+the lobe's parameters carry its number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError, did_you_mean
+
+Floats = NDArray[np.floating]
+Side = Literal["reflection", "transmission"]
+Value = float | tuple[float, float, float]
+Fixed = Mapping[str, Value]
+Ranges = Mapping[str, tuple[float, float]]
+
+SHAPE = ("mx", "my", "r0", "alpha")  # the axes of the search, in this order
+BOUNDS = {"mx": (0.003, 1.5), "my": (0.003, 1.5), "r0": (0.004, 1.0), "alpha": (0.0, 1.0)}
+LEGAL = {"mx": (0.001, 4.0), "my": (0.001, 4.0), "r0": (0.0, 1.0), "alpha": (0.0, 1.0)}
+LEGAL_COEFFICIENT = (0.0, 1e6)
+R0_FLOOR = 1e-6  # r0 is searched in its logarithm
+LOGARITHMIC = np.array([True, True, True, False])
+
+
+def to_search(shape: Floats) -> Floats:
+    """(..., 4) mx, my, r0, alpha -> coordinates of the search: logarithms of the first three."""
+    return np.where(LOGARITHMIC, np.log(np.maximum(shape, R0_FLOOR)), shape)
+
+
+def from_search(coordinates: Floats) -> Floats:
+    """Inverse of `to_search`."""
+    return np.where(LOGARITHMIC, np.exp(np.where(LOGARITHMIC, coordinates, 0)), coordinates)
+
+
+def parameter(side: Side, base: str, index: int = 0) -> str:
+    """The user's name of a lobe's parameter; `base` is one of `SHAPE` or "k", `index` counts lobes of the side from 0."""
+    if base == "k":
+        name = "ks" if side == "reflection" else "kt"
+    else:
+        name = base if side == "reflection" else f"t_{base}"
+    return name if index == 0 else f"{name}_{index + 1}"
+
+
+def known_parameters(lobes: int) -> list[str]:
+    """Every name that `fix` and `ranges` may hold for that many lobes a side."""
+    sides: tuple[Side, ...] = ("reflection", "transmission")
+    names = [parameter(side, base, i) for side in sides for i in range(lobes) for base in ("k", *SHAPE)]
+    return ["kd", "kt_d", *names]
+
+
+@dataclass(frozen=True)
+class Box:
+    """Where one lobe is sought.
+
+    Attributes
+    ----------
+    lo, hi : (4,) float64
+        Bounds in search coordinates; equal where the parameter is fixed.
+    tied : bool
+        Whether my follows mx (isotropic).
+    k_limits : tuple of (float, float)
+        Interval of the coefficient, per channel.
+    """
+
+    lo: Floats
+    hi: Floats
+    tied: bool
+    k_limits: tuple[tuple[float, float], ...]
+
+
+def box_of(side: Side, index: int, isotropic: bool, channels: int, fix: Fixed, ranges: Ranges) -> Box:
+    """The search box of a lobe under the user's restrictions.
+
+    An isotropic table ties my to mx, unless the user restricts my. r0 of a transmission lobe is fixed at 0 unless the
+    user says otherwise: with Schlick's F the lobe (3.5) holds kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so that only
+    the product kt (1 - r0) can be measured, and kt then is that product.
+    """
+    restrictions = dict(fix)
+    if side == "transmission" and parameter(side, "r0", index) not in {**fix, **ranges}:
+        restrictions[parameter(side, "r0", index)] = 0.0
+    lo, hi = np.zeros(4), np.zeros(4)
+    for axis, base in enumerate(SHAPE):
+        name = parameter(side, base, index)
+        lo[axis], hi[axis] = ranges.get(name, BOUNDS[base])
+        if name in restrictions:
+            lo[axis] = hi[axis] = scalar(restrictions[name], name)
+    tied = isotropic and parameter(side, "my", index) not in {**fix, **ranges}
+    name = parameter(side, "k", index)
+    if name in fix:
+        k_limits = tuple((value, value) for value in per_channel(fix[name], channels))
+    else:
+        k_limits = (ranges.get(name, (0.0, np.inf)),) * channels
+    return Box(to_search(lo), to_search(hi), tied, k_limits)
+
+
+def scalar(value: Value, name: str) -> float:
+    if isinstance(value, tuple):
+        raise UserError("takes one value", field=name, got=value)
+    return float(value)
+
+
+def per_channel(value: Value, channels: int) -> tuple[float, ...]:
+    """A coefficient as one value per channel of the table."""
+    if not isinstance(value, tuple):
+        return (float(value),) * channels
+    return value if channels == 3 else (sum(value) / 3,) * channels
+
+
+def check(fix: Fixed, ranges: Ranges, lobes: int) -> None:
+    """Raise `UserError` where a name is unknown, a value illegal or a parameter both fixed and ranged."""
+    known = known_parameters(lobes)
+    for name in [*fix, *ranges]:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
+            raise UserError("unknown parameter", field=name, hint=hint)
+    both = sorted(set(fix) & set(ranges))
+    if both:
+        raise UserError("both fixed and given a range", field=both[0])
+    for name, value in fix.items():
+        for one in value if isinstance(value, tuple) else (value,):
+            _check_value(name, one)
+    for name, (lo, hi) in ranges.items():
+        if name in ("kd", "kt_d"):
+            raise UserError(
+                "the diffuse term is read off the histogram, it has no range", field=name, hint="fix it instead"
+            )
+        _check_value(name, lo)
+        _check_value(name, hi)
+        if lo >= hi:
+            raise UserError("empty range", field=name, got=f"{lo}:{hi}", expected="lo < hi")
+
+
+def _check_value(name: str, value: float) -> None:
+    base = re.sub(r"(^t_)|(_\d+$)", "", name)
+    lo, hi = LEGAL.get(base, LEGAL_COEFFICIENT)
+    if not lo <= value <= hi:  # False for NaN as well
+        raise UserError("value out of bounds", field=name, got=value, expected=f"{lo} to {hi:g}")
+
+
+def parse_fix(options: Iterable[str]) -> dict[str, Value]:
+    """{'mx': .1, 'kd': (.1, .2, .3)} of options such as 'mx=.1' and 'kd=.1,.2,.3'."""
+    fix: dict[str, Value] = {}
+    for option in options:
+        name, text = _split(option, "name=value")
+        values = tuple(_number(part, name) for part in text.split(","))
+        if len(values) not in (1, 3):
+            raise UserError("takes one value or three", field=name, got=text)
+        fix[name] = values[0] if len(values) == 1 else (values[0], values[1], values[2])
+    return fix
+
+
+def parse_ranges(options: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """{'mx': (.05, .3)} of options such as 'mx=.05:.3'."""
+    ranges = {}
+    for option in options:
+        name, text = _split(option, "name=lo:hi")
+        ends = text.split(":")
+        if len(ends) != 2:
+            raise UserError("not a range", field=name, got=text, expected="lo:hi")
+        ranges[name] = (_number(ends[0], name), _number(ends[1], name))
+    return ranges
+
+
+def _split(option: str, expected: str) -> tuple[str, str]:
+    name, equals, text = option.partition("=")
+    if not equals or not name.strip():
+        raise UserError("cannot be read", field=option, expected=expected)
+    return name.strip(), text
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UserError("not a number", field=name, got=text) from None
