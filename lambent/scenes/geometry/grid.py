@@ -1,0 +1,115 @@
+"""Every shape here is a sheet of points in rows and columns, or several of them: one place makes the triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lambent.core.frames import Floats, basis, normalize
+from lambent.scenes.scene import Mesh
+
+FLAT = 1e-10  # a triangle below this share of its sheet's extent squared has no area worth the name
+
+
+def tangents_along(normals: Floats, direction: ArrayLike) -> Floats:
+    """Unit tangents (V, 3): `direction`, (3,) or (V, 3), laid into the surface; any tangent where it stands upright."""
+    along = np.broadcast_to(np.asarray(direction, float), normals.shape)
+    flat = along - normals * np.sum(normals * along, axis=-1, keepdims=True)
+    usable = np.linalg.norm(flat, axis=-1, keepdims=True) > 1e-4
+    tangents = normalize(np.where(usable, flat, basis(normals)[0]))
+    return normalize(tangents - normals * np.sum(normals * tangents, axis=-1, keepdims=True))
+
+
+def areas(positions: Floats, faces: NDArray[np.integer]) -> Floats:
+    """Area (T,) of each triangle, m^2."""
+    a, b, c = (positions[faces[:, i]].astype(float) for i in range(3))
+    area: Floats = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+    return area
+
+
+def build(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, faces: NDArray[np.integer]) -> Mesh:
+    """Mesh of (V, ...) arrays and triangles in any winding.
+
+    Triangles without area are dropped, the others turned to the side of their normals; vertices nobody uses go.
+    `direction` is what `tangents_along` takes.
+    """
+    positions = np.asarray(positions, np.float32)
+    normals = normalize(np.asarray(normals, float))
+    extent = float(np.ptp(positions, axis=0).max())
+    faces = faces[areas(positions, faces) > FLAT * extent**2]
+    a, b, c = (positions[faces[:, i]].astype(float) for i in range(3))
+    outward = np.sum(np.cross(b - a, c - a) * normals[faces].sum(axis=1), axis=-1)
+    faces = np.where((outward < 0)[:, None], faces[:, ::-1], faces)
+    used, index = np.unique(faces, return_inverse=True)
+    tangents = tangents_along(normals, direction)
+    return Mesh(
+        positions[used],
+        normals[used].astype(np.float32),
+        tangents[used].astype(np.float32),
+        np.asarray(uv, np.float32)[used],
+        index.reshape(-1, 3).astype(np.uint32),
+    )
+
+
+def grid(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats) -> Mesh:
+    """Mesh of a sheet: positions and normals (R, C, 3), uv (R, C, 2), `direction` (3,) or (R, C, 3)."""
+    rows, columns = positions.shape[:2]
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    along = np.asarray(direction, float)
+    along = along.reshape(-1, 3) if along.ndim == 3 else along
+    return build(positions.reshape(-1, 3), normals.reshape(-1, 3), along, uv.reshape(-1, 2), faces)
+
+
+def merge(meshes: Iterable[Mesh]) -> Mesh:
+    """All of them as one."""
+    parts = list(meshes)
+    starts = np.cumsum([0] + [len(m.positions) for m in parts[:-1]]).astype(np.uint32)
+    return Mesh(
+        np.concatenate([m.positions for m in parts]),
+        np.concatenate([m.normals for m in parts]),
+        np.concatenate([m.tangents for m in parts]),
+        np.concatenate([m.uv for m in parts]),
+        np.concatenate([m.faces + start for m, start in zip(parts, starts, strict=True)]),
+    )
+
+
+def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
+    """`mesh` under an affine 4x4 matrix; a mirroring one turns the winding, so outside stays outside."""
+    m = np.asarray(matrix, float)
+    linear = m[:3, :3]
+    normals = normalize(mesh.normals.astype(float) @ np.linalg.inv(linear))
+    mirrored = np.linalg.det(linear) < 0
+    return Mesh(
+        (mesh.positions @ linear.T + m[:3, 3]).astype(np.float32),
+        normals.astype(np.float32),
+        tangents_along(normals, mesh.tangents @ linear.T).astype(np.float32),
+        mesh.uv,
+        mesh.faces[:, ::-1].copy() if mirrored else mesh.faces,
+    )
+
+
+def turn(axis: str, angle_deg: float) -> Floats:
+    """3x3 rotation about "x", "y" or "z", right-handed."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    matrix = np.eye(3)
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
+    return matrix
+
+
+def placed(mesh: Mesh, at: ArrayLike = (0.0, 0.0, 0.0), rotation: Floats | None = None) -> Mesh:
+    """`mesh` rotated about the origin by a 3x3 matrix, then moved to `at` (metres)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.eye(3) if rotation is None else rotation
+    matrix[:3, 3] = at
+    return transformed(mesh, matrix)
+
+
+def signed_volume(mesh: Mesh) -> float:
+    """Volume in m^3 of a closed mesh, negative where it is inside out."""
+    a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))
+    return float(np.sum(a * np.cross(b, c)) / 6)

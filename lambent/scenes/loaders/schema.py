@@ -1,0 +1,164 @@
+"""What a scene.toml may say, key by key. Unknown keys are errors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+FORMAT = "lambent-scene"
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+Colour = tuple[NotNegative, NotNegative, NotNegative]
+Plane = tuple[Finite, Finite, Finite, Finite]
+
+
+def _not_zero(vector: Any) -> Any:
+    if not any(vector):
+        raise ValueError("a direction cannot be zero")
+    return vector
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class GeometrySection(Section):
+    """A file, or a built-in scene's geometry; `scale` turns its unit into metres."""
+
+    file: str
+    scale: Positive = 1.0
+
+
+class SunSkySection(Section):
+    """Clear daylight (Hosek & Wilkie 2012, 2013)."""
+
+    kind: Literal["sunsky"]
+    sun_direction: Vector
+    turbidity: Annotated[float, Field(ge=1, le=10)] = 3.0
+    albedo: Annotated[float, Field(ge=0, le=1)] = 0.3
+    sun_scale: NotNegative = 1.0
+    sky_scale: NotNegative = 1.0
+
+    @field_validator("sun_direction")
+    @classmethod
+    def _above_horizon(cls, vector: Any) -> Any:
+        if vector[1] < 0:
+            raise ValueError("the sun is below the horizon (its y is negative)")
+        return _not_zero(vector)
+
+
+class ImageSection(Section):
+    """A lat-long HDR picture."""
+
+    kind: Literal["image"]
+    file: str
+    scale: NotNegative = 1.0
+    rotation_deg: Finite = 0.0
+
+
+class ObjectSection(Section):
+    """What is said of the objects whose name fits a pattern; unsaid, the geometry file's word stands."""
+
+    material: str | None = None
+    emission: Colour | None = None
+    light_map_scale: Positive | None = None
+    probe_centre: Vector | None = None
+    probe_planes: tuple[Plane, ...] | None = None
+
+    @field_validator("probe_planes")
+    @classmethod
+    def _planes(cls, planes: Any) -> Any:
+        for plane in planes or ():
+            _not_zero(plane[:3])
+        return planes
+
+
+class PointSection(Section):
+    kind: Literal["point"]
+    position: Vector
+    intensity: Colour
+
+
+class SpotSection(Section):
+    kind: Literal["spot"]
+    position: Vector
+    intensity: Colour
+    direction: Vector
+    inner_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
+    outer_deg: Annotated[float, Field(gt=0, le=90)] = 45.0
+
+    _direction = field_validator("direction")(_not_zero)
+
+    @model_validator(mode="after")
+    def _cone(self) -> SpotSection:
+        if self.inner_deg > self.outer_deg:
+            raise ValueError("inner_deg is larger than outer_deg")
+        return self
+
+
+class DirectionalSection(Section):
+    kind: Literal["directional"]
+    direction: Vector
+    irradiance: Colour
+
+    _direction = field_validator("direction")(_not_zero)
+
+
+class ViewSection(Section):
+    """Where a camera stands and what it looks at."""
+
+    position: Vector
+    target: Vector
+    up: Vector = (0.0, 1.0, 0.0)
+    fov_y_deg: Annotated[float, Field(ge=1, le=150)] = 45.0
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> ViewSection:
+        if self.position == self.target:
+            raise ValueError("position and target are the same point")
+        return self
+
+
+class CameraSection(ViewSection):
+    name: str
+
+
+class PathSection(Section):
+    name: str
+    seconds: Positive = 20.0
+    keys: Annotated[tuple[ViewSection, ...], Field(min_length=2)]
+
+
+class SceneDocument(Section):
+    """A whole scene.toml."""
+
+    format: Literal["lambent-scene"]
+    version: Literal[1]
+    name: str = "scene"
+    geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
+    exposure_ev: Annotated[float, Field(ge=-30, le=30)] = 0.0
+    environment: Annotated[SunSkySection | ImageSection, Field(discriminator="kind")] | None = None
+    materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    objects: dict[str, ObjectSection] = Field(default_factory=dict)
+    lights: tuple[Annotated[PointSection | SpotSection | DirectionalSection, Field(discriminator="kind")], ...] = ()
+    cameras: tuple[CameraSection, ...] = ()
+    paths: tuple[PathSection, ...] = ()
+
+    @field_validator("geometry", mode="before")
+    @classmethod
+    def _one_or_many(cls, value: Any) -> Any:
+        return [value] if isinstance(value, str | dict) else value
+
+
+def known_keys() -> set[str]:
+    """Every key that has a meaning somewhere in a scene.toml."""
+    sections: list[type[BaseModel]] = [SceneDocument, *_below(Section)]
+    return {key for section in sections for key in section.model_fields}
+
+
+def _below(section: type[BaseModel]) -> list[type[BaseModel]]:
+    return [s for child in section.__subclasses__() for s in (child, *_below(child))]
