@@ -8,12 +8,13 @@ is not. Only one process writes a store at a time.
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import zarr
@@ -23,6 +24,7 @@ from lambent.core.errors import UserError
 from lambent.core.files import inside, write_text
 
 FORMAT, VERSION = "lambent-store", 1
+LIMIT_BYTES = 1 << 34  # of one array: a manifest that promises more is not believed
 Array = NDArray[Any]
 Chunk = tuple[int, ...]
 
@@ -42,13 +44,16 @@ class Artefact:
     complete: bool = False
 
     @property
+    def chunk_counts(self) -> tuple[int, ...]:
+        return tuple(-(-size // step) for size, step in zip(self.shape, self.chunks, strict=True))
+
+    @property
     def chunk_grid(self) -> list[Chunk]:
-        counts = (-(-size // step) for size, step in zip(self.shape, self.chunks, strict=True))
-        return list(product(*(range(count) for count in counts)))
+        return list(product(*(range(count) for count in self.chunk_counts)))
 
     @property
     def state(self) -> str:
-        return "complete" if self.complete else f"partial ({len(self.done)} of {len(self.chunk_grid)} chunks)"
+        return "complete" if self.complete else f"partial ({len(self.done)} of {math.prod(self.chunk_counts)} chunks)"
 
 
 class Store:
@@ -89,7 +94,7 @@ class Store:
                 found = f"{manifest['format']} {manifest['version']}"
                 raise UserError("unknown store", file=path, got=found, expected=f"{FORMAT} {VERSION}")
             return cls(Path(folder), manifest)
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
             raise UserError(f"manifest is damaged ({error})", file=path, hint="bake again") from error
 
     def artefacts(self, kind: str | None = None) -> list[Artefact]:
@@ -154,8 +159,18 @@ class Store:
         for chunk in artefact.chunk_grid:
             if self._crc(name, chunk) != artefact.done[_id(chunk)]:
                 raise UserError("chunk is damaged", file=self.folder, field=f"{name} {_id(chunk)}", hint="bake again")
-        array: Array = np.asarray(zarr.open_array(inside(self.folder, name), mode="r")[...])
+        array: Array = np.asarray(self._open_array(artefact, "r")[...])
         return array
+
+    def _open_array(self, artefact: Artefact, mode: Literal["r", "r+"]) -> zarr.Array[Any]:
+        try:
+            array = zarr.open_array(inside(self.folder, artefact.name), mode=mode)
+            if (array.shape, array.chunks, np.dtype(artefact.dtype)) == (artefact.shape, artefact.chunks, array.dtype):
+                return array
+            reason = "another shape or type than the manifest says"
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            reason = str(error)
+        raise UserError(f"array is damaged ({reason})", file=self.folder, field=artefact.name, hint="bake again")
 
     def _crc(self, name: str, chunk: Chunk) -> int:
         path = inside(self.folder, name) / "c" / Path(*map(str, chunk)) if chunk else inside(self.folder, name) / "c"
@@ -178,7 +193,7 @@ class Writer:
 
     def __init__(self, store: Store, artefact: Artefact) -> None:
         self._store, self.artefact = store, artefact
-        self._array = zarr.open_array(inside(store.folder, artefact.name), mode="r+")
+        self._array = store._open_array(artefact, "r+")
 
     @property
     def missing(self) -> list[Chunk]:
@@ -222,5 +237,13 @@ def _entry(a: Artefact) -> dict[str, Any]:
 
 
 def _artefact(name: str, e: dict[str, Any]) -> Artefact:
-    shape, chunks = tuple(e["shape"]), tuple(e["chunks"])
-    return Artefact(name, e["kind"], shape, chunks, e["dtype"], e["key"], e["meta"], e["done"], e["complete"])
+    """The manifest's entry, or an error that `Store.open` turns into "manifest is damaged"."""
+    shape, chunks = tuple(map(int, e["shape"])), tuple(map(int, e["chunks"]))
+    a = Artefact(
+        name, e["kind"], shape, chunks, e["dtype"], e["key"], dict(e["meta"]), dict(e["done"]), e["complete"] is True
+    )
+    if min(shape, default=0) < 0 or math.prod(shape) * np.dtype(a.dtype).itemsize > LIMIT_BYTES:
+        raise ValueError(f"{name}: impossible shape {shape}")
+    if a.complete and len(a.done) != math.prod(a.chunk_counts):
+        raise ValueError(f"{name}: complete with {len(a.done)} chunks")
+    return a
