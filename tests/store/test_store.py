@@ -1,0 +1,269 @@
+"""A store is whole or says what is missing, whatever happened to the process or the disk."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lambent.core.errors import UserError
+from lambent.store.store import Store
+
+ARRAY = np.arange(6 * 5 * 3, dtype=np.float32).reshape(6, 5, 3)
+CHUNKS = (2, 5, 3)
+
+
+def begin(folder: Path, key: str = "k") -> tuple[Store, Any]:
+    store = Store.create(folder, {"scene": "hash"})
+    return store, store.begin("light_map/irradiance", "light map", ARRAY.shape, CHUNKS, "float32", key=key)
+
+
+def write_all(writer: Any) -> None:
+    for chunk in writer.missing:
+        writer.write(chunk, ARRAY[writer.region(chunk)])
+
+
+def finished(folder: Path) -> Store:
+    store, writer = begin(folder)
+    write_all(writer)
+    writer.finish(noise=0.01)
+    return store
+
+
+def chunk_files(folder: Path) -> list[Path]:
+    return sorted(path for path in (folder / "light_map/irradiance/c").rglob("*") if path.is_file())
+
+
+def edit_manifest(folder: Path, **changes: Any) -> None:
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text())
+    manifest["artefacts"]["light_map/irradiance"].update(changes)
+    path.write_text(json.dumps(manifest))
+
+
+def test_what_was_written_is_read_by_another_process_later(tmp_path: Path) -> None:
+    finished(tmp_path / "s").set_document("timings", {"light_map_s": 1.5})
+    store = Store.open(tmp_path / "s")
+    np.testing.assert_array_equal(store.read("light_map/irradiance"), ARRAY)
+    assert "light_map/irradiance" in store
+    assert store.inputs == {"scene": "hash"}
+    assert store.documents["timings"] == {"light_map_s": 1.5}
+    assert store.artefact("light_map/irradiance").meta == {"noise": 0.01}
+    assert [a.state for a in store.artefacts("light map")] == ["complete"]
+
+
+def test_partial_says_so_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    _, writer = begin(tmp_path / "s")
+    writer.write((1, 0, 0), ARRAY[2:4])
+    store = Store.open(tmp_path / "s")
+    assert "light_map/irradiance" not in store
+    with pytest.raises(UserError, match=r"partial \(1 of 3 chunks\).*--resume"):
+        store.read("light_map/irradiance")
+    store, writer = begin(tmp_path / "s")
+    assert writer.missing == [(0, 0, 0), (2, 0, 0)]
+    np.testing.assert_array_equal(writer.read_chunk((1, 0, 0)), ARRAY[2:4])
+    write_all(writer)
+    writer.finish()
+    np.testing.assert_array_equal(store.read("light_map/irradiance"), ARRAY)
+
+
+def test_another_key_starts_empty(tmp_path: Path) -> None:
+    finished(tmp_path / "s")
+    store, writer = begin(tmp_path / "s", key="scene changed")
+    assert len(writer.missing) == 3
+    assert "light_map/irradiance" not in store
+
+
+def test_dying_between_chunk_and_manifest_loses_that_chunk_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, writer = begin(tmp_path / "s")
+    writer.write((0, 0, 0), ARRAY[0:2])
+
+    def die(store: Store) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "_save", die)
+        with pytest.raises(KeyboardInterrupt):
+            writer.write((1, 0, 0), ARRAY[2:4])
+    assert len(chunk_files(tmp_path / "s")) == 2
+    _, writer = begin(tmp_path / "s")
+    assert writer.missing == [(1, 0, 0), (2, 0, 0)]
+
+
+def test_finishing_early_is_a_bug_not_a_complete_array(tmp_path: Path) -> None:
+    _, writer = begin(tmp_path / "s")
+    with pytest.raises(AssertionError, match="3 chunks missing"):
+        writer.finish()
+    assert "light_map/irradiance" not in Store.open(tmp_path / "s")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_kill_9_at_any_moment(tmp_path: Path) -> None:
+    """A process that writes chunk after chunk is killed; what the manifest names must all be readable."""
+    program = """
+import sys
+import numpy as np
+from lambent.store.store import Store
+store = Store.create(sys.argv[1], {})
+writer = store.begin("a", "a", (400, 64), (1, 64), "float32", key="k")
+print("ready", flush=True)
+for chunk in writer.missing:
+    writer.write(chunk, np.full((1, 64), chunk[0] + 1, np.float32))
+"""
+    done: set[str] = set()
+    for delay_s in (0.03, 0.11, 0.2):
+        process = subprocess.Popen([sys.executable, "-c", program, str(tmp_path / "s")], stdout=subprocess.PIPE)
+        assert process.stdout is not None and process.stdout.readline() == b"ready\n"
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+        store = Store.open(tmp_path / "s")
+        assert done <= set(store.artefact("a").done), "a finished chunk was lost"
+        done = set(store.artefact("a").done)
+        writer = store.begin("a", "a", (400, 64), (1, 64), "float32", key="k")
+        for name in done:
+            row = int(name.partition(".")[0])
+            assert (writer.read_chunk((row, 0)) == row + 1).all()
+    assert done
+
+
+def test_a_damaged_chunk_is_noticed(tmp_path: Path) -> None:
+    finished(tmp_path / "s")
+    path = chunk_files(tmp_path / "s")[1]
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(UserError, match=r"irradiance 1\.0\.0: chunk is damaged"):
+        Store.open(tmp_path / "s").read("light_map/irradiance")
+
+
+def test_a_lost_chunk_is_noticed(tmp_path: Path) -> None:
+    finished(tmp_path / "s")
+    chunk_files(tmp_path / "s")[2].unlink()
+    with pytest.raises(UserError, match="chunk is damaged"):
+        Store.open(tmp_path / "s").read("light_map/irradiance")
+
+
+def test_zeros_and_empty_arrays(tmp_path: Path) -> None:
+    store = Store.create(tmp_path / "s", {})
+    store.put("zeros", "x", np.zeros((4, 3), np.float16), key="k")
+    store.put("empty", "x", np.zeros((0, 3), np.uint32), key="k")
+    store = Store.open(tmp_path / "s")
+    assert not store.read("zeros").any() and store.read("zeros").dtype == np.float16
+    assert store.read("empty").shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "null", '{"format": "lambent-store"}', '{"format": "lambent-store", "version": 1}', "\x00\xff",
+     '{"format": "lambent-store", "version": 1, "inputs": {}, "documents": {}, "artefacts": {"a": {}}}',
+     '{"format": "lambent-store", "version": 1, "inputs": {}, "documents": {}, "artefacts": 3}'],
+)  # fmt: skip
+def test_a_damaged_manifest_is_one_clear_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "manifest.json").write_bytes(text.encode("latin-1"))
+    with pytest.raises(UserError, match=r"manifest\.json: manifest is damaged") as caught:
+        Store.open(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"shape": [10**9, 10**9], "chunks": [1, 1]},
+        {"chunks": [0, 5, 3]},
+        {"shape": [6, 5]},
+        {"shape": [-6, 5, 3]},
+        {"done": {"0.0.0": 1}},
+        {"shape": ["x", 5, 3]},
+        {"done": 7},
+    ],
+)
+def test_an_impossible_manifest_is_refused_at_once(tmp_path: Path, changes: dict[str, Any]) -> None:
+    finished(tmp_path / "s")
+    edit_manifest(tmp_path / "s", **changes)
+    with pytest.raises(UserError):
+        Store.open(tmp_path / "s").read("light_map/irradiance")
+
+
+def test_another_version_is_named(tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text('{"format": "lambent-store", "version": 99}')
+    with pytest.raises(UserError, match=r"found lambent-store 99; expected lambent-store 1"):
+        Store.open(tmp_path)
+
+
+def test_array_of_another_shape_than_the_manifest_says(tmp_path: Path) -> None:
+    finished(tmp_path / "s")
+    path = tmp_path / "s/light_map/irradiance/zarr.json"
+    meta = json.loads(path.read_text())
+    meta["shape"] = [10**6, 10**6, 3]
+    path.write_text(json.dumps(meta))
+    with pytest.raises(UserError, match="damaged"):
+        Store.open(tmp_path / "s").read("light_map/irradiance")
+
+
+@pytest.mark.parametrize("name", ["../outside", "/tmp/outside", "a/../../outside"])
+def test_names_stay_inside_the_folder(tmp_path: Path, name: str) -> None:
+    store = Store.create(tmp_path / "s", {})
+    with pytest.raises(UserError, match="path leaves its folder"):
+        store.put(name, "x", ARRAY, key="k")
+    assert [path.name for path in tmp_path.iterdir()] == ["s"]
+
+
+def test_a_manifest_cannot_lead_outside(tmp_path: Path) -> None:
+    finished(tmp_path / "s")
+    path = tmp_path / "s/manifest.json"
+    path.write_text(path.read_text().replace('"light_map/irradiance"', '"../secret"'))
+    with pytest.raises(UserError, match="path leaves its folder"):
+        Store.open(tmp_path / "s").read("../secret")
+
+
+def test_create_does_not_take_over_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("mine")
+    with pytest.raises(UserError, match="not empty and not a store"):
+        Store.create(tmp_path, {})
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_missing_store_and_missing_array(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="not a store"):
+        Store.open(tmp_path / "absent")
+    with pytest.raises(UserError, match="bake it first"):
+        Store.create(tmp_path / "s", {}).read("probe/vase/radiance")
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_order_any_interruption_same_array(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    """Shapes, chunkings, the order of chunks and the point of interruption do not show in what is read."""
+    shape = tuple(data.draw(st.lists(st.integers(1, 7), min_size=1, max_size=3)))
+    chunks = tuple(data.draw(st.integers(1, size)) for size in shape)
+    array = np.random.default_rng(data.draw(st.integers(0, 9))).integers(0, 3, shape).astype(np.uint16)
+    folder = tmp_path_factory.mktemp("store") / "s"
+
+    def go_on() -> tuple[Store, Any]:
+        store = Store.create(folder, {})
+        return store, store.begin("a", "a", shape, chunks, "uint16", key="k")
+
+    _, writer = go_on()
+    order = data.draw(st.permutations(writer.missing))
+    stop = data.draw(st.integers(0, len(order)))
+    for chunk in order[:stop]:
+        writer.write(chunk, array[writer.region(chunk)])
+    _, writer = go_on()
+    assert sorted(writer.missing) == sorted(order[stop:])
+    for chunk in writer.missing:
+        writer.write(chunk, array[writer.region(chunk)])
+    writer.finish()
+    np.testing.assert_array_equal(Store.open(folder).read("a"), array)
