@@ -30,7 +30,7 @@ SHORTCUTS = (
     ("1 ... 9", "jump to a camera of the scene"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
     ("P", "save the picture (PNG and EXR)"),
-    ("Tab", "hide or show the panels"),
+    ("H", "hide or show the panels"),
 )
 
 
@@ -38,10 +38,10 @@ SHORTCUTS = (
 class Rect:
     """The picture's place in the window."""
 
-    x: float
-    y: float
-    width: float
-    height: float
+    x: int
+    y: int
+    width: int
+    height: int
 
     def holds(self, x: float, y: float) -> bool:
         return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
@@ -119,9 +119,8 @@ class Input:
         was_click = self._button == LEFT and self._moved_px < CLICK_PX
         self._button = None
         if was_click:
-            x = (event["x"] - self.picture.x) / self.picture.width
-            y = (event["y"] - self.picture.y) / self.picture.height
-            found = self.geometry.pick(*ray_through(state.camera, x, y, self.picture.width / self.picture.height))
+            x, y = event["x"] - self.picture.x, event["y"] - self.picture.y
+            found = self.geometry.pick(*ray_through(state.camera, x, y, self.picture.width, self.picture.height))
             state.selected = found.name if found else None
 
     def _key(self, state: ViewerState, key: str, modifiers: tuple[str, ...]) -> None:
@@ -139,9 +138,9 @@ class Input:
             state.mode = "walk" if state.mode == "orbit" else "orbit"
         elif letter == "p":
             state.screenshot_wanted = True
-        elif key == "Tab":
+        elif letter == "h":
             state.panels_shown = not state.panels_shown
-        elif key == "Escape":
+        elif letter == "Escape":
             state.selected = None
         elif letter in "123456789" and int(letter) <= len(state.scene.cameras):
             state.jump(state.scene.cameras[int(letter) - 1])

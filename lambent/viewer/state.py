@@ -82,6 +82,17 @@ class PathPlay:
     playing: bool = True
 
 
+@dataclass(frozen=True)
+class Choices:
+    """What the renderer can be asked for, so that a panel offers nothing else."""
+
+    integrators: tuple[str, ...]
+    view_transforms: tuple[str, ...]
+    shows: tuple[str, ...]
+    lookups: tuple[str, ...]
+    sample_counts: tuple[int, ...]
+
+
 @dataclass
 class Message:
     text: str
@@ -109,16 +120,20 @@ class ViewerState:
     scene: SceneRecord
     camera: CameraRecord
     edits: MaterialEdits
-    mode: Mode = "walk"
-    flying: bool = False
-    exposure_ev: float = 0.0
-    view_transform: str = "filmic"
-    integrator: str = "rings"
+    choices: Choices
+    mode: Mode
+    exposure_ev: float
+    view_transform: str
+    integrator: str
+    show: str
+    lookup: str
     n: int | None = None  # samples per lobe; None: chosen per material from its roughness
-    show: str = "full"
-    lookup: str = "planes"
+    flying: bool = False
     selected: str | None = None  # object name
+    linked_roughness: bool = True  # mx and my keep their ratio
+    file_names: dict[str, str] = field(default_factory=dict)  # material -> where it is saved
     path: PathPlay | None = None
+    missing: tuple[str, ...] = ()  # what the store lacks
     refine: bool = True  # accumulate while nothing moves
     adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
     panels_shown: bool = True
@@ -129,11 +144,14 @@ class ViewerState:
     clock: Callable[[], float] = time.monotonic
 
     @classmethod
-    def of(cls, scene: SceneRecord, mode: Mode, **options: object) -> ViewerState:
-        """State at the scene's first camera, or, where it has none, at one that sees the whole scene."""
+    def of(cls, scene: SceneRecord, choices: Choices, mode: Mode, **options: object) -> ViewerState:
+        """State at the scene's first camera, or, where it has none, at one that sees the whole scene.
+
+        Every choice starts at its first value.
+        """
         camera = scene.cameras[0] if scene.cameras else overview(scene)
-        edits = MaterialEdits(scene.materials)
-        return cls(scene, camera, edits, mode, exposure_ev=scene.exposure_ev, **options)  # type: ignore[arg-type]
+        first = (choices.view_transforms[0], choices.integrators[0], choices.shows[0], choices.lookups[0])
+        return cls(scene, camera, MaterialEdits(scene.materials), choices, mode, scene.exposure_ev, *first, **options)  # type: ignore[arg-type]
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""
@@ -160,8 +178,14 @@ class ViewerState:
         chosen = self.selected_object
         return chosen.material if chosen else None
 
-    def save_material(self, name: str, file_name: str) -> None:
+    def file_name(self, material: str) -> str:
+        """Where `material` will be saved: what was typed, else its name."""
+        plain = "".join(c if c.isalnum() or c in " ._-" else "_" for c in material).strip(" .") or "material"
+        return self.file_names.get(material, f"{plain}.json")
+
+    def save_material(self, name: str) -> None:
         """Write the material as it is now into `folder`, and say so, or say why not."""
+        file_name = self.file_name(name)
         try:
             self.edits.current(name).save(file_in(self.folder, file_name))
         except (UserError, OSError) as error:

@@ -4,6 +4,7 @@ import pytest
 
 from lambent.materials.document import Lobe, Material
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+from lambent.viewer.state import Choices
 
 
 @pytest.fixture
@@ -24,4 +25,15 @@ def scene():
         paths=(PathRecord(name="tour", keys=(front, side), seconds=4),),
         exposure_ev=1.5,
         bounds=room,
+    )
+
+
+@pytest.fixture
+def choices():
+    return Choices(
+        integrators=("rings", "qmc"),
+        view_transforms=("filmic", "linear"),
+        shows=("full", "diffuse", "specular"),
+        lookups=("planes", "plain"),
+        sample_counts=(1, 3, 5, 7),
     )

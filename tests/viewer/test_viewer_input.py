@@ -12,8 +12,8 @@ from lambent.viewer.state import PathPlay, ViewerState
 
 
 @pytest.fixture
-def state(scene):
-    return ViewerState.of(scene, "walk")
+def state(scene, choices):
+    return ViewerState.of(scene, choices, "walk")
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def test_keys(mouse, state):
     assert state.camera == state.scene.cameras[1] and state.path is None
     send(mouse, state, "key_down", key="9")
     assert state.camera == state.scene.cameras[1]
-    for key in ("o", "f", "p", "Tab"):
+    for key in ("o", "f", "p", "h"):
         send(mouse, state, "key_down", key=key)
     assert (state.mode, state.flying, state.screenshot_wanted, state.panels_shown) == ("orbit", True, True, False)
     state.selected = "table"

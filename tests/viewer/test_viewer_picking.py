@@ -22,15 +22,15 @@ def geometry(scene):
 
 
 def test_the_nearest_object_is_picked(geometry):
-    assert geometry.pick(*ray_through(TOP, 0.5, 0.5, 1.5)).name == "table"
-    assert geometry.pick(*ray_through(TOP, 0.95, 0.5, 1.0)).name == "floor"
+    assert geometry.pick(*ray_through(TOP, 150, 100, 300, 200)).name == "table"
+    assert geometry.pick(*ray_through(TOP, 190, 100, 200, 200)).name == "floor"
     assert geometry.pick(np.array([0.0, 3, 0]), np.array([0.0, 1, 0])) is None
 
 
 def test_picture_points_are_right_side_up():
     eye = CameraRecord(name="eye", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
-    _, right = ray_through(eye, 1.0, 0.5, 2.0)
-    _, top = ray_through(eye, 0.5, 0.0, 2.0)
+    _, right = ray_through(eye, 200, 50, 200, 100)
+    _, top = ray_through(eye, 100, 0, 200, 100)
     assert right == pytest.approx(np.array([2, 0, -1]) / np.sqrt(5))
     assert top == pytest.approx(np.array([0, 1, -1]) / np.sqrt(2))
 

@@ -7,8 +7,8 @@ from lambent.viewer.state import MESSAGE_S, PathPlay, ViewerState
 
 
 @pytest.fixture
-def state(scene, tmp_path):
-    return ViewerState.of(scene, "walk", folder=tmp_path)
+def state(scene, choices, tmp_path):
+    return ViewerState.of(scene, choices, "walk", folder=tmp_path)
 
 
 def rougher(material, mx):
@@ -20,8 +20,8 @@ def test_it_starts_at_the_first_camera_with_the_scenes_exposure(state, scene):
     assert state.exposure_ev == 1.5
 
 
-def test_a_scene_without_cameras_is_seen_whole(scene):
-    camera = ViewerState.of(scene.model_copy(update={"cameras": ()}), "orbit").camera
+def test_a_scene_without_cameras_is_seen_whole(scene, choices):
+    camera = ViewerState.of(scene.model_copy(update={"cameras": ()}), choices, "orbit").camera
     assert camera.target == pytest.approx((0, 1.3, 0))
     assert camera.position[2] > 4
 
@@ -97,13 +97,21 @@ def test_messages_go(state):
 def test_a_material_is_saved_as_it_is_now(state, tmp_path):
     edited = rougher(state.scene.materials["brass"], 0.2)
     state.edits.change("brass", edited)
-    state.save_material("brass", "new brass.json")
+    state.file_names["brass"] = "new brass.json"
+    state.save_material("brass")
     assert load_material(tmp_path / "new brass.json") == edited
     assert state.messages[-1].text == "saved new brass.json"
 
 
 @pytest.mark.parametrize("name", ["../brass.json", "brass", ".json", "/tmp/brass.json", ""])
 def test_a_material_is_saved_nowhere_else(state, tmp_path, name):
-    state.save_material("brass", name)
+    state.file_names["brass"] = name
+    state.save_material("brass")
     assert "not saved" in state.messages[-1].text
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_name_is_offered_for_any_material(state):
+    assert state.file_name("brass") == "brass.json"
+    assert state.file_name("../a/b:c") == "_a_b_c.json"
+    assert state.file_name("...") == "material.json"

@@ -1,0 +1,13 @@
+"""Mouse and keys."""
+
+from __future__ import annotations
+
+from lambent.viewer.input import SHORTCUTS
+from lambent.viewer.panels.widgets import rows
+from lambent.viewer.state import ViewerState
+
+TITLE = "Help"
+
+
+def draw(state: ViewerState) -> None:
+    rows(SHORTCUTS, "shortcuts")

@@ -1,0 +1,23 @@
+"""What the last picture cost."""
+
+from __future__ import annotations
+
+from lambent.viewer.panels.widgets import rows
+from lambent.viewer.state import ViewerState
+
+TITLE = "Statistics"
+
+
+def draw(state: ViewerState) -> None:
+    s = state.statistics
+    width, height = s.resolution
+    table = [
+        ("adapter", s.adapter),
+        ("frame", f"{s.frame_ms:.1f} ms"),
+        ("picture", f"{width} x {height}"),
+        ("samples per pixel", str(s.samples)),
+        ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
+        ("draw calls", str(s.draw_calls)),
+    ]
+    table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
+    rows(table, "statistics")

@@ -1,0 +1,79 @@
+"""Controls that more than one panel uses. Each returns the value as it is after this frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from imgui_bundle import imgui
+
+from lambent.core.colour import srgb_decode, srgb_encode
+
+RGB = tuple[float, float, float]
+
+
+def choice(label: str, value: str, options: Sequence[str]) -> str:
+    """A drop-down list."""
+    index = options.index(value)
+    changed, index = imgui.combo(label, index, list(options))
+    return options[index]
+
+
+def slider(label: str, value: float, low: float, high: float, *, log: bool = False, unit: str = "") -> float:
+    """A slider; Ctrl+click takes a typed number, kept within the range."""
+    flags = imgui.SliderFlags_.always_clamp
+    if log:
+        flags |= imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
+    changed, moved = imgui.slider_float(label, value, low, high, ("%.4f" if log else "%.3f") + unit, flags)
+    return min(max(moved, low), high) if changed else value
+
+
+def rgb(label: str, value: RGB, high: float) -> RGB:
+    """Three sliders of linear coefficients and a swatch that opens a colour picker.
+
+    The picker works on the colour as the display shows it; a coefficient above 1 keeps its scale.
+    """
+    imgui.push_id(label)
+    swatch_px = imgui.get_frame_height()
+    imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
+    changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, "%.3f", imgui.SliderFlags_.always_clamp)
+    value = _triple(moved) if changed else value
+    scale = max(1.0, *value)
+    shown = [float(x) for x in srgb_encode(np.array(value) / scale)]
+    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    if imgui.color_button("##swatch", (*shown, 1.0), imgui.ColorEditFlags_.no_tooltip, (swatch_px, swatch_px)):
+        imgui.open_popup("picker")
+    if imgui.begin_popup("picker"):
+        picked, colour = imgui.color_picker3("##picker", shown, imgui.ColorEditFlags_.no_side_preview)
+        if picked:
+            value = _triple(srgb_decode(np.array(colour)) * scale)
+        imgui.end_popup()
+    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    imgui.text_unformatted(label)
+    imgui.pop_id()
+    return value
+
+
+def explain(text: str) -> None:
+    """Help that appears while the mouse rests on the control before."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+        imgui.set_tooltip(text)
+
+
+def rows(pairs: Sequence[tuple[str, str]], name: str) -> None:
+    """A table of two columns: names and values."""
+    if not imgui.begin_table(name, 2, imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit):
+        return
+    imgui.table_setup_column("name")
+    imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
+    for left, right in pairs:
+        imgui.table_next_column()
+        imgui.text_unformatted(left)
+        imgui.table_next_column()
+        imgui.text_wrapped(right.replace("%", "%%"))
+    imgui.end_table()
+
+
+def _triple(values: Sequence[float] | np.ndarray) -> RGB:
+    return cast(RGB, tuple(max(0.0, float(v)) for v in values))

@@ -1,0 +1,132 @@
+"""Every control of the panels does what it says to the state."""
+
+import pytest
+
+from lambent.materials.document import load_material
+from lambent.viewer.state import Statistics, ViewerState
+from tests.viewer.panel_driver import PanelDriver
+
+
+@pytest.fixture
+def state(scene, choices, tmp_path):
+    return ViewerState.of(scene, choices, "walk", folder=tmp_path)
+
+
+@pytest.fixture
+def panels(monkeypatch, state):
+    driver = PanelDriver(monkeypatch, state)
+    yield driver
+    driver.close()
+
+
+def test_movement_and_cameras(panels, state):
+    panels.click("orbit", 0.1)
+    assert state.mode == "orbit"
+    panels.click("walk", 0.1)
+    panels.click("fly", 0.1)
+    assert (state.mode, state.flying) == ("walk", True)
+    panels.click("2  side##1", 0.1)
+    assert state.camera == state.scene.cameras[1]
+
+
+def test_a_camera_path_plays_pauses_and_is_scrubbed(panels, state):
+    panels.click("play")
+    assert state.path.playing
+    panels.click("pause")
+    assert not state.path.playing
+    panels.drag("##time", 0.05, 0.5)
+    assert state.path.time_s == pytest.approx(2, abs=0.2) and not state.path.playing
+
+
+def test_view(panels, state):
+    panels.drag("exposure", 0.5, 0.75)
+    assert state.exposure_ev == pytest.approx(6, abs=0.5)
+    for label, field in (("transform", "view_transform"), ("show", "show"), ("integrator", "integrator")):
+        before = getattr(state, field)
+        panels.click(label)
+        assert panels.popup_open
+        x, y = panels.point(label)
+        panels.move(x, y + 45)  # the second entry of the list
+        panels.button(True)
+        panels.button(False)
+        panels.frame()
+        assert getattr(state, field) != before, label
+    panels.click("refine while nothing moves", 0.1)
+    panels.click("fewer pixels in motion where needed", 0.1)
+    assert not state.refine and not state.adaptive_resolution
+
+
+def test_samples(panels, state):
+    panels.drag("samples", 0.1, 0.9)
+    assert state.n is None  # greyed out while automatic
+    panels.click("samples from roughness", 0.05)
+    assert state.n == 5
+    panels.drag("samples", 0.6, 0.99)
+    assert state.n == 7
+    panels.click("samples from roughness", 0.05)
+    assert state.n is None
+
+
+def test_material_sliders(panels, state):
+    panels.click("table##1", 0.2)
+    assert state.selected == "table"
+    panels.frame()
+    before = state.edits.current("brass").lobes[0]
+    panels.drag("mx", 0.5, 0.7)
+    lobe = state.edits.current("brass").lobes[0]
+    assert lobe.mx > before.mx
+    assert lobe.my / lobe.mx == pytest.approx(before.my / before.mx, rel=1e-4)
+    panels.click("keep the ratio of mx and my", 0.05)
+    panels.drag("my", 0.5, 0.4)
+    assert state.edits.current("brass").lobes[0].my < lobe.my
+    assert state.edits.current("brass").lobes[0].mx == lobe.mx
+    panels.drag("alpha", 0.1, 0.6)
+    assert state.edits.current("brass").lobes[0].alpha == pytest.approx(0.6, abs=0.05)
+    panels.drag("##values", 0.1, 0.2)
+    for undone in range(4):
+        panels.click("undo")
+    assert state.edits.edited == {}
+    panels.click("redo")
+    assert state.edits.current("brass").lobes[0] == lobe
+    panels.click("reset")
+    assert state.edits.edited == {}
+
+
+def test_the_colour_picker_edits_linear_coefficients(panels, state):
+    state.selected = "floor"
+    panels.frame()
+    panels.click("##swatch")
+    assert panels.popup_open
+    panels.frame(2)
+    x, y = panels.point("##swatch")
+    panels.move(x - 40, y + 60)
+    panels.button(True)
+    panels.button(False)
+    panels.frame()
+    kd = state.edits.current("plaster").kd
+    assert kd != (0.6, 0.6, 0.6) and all(0 <= v <= 1 for v in kd)
+
+
+def test_save(panels, state, tmp_path):
+    state.selected = "table"
+    panels.frame(2)
+    panels.click("save")
+    assert load_material(tmp_path / "brass.json") == state.scene.materials["brass"]
+    panels.click("##file", 0.9)
+    assert panels.io.want_text_input
+    panels.type("x")
+    assert "x" in state.file_names["brass"]
+
+
+def test_everything_fits_the_column(panels, state):
+    """No control or label is cut off at the right edge."""
+    state.selected = "table"
+    state.statistics = Statistics(
+        adapter="a rather long name of an adapter (LLVM 15.0.6, 256 bits)", gpu_ms={"shade": 1}
+    )
+    panels.click("Statistics", 0.3)
+    panels.click("Help", 0.3)
+    panels.frame(2)
+    assert len(panels.rects) > 20
+    width = panels.io.display_size.x
+    assert {label for label, rect in panels.rects.items() if rect[2] > width} == set()
