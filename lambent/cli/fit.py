@@ -1,0 +1,111 @@
+"""`lambent fit`: measured data to material."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from lambent.cli.console import Json, progress_bar, say, show, table
+
+if TYPE_CHECKING:
+    from lambent.materials.document import Material
+    from lambent.materials.fitting.fit import FitResult
+
+UNITS = {"mx": "slope", "my": "slope", "r0": "reflectance at normal incidence", "alpha": "exponent"}
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="Measured table, in any format `lambent inspect` knows.")],
+    lobes: Annotated[int, typer.Option(help="Lobes per side, 1 to 4.")] = 1,
+    method: Annotated[
+        Literal["grid", "gradient"], typer.Option(help="The grid search, or it and a joint polish.")
+    ] = "grid",
+    metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
+    fix: Annotated[list[str] | None, typer.Option(help="Keep a parameter: r0=.05 or kd=.1,.2,.3. Repeatable.")] = None,
+    range_: Annotated[
+        list[str] | None, typer.Option("--range", help="Seek a parameter within lo:hi: mx=.05:.3. Repeatable.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same material.")] = 0,
+    output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw measurement and fit (.png, .pdf, .svg).")] = None,
+    json: Json = False,
+) -> None:
+    """Fit a diffuse term and lobes to a measured material.
+
+    Example: lambent fit brushed.bsdf --lobes 2 -o brushed.json --plot brushed.png
+    """
+    from lambent.core.images import check_writable
+    from lambent.materials import measured
+    from lambent.materials.fitting.fit import fit
+    from lambent.materials.fitting.parameters import parse_fix, parse_ranges
+
+    if output is not None:
+        check_writable(output, (".json",))
+    if plot is not None:
+        check_writable(plot, (".png", ".pdf", ".svg"))
+    fixed, ranges = parse_fix(fix or ()), parse_ranges(range_ or ())
+    measurement = measured.load(file)
+    with progress_bar() as progress:
+        result = fit(
+            measurement,
+            lobes=lobes,
+            method=method,
+            metric=metric,
+            fix=fixed,
+            ranges=ranges,
+            seed=seed,
+            source=file,
+            progress=progress,
+        )
+    if output is not None:
+        result.material.save(output)
+    if plot is not None:
+        from lambent.materials.bsdf import MaterialBSDF
+        from lambent.materials.plots import plot_plane_of_incidence
+
+        evals = {"measured": measurement.eval, "fit": MaterialBSDF(result.material).eval}
+        plot_plane_of_incidence(plot, evals, title=file.name, transmits=measurement.info.transmits)
+    for warning in result.warnings:
+        say(f"note: {warning}")
+    facts = {
+        "material": result.material.model_dump(mode="json"),
+        "errors": result.errors,
+        "lambertian_errors": result.lambertian_errors,
+        "seconds": result.seconds,
+        "partial": result.partial,
+        "warnings": result.warnings,
+        "written": output,
+    }
+    show(facts, describe(result), json)
+    if result.partial:
+        raise typer.Exit(130)
+
+
+def describe(result: FitResult) -> str:
+    """Parameters with their units, then the error under every metric beside that of a Lambertian surface."""
+    from lambent.materials.fitting.metrics import METRICS
+
+    errors = [
+        (name, f"{value:.4g}", f"{result.lambertian_errors[name]:.4g}", METRICS[name].unit)
+        for name, value in result.errors.items()
+    ]
+    head = ("error", "fit", "Lambertian", "unit")
+    return f"{parameters(result.material)}\n\n{table([head, *errors])}\n\n{result.seconds:.1f} s"
+
+
+def parameters(material: Material) -> str:
+    """The material's numbers, one line each, with their units."""
+    rows = [("kd", _rgb(material.kd), "RGB"), ("kt_d", _rgb(material.kt_d), "RGB")]
+    for number, lobe in enumerate(material.lobes, 1):
+        rows.append((f"lobe {number}", lobe.side, lobe.distribution))
+        rows.append(("  k", _rgb(lobe.k), "RGB"))
+        for name, unit in UNITS.items():
+            value = getattr(lobe, name)
+            rows.append((f"  {name}", _rgb(value) if isinstance(value, tuple) else f"{value:.4f}", unit))
+    return table(rows)
+
+
+def _rgb(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:.4f}" for value in values)
