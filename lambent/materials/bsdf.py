@@ -64,7 +64,7 @@ def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
 def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops: Any = NUMPY) -> Vector:
     """wi of the mixture; u_* uniform in [0, 1).
 
-    A lobe sample that crosses the horizon comes back with wi.z = 0, where value and pdf are 0: on the far side the
+    A lobe sample at or across the horizon comes back with wi.z = 0, where value and pdf are 0: on the far side the
     other components' pdf would accept it, and the estimate would be too bright.
     """
     chosen = selection(wo, material, ops)
@@ -77,7 +77,7 @@ def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops:
     for p, lobe in zip(chosen[2:], material.lobes, strict=True):
         lx, ly, lz = lobes.sample(wo, u1, u2, lobe, ops)
         towards = -side if lobe.side == "transmission" else side
-        lz = ops.select(lz * towards > 0, lz, 0.0)
+        lz = ops.select(lz * towards > COS_MIN, lz, 0.0)
         here = u_select >= up_to
         x, y, z = ops.select(here, lx, x), ops.select(here, ly, y), ops.select(here, lz, z)
         up_to = up_to + p
