@@ -1,4 +1,4 @@
-"""MERL binary (Matusik et al. 2003, "A data-driven reflectance model"): isotropic RGB BRDF over half and difference angles.
+"""MERL binary (Matusik et al. 2003): isotropic RGB BRDF over half and difference angles.
 
 Layout, little-endian: 3 x int32 (bins of theta_h, theta_d, phi_d; 90, 90, 180), then the planes R, G, B as float64,
 phi_d fastest. f = value / 1500 x (1, 1.15, 1.66), in 1/sr without the cosine. A negative value was not measured.

@@ -1,0 +1,147 @@
+"""A gonio-photometer in software: incident grid, outgoing grid, sensor noise, and directions the lamp's arm hides.
+
+It records any function f(wi, wo): a material document here, whatever the path tracer knows in the bake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, direction
+from lambent.core.progress import Progress, silent
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Material
+from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheet, Symmetry
+
+Evaluate = Callable[[Floats, Floats], Floats]
+"""f (N, C) in 1/sr without the cosine, of wi and wo (N, 3)."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How the device measures.
+
+    Attributes
+    ----------
+    theta_i_deg, phi_i_deg : tuple of float
+        Incident grid.
+    symmetry : str
+        What the specimen is taken to have, see `GonioTable`.
+    step_deg, fine_deg, fine_reach_deg : float
+        Spacing of the outgoing directions, and the closer one within `fine_reach_deg` of the mirror direction
+        (of the straight one on the far side).
+    noise : float
+        Standard deviation of a reading as a share of it.
+    floor : float
+        Standard deviation of a reading in the dark, as f in 1/sr.
+    sector_deg : float
+        Reflected directions closer to the lamp than this are hidden by its arm and not measured.
+    grazing_deg : float
+        Largest theta_o.
+    seed : int
+        Of the noise; each incident direction has its own stream.
+    """
+
+    theta_i_deg: tuple[float, ...]
+    phi_i_deg: tuple[float, ...] = (0.0,)
+    symmetry: Symmetry = "isotropic"
+    step_deg: float = 2.5
+    fine_deg: float = 1.0
+    fine_reach_deg: float = 10.0
+    noise: float = 0.02
+    floor: float = 1e-4
+    sector_deg: float = 4.0
+    grazing_deg: float = 85.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        span = max(self.phi_i_deg) - min(self.phi_i_deg)
+        if span > PHI_I_RANGE_DEG[self.symmetry]:
+            raise UserError("phi_i spans more than the symmetry", field=self.symmetry, got=f"{span:g} degrees")
+        for name in ("theta_i_deg", "phi_i_deg"):
+            if not (np.diff(getattr(self, name)) > 0).all():
+                raise UserError("angles do not increase", field=name, got=getattr(self, name))
+        if not (min(self.theta_i_deg) >= 0 and max(self.theta_i_deg) < 90 and 0 < self.grazing_deg < 90):
+            raise UserError("an angle is outside its range", expected="theta_i and grazing_deg in [0, 90) degrees")
+        if not (0.1 <= self.fine_deg <= self.step_deg <= 45 and min(self.noise, self.floor, self.sector_deg) >= 0):
+            raise UserError("impossible setup", expected="0.1 <= fine_deg <= step_deg <= 45, noise and sector >= 0")
+
+
+# The incident grids of the thesis (figure 2.6, and its isotropic specimens).
+ANISOTROPIC = Setup((0, 5, 20, 35, 50, 65), tuple(range(0, 91, 15)), "quadrant")
+ISOTROPIC = Setup((0, 5, 19, 33, 47, 61, 75))
+
+
+def record(
+    evaluate: Evaluate, name: str, setup: Setup, *, transmits: bool = False, progress: Progress = silent
+) -> GonioTable:
+    """Measure `evaluate` with the device of `setup`.
+
+    Parameters
+    ----------
+    evaluate : callable
+        f (N, C) of wi, wo (N, 3); wo.z < 0 is asked only where `transmits`.
+    name : str
+        Name of the specimen.
+    """
+    sides: list[list[tuple[Sheet, ...]]] = [[], []]
+    count = len(setup.theta_i_deg) * len(setup.phi_i_deg)
+    for a, theta_i in enumerate(setup.theta_i_deg):
+        rows: list[list[Sheet]] = [[], []]
+        for b, phi_i in enumerate(setup.phi_i_deg):
+            index = a * len(setup.phi_i_deg) + b
+            progress(index, count, f"measuring {name}")
+            noise = np.random.default_rng([setup.seed, index])
+            for far in range(1 + transmits):
+                rows[far].append(_sheet(evaluate, theta_i, phi_i, bool(far), setup, noise))
+        for side, row in zip(sides, rows, strict=True):
+            side.append(tuple(row))
+    progress(count, count, f"measuring {name}")
+    return GonioTable(
+        name=name,
+        theta_i_deg=np.array(setup.theta_i_deg, float),
+        phi_i_deg=np.array(setup.phi_i_deg, float),
+        reflected=tuple(sides[0]),
+        transmitted=tuple(sides[1]) if transmits else (),
+        symmetry=setup.symmetry,
+    )
+
+
+def synthesise(material: Material, setup: Setup | None = None, progress: Progress = silent) -> GonioTable:
+    """Table of a material document whose answer is therefore known; the thesis's grids where no setup is given."""
+    setup = setup or (ANISOTROPIC if any(lobe.mx != lobe.my for lobe in material.lobes) else ISOTROPIC)
+    evaluate = MaterialBSDF(material).eval
+    return record(evaluate, material.name, setup, transmits=material.transmits, progress=progress)
+
+
+def outgoing_grid(theta_i_deg: float, phi_i_deg: float, setup: Setup) -> tuple[Floats, Floats]:
+    """(theta_o, phi_o) in degrees for one incident direction: regular, and closer around the mirror direction."""
+    step, fine, reach = setup.step_deg, setup.fine_deg, setup.fine_reach_deg
+    theta = np.arange(0, setup.grazing_deg + 1e-9, step)
+    near = theta_i_deg + np.arange(-reach, reach + 1e-9, fine)
+    theta = np.union1d(theta, near[(near >= 0) & (near <= setup.grazing_deg)].round(6))
+    phi = np.arange(0, 360, step)
+    across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # a step in phi is so much shorter on the sphere
+    if fine / across < step:
+        near = phi_i_deg + 180 + np.arange(-reach, reach + 1e-9, fine) / across
+        phi = np.union1d(phi, (near % 360).round(4) % 360)
+    return theta, phi
+
+
+def _sheet(
+    evaluate: Evaluate, theta_i: float, phi_i: float, far: bool, setup: Setup, noise: np.random.Generator
+) -> Sheet:
+    theta, phi = outgoing_grid(theta_i, phi_i, setup)
+    wo = direction(*np.radians(np.meshgrid(theta, phi, indexing="ij")))
+    wi = np.broadcast_to(direction(np.radians(theta_i), np.radians(phi_i)), wo.shape)
+    towards = wo * (1, 1, -1) if far else wo
+    f = np.asarray(evaluate(wi.reshape(-1, 3), towards.reshape(-1, 3)), dtype=float).reshape(*wo.shape[:2], -1)
+    f = f * (1 + setup.noise * noise.standard_normal(f.shape)) + setup.floor * noise.standard_normal(f.shape)
+    hidden = np.sum(wi * wo, axis=-1) > np.cos(np.radians(setup.sector_deg))
+    if not far:
+        f[hidden] = np.nan
+    return Sheet(theta, phi, f)
