@@ -114,6 +114,11 @@ class Store:
         self.documents[name] = document
         self._save()
 
+    def forget_all(self) -> None:
+        """Drop every array, so that a bake starts anew; their files go when they are written again."""
+        self._artefacts.clear()
+        self._save()
+
     def begin(
         self,
         name: str,
