@@ -1,0 +1,103 @@
+"""What the renderer needs of a store, as plain arrays; a store that lacks something says so in `missing`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.realtime.cube_mips import finite
+from lambent.store import contract
+from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.store.store import Store
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4)."""
+
+    centre: tuple[float, float, float]
+    radiance: Array
+    distance: Array | None = None
+    planes: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+
+
+@dataclass(frozen=True)
+class BakedScene:
+    """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name."""
+
+    record: SceneRecord
+    positions: Array
+    normals: Array
+    tangents: Array
+    uv2: Array
+    faces: NDArray[np.uint32]
+    irradiance: Array | None = None
+    irradiance_back: Array | None = None
+    environment: Array | None = None
+    probes: Mapping[str, Probe] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+
+    def probe_of(self, obj: ObjectRecord) -> Probe | None:
+        """The object's own probe, else the nearest one, else the environment from the object's centre, else None."""
+        if obj.name in self.probes:
+            return self.probes[obj.name]
+        centre = np.mean(obj.bounds, axis=0)
+        if self.probes:
+            return min(self.probes.values(), key=lambda probe: float(np.linalg.norm(probe.centre - centre)))
+        if self.environment is not None:
+            return Probe((float(centre[0]), float(centre[1]), float(centre[2])), self.environment)
+        return None
+
+
+def read_baked(store: Store) -> BakedScene:
+    """Everything the renderer shows of a store. Only the geometry and the scene record must be there."""
+    record = contract.scene_record(store)
+    missing: list[str] = []
+
+    def light(name: str, why: str | None) -> Array | None:
+        if name not in store:
+            if why is not None:
+                missing.append(f"{name}: {why}")
+            return None
+        values, bad = finite(store.read(name))
+        if bad:
+            missing.append(f"{name}: {bad} values are negative or not finite and were set to 0")
+        return values
+
+    two_sided = any(contract.is_two_sided(record.materials[o.material]) for o in record.objects)
+    probes = {}
+    for obj in record.objects:
+        name = contract.probe_name(obj.name, "radiance")
+        wanted = obj.probe and contract.needs_probe(record.materials[obj.material])
+        radiance = light(name, "the nearest probe or the environment stands in" if wanted else None)
+        if radiance is not None:
+            probes[obj.name] = _probe(store, obj.name, radiance)
+    return BakedScene(
+        record,
+        store.read("geometry/positions"),
+        store.read("geometry/normals"),
+        store.read("geometry/tangents"),
+        store.read("geometry/uv2"),
+        store.read("geometry/faces"),
+        light("light_map/irradiance", "diffuse light is black"),
+        light("light_map/irradiance_back", "light through two-sided sheets is black" if two_sided else None),
+        light("environment/radiance", None),
+        probes,
+        tuple(missing),
+    )
+
+
+def _probe(store: Store, name: str, radiance: Array) -> Probe:
+    x, y, z = store.artefact(contract.probe_name(name, "radiance")).meta["centre"]
+    distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))
+    return Probe(
+        (float(x), float(y), float(z)),
+        radiance,
+        store.read(distance) if distance in store else None,
+        store.read(planes).reshape(-1, 4) if planes in store else np.zeros((0, 4), np.float32),
+    )

@@ -1,0 +1,108 @@
+"""The GPU: which adapter, with which limits, and waiting for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import wgpu
+
+from lambent.core.errors import UserError
+
+MEND = "install a Vulkan driver (Debian: apt-get install mesa-vulkan-drivers libvulkan1)"
+
+# What every WebGPU implementation grants (WebGPU, section 3.6.2). A device asked for without limits gets the adapter's
+# own, so that code which outgrows the defaults would only fail on someone else's machine: we always ask for these.
+WEBGPU_LIMITS: Mapping[str, int] = {
+    "max-texture-dimension-1d": 8192,
+    "max-texture-dimension-2d": 8192,
+    "max-texture-dimension-3d": 2048,
+    "max-texture-array-layers": 256,
+    "max-bind-groups": 4,
+    "max-bindings-per-bind-group": 1000,
+    "max-sampled-textures-per-shader-stage": 16,
+    "max-samplers-per-shader-stage": 16,
+    "max-storage-buffers-per-shader-stage": 8,
+    "max-storage-textures-per-shader-stage": 4,
+    "max-uniform-buffers-per-shader-stage": 12,
+    "max-uniform-buffer-binding-size": 64 << 10,
+    "max-storage-buffer-binding-size": 128 << 20,
+    "max-vertex-buffers": 8,
+    "max-buffer-size": 256 << 20,
+    "max-vertex-attributes": 16,
+    "max-vertex-buffer-array-stride": 2048,
+    "max-color-attachments": 8,
+    "max-color-attachment-bytes-per-sample": 32,
+}
+OPTIONAL_FEATURES = ("timestamp-query",)
+
+
+@dataclass(frozen=True)
+class AdapterInfo:
+    """What a user, a report or a bench says about the GPU."""
+
+    name: str
+    type: str  # "DiscreteGPU", "IntegratedGPU", "CPU"...
+    backend: str
+    driver: str
+
+    @property
+    def is_software(self) -> bool:
+        return self.type == "CPU"
+
+
+def adapter_info(device_or_adapter: Any) -> AdapterInfo:
+    """Name, type, backend and driver of a wgpu adapter or of a device's adapter."""
+    adapter = getattr(device_or_adapter, "adapter", device_or_adapter)
+    info = adapter.info
+    return AdapterInfo(
+        info.get("device", ""), info.get("adapter_type", ""), info.get("backend_type", ""), info.get("description", "")
+    )
+
+
+def choose_adapter() -> Any:
+    """The fastest adapter: a real GPU before a software one, Vulkan, Metal or DX12 before OpenGL.
+
+    Raises
+    ------
+    UserError
+        Where this machine has no adapter at all; names the package that mends it.
+    """
+    adapters = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info.get("backend_type") != "OpenGL"]
+    if not adapters:
+        raise UserError("no graphics adapter found", expected="Vulkan, Metal or Direct3D 12", hint=MEND)
+    order = ["DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU"]
+    return min(adapters, key=lambda a: order.index(a.info["adapter_type"]) if a.info["adapter_type"] in order else 3)
+
+
+def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> Any:
+    """A wgpu device with WebGPU's default limits, raised only where `needs` says so.
+
+    Parameters
+    ----------
+    needs : mapping, optional
+        Limit name -> least value, for example ``{"max-buffer-size": 1 << 30}`` of a large scene.
+    adapter : wgpu.GPUAdapter, optional
+        The adapter of a window; by default `choose_adapter`.
+
+    Raises
+    ------
+    UserError
+        Where there is no adapter or it cannot grant a limit.
+    """
+    adapter = adapter or choose_adapter()
+    limits = dict(WEBGPU_LIMITS)
+    for name, value in (needs or {}).items():
+        if value > adapter.limits[name]:
+            raise UserError(
+                "scene needs more than this adapter grants", field=name, got=adapter.limits[name], expected=value
+            )
+        limits[name] = max(limits.get(name, 0), value)
+    features = [name for name in OPTIONAL_FEATURES if name in adapter.features]
+    return adapter.request_device_sync(required_limits=limits, required_features=features)
+
+
+def wait(device: Any, buffer: Any) -> None:
+    """Return when the GPU has done all that was submitted; `buffer` is any readable one of at least 4 bytes."""
+    device.queue.read_buffer(buffer, size=4)

@@ -1,0 +1,268 @@
+"""One frame: state in, image out. The window and the headless commands run this same code.
+
+renderer = Renderer(open_device(), store)
+picture = renderer.display_image(FrameState(camera, 1680, 1050))
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
+from lambent.core.sequences import radical_inverse
+from lambent.materials.document import Material
+from lambent.realtime.baked import BakedScene, read_baked
+from lambent.realtime.camera import clip_from_world, image_plane
+from lambent.realtime.frame_data import FRAME_DTYPE
+from lambent.realtime.integrators import INTEGRATORS, integrator
+from lambent.realtime.passes.accumulate import AccumulatePass
+from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.shade import Draw, ShadePass
+from lambent.realtime.passes.sky import SkyPass
+from lambent.realtime.passes.tonemap import VIEW_TRANSFORMS, TonemapPass
+from lambent.realtime.patterns import N_MAX, automatic_n
+from lambent.realtime.resources import Layouts, SceneResources
+from lambent.realtime.targets import PassTimer, Targets
+from lambent.store.contract import CameraRecord
+from lambent.store.store import Store
+
+Floats = NDArray[np.float32]
+SHOW = {"full": (1, 1, 1), "diffuse": (1, 0, 0), "specular": (0, 1, 0)}  # weights of diffuse, specular, sky
+QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
+DISPLAY_FORMAT = "rgba8unorm"
+
+
+@dataclass(frozen=True)
+class FrameState:
+    """All that a frame depends on besides the store.
+
+    Attributes
+    ----------
+    camera : CameraRecord
+        Or anything with its fields.
+    width, height : int
+        Pixels.
+    integrator : str
+        A name of `integrators.INTEGRATORS`.
+    n : int, optional
+        Samples per lobe, 1 to 64; by default chosen per material from its roughness.
+    exposure_ev : float
+        Radiance is multiplied by 2^exposure_ev before the view transform; only the display image knows it.
+    view_transform : str
+        filmic, neutral or linear.
+    materials : mapping
+        Materials that stand in for the store's, by name.
+    lookup : str
+        How a direction finds its light in a probe: auto, plain, planes or distance.
+    lookups : mapping
+        The same for single objects, by name.
+    show : str
+        full, diffuse or specular.
+    accumulate : int, optional
+        Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
+    antialias : bool
+        Four coverage samples per pixel, or jitter when accumulating.
+    """
+
+    camera: CameraRecord
+    width: int = 1680
+    height: int = 1050
+    integrator: str = "rings"
+    n: int | None = None
+    exposure_ev: float = 0.0
+    view_transform: str = "filmic"
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    lookup: str = "auto"
+    lookups: Mapping[str, str] = field(default_factory=dict)
+    show: str = "full"
+    accumulate: int | None = None
+    antialias: bool = True
+
+    def check(self) -> None:
+        """Raise `UserError` for a value that no frame can have."""
+        integrator(self.integrator)
+        if self.n is not None and not 1 <= self.n <= N_MAX:
+            raise UserError("sample count is out of range", field="n", got=self.n, expected=f"1 to {N_MAX}")
+        if self.view_transform not in VIEW_TRANSFORMS:
+            raise UserError(
+                "unknown view transform", got=self.view_transform, expected=", ".join(reversed(VIEW_TRANSFORMS))
+            )
+        if self.show not in SHOW:
+            raise UserError("unknown part of the light", got=self.show, expected=", ".join(SHOW))
+        if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
+            size = f"{self.width}x{self.height}"
+            raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
+
+    def samples(self, material: Material) -> int:
+        """Samples per lobe of a material in this frame."""
+        return self.n or (QMC_N if self.integrator == "qmc" else automatic_n(material))
+
+
+class Renderer:
+    """Draws frames of one baked scene on one device.
+
+    Attributes
+    ----------
+    scene : BakedScene
+    missing : tuple of str
+        What the store lacks, in plain words.
+    """
+
+    def __init__(self, device: Any, source: Store | BakedScene) -> None:
+        self.device = device
+        self.scene = source if isinstance(source, BakedScene) else read_baked(source)
+        self.missing = self.scene.missing
+        self._layouts = Layouts(device)
+        self.resources = SceneResources(device, self.scene, self._layouts)
+        self._depth, self._shade = DepthPass(device, self._layouts), ShadePass(device, self._layouts)
+        self._sky, self._accumulate = SkyPass(device, self._layouts), AccumulatePass(device)
+        self._tonemap = TonemapPass(device, self._layouts)
+        self._targets, self._timer = Targets(device), PassTimer(device)
+        self._frame_buffer = device.create_buffer(
+            size=FRAME_DTYPE.itemsize, usage=wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST
+        )
+        self._frame_group = self._layouts.group(self._layouts.frame, self._frame_buffer, self.resources.sampler)
+        self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
+        self._counts: dict[str, Any] = {}
+
+    def draw(self, state: FrameState, target_view: Any = None, target_format: str = DISPLAY_FORMAT) -> Any:
+        """Draw a frame; returns the texture of linear radiance that it left.
+
+        With `target_view` (a window's surface or a texture of the state's size and of `target_format`) the frame is
+        also shown there. Returns before the GPU is done: see `finish`.
+        """
+        state.check()
+        started = time.perf_counter()
+        draws = self._draws(state)
+        self.device.queue.write_buffer(self._frame_buffer, 0, self._frame_data(state, target_format).tobytes())
+        single = state.accumulate is not None or not state.antialias
+        target = self._targets.fit(state.width, state.height, single)
+        encoder = self.device.create_command_encoder()
+        calls = self._encode_light(encoder, draws, target)
+        radiance = target.radiance
+        if state.accumulate is not None:
+            stamps = self._timer.writes("accumulate")
+            radiance = self._accumulate.encode(encoder, radiance, state.accumulate, stamps)
+        if target_view is not None:
+            stamps = self._timer.writes("tonemap")
+            self._tonemap.encode(encoder, self._frame_group, radiance, target_view, target_format, stamps)
+        self._timer.resolve(encoder)
+        self.device.queue.submit([encoder.finish()])
+        self._counts = {
+            "integrator": state.integrator,
+            "width": state.width,
+            "height": state.height,
+            "draw_calls": calls,
+            "triangles": len(self.scene.faces),
+            "samples_per_pixel": max((d.n * d.lobes for d in draws if d.integrator.specular), default=0),
+            "encode_ms": (time.perf_counter() - started) * 1e3,
+        }
+        return radiance
+
+    def finish(self) -> None:
+        """Return when the GPU is done with all frames."""
+        self.device.queue.read_buffer(self._done)
+
+    def image(self, state: FrameState) -> Floats:
+        """Linear radiance (height, width, 3) float32, row 0 on top."""
+        return self._read(self.draw(state), state)
+
+    def display_image(self, state: FrameState) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
+        view = self._targets.display(state.width, state.height, DISPLAY_FORMAT)
+        self.draw(state, view.create_view(), DISPLAY_FORMAT)
+        return self._read_pixels(view, state, np.uint8)
+
+    def converged(self, state: FrameState, spp: int, progress: Progress = silent) -> Floats:
+        """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe (`qmc`)."""
+        state = replace(state, integrator="qmc")
+        per_frame = state.n or QMC_N
+        frames = max(1, -(-spp // per_frame))
+        radiance = None
+        for index in range(frames):
+            radiance = self.draw(replace(state, accumulate=index))
+            if index % 16 == 15:
+                self.finish()
+                progress((index + 1) * per_frame, frames * per_frame, "samples per pixel")
+        return self._read(radiance, state)
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """Of the last frame: gpu_ms per pass (empty without timestamps), draw calls, triangles, samples, encode_ms.
+
+        Waits for the GPU.
+        """
+        return {**self._counts, "gpu_ms": self._timer.read()}
+
+    def _draws(self, state: FrameState) -> list[Draw]:
+        """What to draw, with every material's buffers up to date."""
+        wanted = INTEGRATORS[state.integrator]
+        draws, groups = [], {}
+        for name, buffers in self.resources.materials.items():
+            material = state.materials.get(name, self.scene.record.materials[name])
+            lobes = len(material.lobes) if wanted.specular else 0
+            how = wanted if lobes else INTEGRATORS["diffuse"]
+            n = how.rows or (state.samples(material) if lobes else 1)
+            buffers.update(material, how, n)
+            groups[name] = (how, lobes, n, buffers.group)
+        for item in self.resources.objects:
+            how, lobes, n, group = groups[item.record.material]
+            lookup = item.light.lookup(state.lookups.get(item.record.name, state.lookup)) if lobes else "plain"
+            draws.append(Draw(item, how, lobes, n, lookup, group))
+        return draws
+
+    def _frame_data(self, state: FrameState, target_format: str) -> NDArray[np.void]:
+        camera, width, height = state.camera, state.width, state.height
+        jitter = (0.0, 0.0)
+        if state.accumulate is not None and state.antialias:
+            index = np.array([state.accumulate + 1])
+            jitter = (float(radical_inverse(index, 2)[0]) - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
+        low, high = np.asarray(self.scene.record.bounds)
+        near_m = float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+        across, up, forward = image_plane(camera, width, height)
+        data = np.zeros((), FRAME_DTYPE)
+        data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns
+        data["eye"][:3], data["across"][:3], data["up"][:3] = camera.position, across, up
+        data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
+        data["show"][:3] = SHOW[state.show]
+        data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
+        data["view_transform"] = VIEW_TRANSFORMS[state.view_transform]
+        data["encode_srgb"] = not target_format.endswith("-srgb")
+        data["exposure"] = 2.0**state.exposure_ev
+        return data
+
+    def _encode_light(self, encoder: Any, draws: list[Draw], target: Any) -> int:
+        depth = {"view": target.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
+        with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
+        first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
+        first.set_bind_group(0, self._frame_group)
+        calls = self._depth.draw(first, self.resources, target.pixel_samples)
+        first.end()
+        shade = encoder.begin_render_pass(
+            color_attachments=[target.attachment()],
+            depth_stencil_attachment={**depth, "depth_load_op": "load"},
+            **self._timer.writes("shade"),
+        )
+        shade.set_bind_group(0, self._frame_group)
+        calls += self._shade.draw(shade, self.resources, draws, target.format, target.pixel_samples)
+        calls += self._sky.draw(shade, self.resources, target.format, target.pixel_samples)
+        shade.end()
+        return calls
+
+    def _read(self, radiance: Any, state: FrameState) -> Floats:
+        dtype = np.float16 if radiance.format == "rgba16float" else np.float32
+        return np.asarray(self._read_pixels(radiance, state, dtype), np.float32)
+
+    def _read_pixels(self, texture: Any, state: FrameState, dtype: Any) -> NDArray[Any]:
+        row = state.width * 4 * np.dtype(dtype).itemsize
+        size = (state.width, state.height, 1)
+        data = self.device.queue.read_texture({"texture": texture}, {"bytes_per_row": row}, size)
+        return np.frombuffer(data, dtype).reshape(state.height, state.width, 4)[..., :3]

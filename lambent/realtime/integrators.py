@@ -1,0 +1,54 @@
+"""The specular integrators: which shader, with which constants, reads which table of samples.
+
+A further one is a file in shaders/ with `integrate(index, wo, surface)` and a row here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.materials.document import Lobe
+from lambent.realtime import patterns
+from lambent.realtime.split_sum import TABLE_ROWS, albedo_table
+
+Floats = NDArray[np.floating]
+
+
+def _no_table(lobe: Lobe, n: int) -> Floats:
+    return np.zeros((n, 4), np.float32)
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """`table(lobe, n)` gives (rows, 4) float32; `rows` fixes their number where it is not the sample count n."""
+
+    shader: str
+    table: Callable[[Lobe, int], Floats] = _no_table
+    constants: Mapping[str, int] = field(default_factory=dict)
+    rows: int | None = None
+    prefiltered: bool = False  # reads the cube prefiltered by roughness
+    specular: bool = True
+
+
+INTEGRATORS: dict[str, Integrator] = {
+    "rings": Integrator("quadrature.wgsl", patterns.rings_table),
+    "lobe-4.24": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 24}),
+    "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}),
+    "fis": Integrator("quadrature.wgsl", patterns.fis_table),
+    "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, prefiltered=True),
+    "qmc": Integrator("qmc.wgsl"),
+    "diffuse": Integrator("diffuse.wgsl", specular=False),
+}
+
+
+def integrator(name: str) -> Integrator:
+    """The integrator of that name; `UserError` for an unknown one."""
+    if name not in INTEGRATORS:
+        hint = did_you_mean(name, INTEGRATORS)
+        raise UserError("unknown integrator", got=name, expected=", ".join(INTEGRATORS), hint=hint)
+    return INTEGRATORS[name]

@@ -1,0 +1,177 @@
+"""Where the few samples of a lobe lie: the table that each integrator's shader reads.
+
+A table has one row (x, y, z, w) per sample:
+    x, y   slopes of the half vector, h = normalize(x, y, 1)
+    z      half the log2 of the filter constant c: the sample looks up the solid angle c (wo.h) h_z^3 sr
+    w      exp(-r^2), the density of slopes relative to its peak (Beckmann), or its equal for GGX
+with r the slope in units of (mx, my). The rows depend on the lobe alone, so the shader does no exp, ratio or border.
+
+Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-based importance sampling".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.sequences import hammersley
+from lambent.materials.document import Lobe, Material
+
+Floats = NDArray[np.floating]
+
+RINGS: dict[int, tuple[int, ...]] = {
+    1: (1,),
+    3: (3,),
+    5: (1, 4),
+    7: (1, 6),
+    9: (2, 7),
+    11: (1, 5, 5),
+    13: (1, 6, 6),
+    15: (1, 7, 7),
+    17: (1, 8, 8),
+    19: (1, 6, 6, 6),
+    40: (1, 13, 13, 13),
+}
+N_MAX = 64
+LINE_BETWEEN = (2.25, 4.0)  # ratio of the roughnesses between which rings turn into a line
+BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
+RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
+
+
+def ring_counts(n: int) -> tuple[int, ...]:
+    """Samples per ring, from the centre: the tested splits, and for other n rings of about seven and a centre."""
+    if n in RINGS:
+        return RINGS[n]
+    rings = max(1, round((n - 1) / 7))
+    outer = [(n - 1) // rings + (1 if j >= rings - (n - 1) % rings else 0) for j in range(rings)]
+    return (1, *outer) if n > 1 else (1,)
+
+
+def ring_pattern(n: int, ggx: bool = False) -> tuple[Floats, Floats]:
+    """Equal-mass staggered rings: slopes (n, 2) in units of (mx, my), and filter factors S (n).
+
+    Ring j stands where half of its mass lies inside; every sample carries the mass 1/n. S = b / relative density:
+    b = 1/2, because a trilinear look-up blurs by itself, and b = 1 at n = 40, where the samples are dense.
+    """
+    slopes, before = [], 0
+    for j, count in enumerate(ring_counts(n)):
+        r = 0.0 if count == 1 and before == 0 else float(radius((before + count / 2) / n, ggx))
+        phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
+        slopes.append(r * np.stack([np.cos(phi), np.sin(phi)], axis=-1))
+        before += count
+    points = np.concatenate(slopes)
+    bias = 1.0 if n >= 40 else 0.5
+    return points, bias / relative_density(points, ggx)
+
+
+def line_pattern(n: int, ggx: bool = False) -> tuple[Floats, Floats]:
+    """Equal-mass samples on the x axis, for lobes much longer than wide: slopes (n, 2) and filter factors S (n).
+
+    x is the quantile of the lobe's marginal (a normal of variance 1/2 for Beckmann). The filter is the thesis's lobe
+    ellipse, A = pi tan(a_U) tan(a_V) = 4 pi mx my (-ln 0.01) at small roughness, narrowed by one level (a quarter).
+    """
+    from scipy.special import erfinv
+
+    t = (2 * np.arange(n) + 1) / n - 1
+    x = t / np.sqrt(1 - t * t) if ggx else erfinv(t)
+    return np.stack([x, np.zeros(n)], axis=-1), np.full(n, -np.log(BORDER_MASS) / 4)
+
+
+def radius(mass: Any, ggx: bool = False) -> Any:
+    """Slope, in units of m, inside which `mass` in [0, 1) of the lobe lies (4.6)."""
+    return np.sqrt(mass / (1 - mass)) if ggx else np.sqrt(-np.log1p(-np.asarray(mass)))
+
+
+def relative_density(slopes: Floats, ggx: bool = False) -> Floats:
+    """Density of slopes (n, 2) in units of (mx, my), relative to the centre's."""
+    r2 = np.sum(slopes * slopes, axis=-1)
+    return np.asarray(1 / (1 + r2) ** 2 if ggx else np.exp(-r2))
+
+
+def line_share(lobe: Lobe) -> float:
+    """0 for rings, 1 for a line, smooth in my/mx between, so that nothing pops while a slider moves."""
+    low, high = np.log(LINE_BETWEEN)
+    s = float(np.clip((abs(np.log(lobe.my / lobe.mx)) - low) / (high - low), 0, 1))
+    return s * s * (3 - 2 * s)
+
+
+def along_axis(slopes: Floats, lobe: Lobe) -> tuple[Floats, NDArray[np.integer]]:
+    """Slopes with x as the lobe's long axis, and the order of the samples along it.
+
+    Both patterns are sorted along the long axis, so that the k-th of one moves to the k-th of the other.
+    """
+    turned = slopes if lobe.mx >= lobe.my else slopes[:, ::-1]
+    return turned, np.lexsort((turned[:, 1].round(9), turned[:, 0].round(9)))
+
+
+def blended(rings: Floats, line: Floats, lobe: Lobe) -> Floats:
+    """Slopes (n, 2) between a ring pattern and a line along x, by the lobe's anisotropy."""
+    share = line_share(lobe)
+    if share == 0:
+        return rings
+    turned, order = along_axis(rings, lobe)
+    mixed = (1 - share) * turned[order] + share * line
+    return np.asarray(mixed if lobe.mx >= lobe.my else mixed[:, ::-1])
+
+
+def table(slopes: Floats, filter_factor: Floats, lobe: Lobe) -> Floats:
+    """Rows (x, y, z, w) of samples at slopes (n, 2) in units of (mx, my), each of solid angle S/(n pdf)."""
+    n = len(slopes)
+    constant = filter_factor * 4 * np.pi * lobe.mx * lobe.my / n
+    density = relative_density(slopes, lobe.distribution == "ggx")
+    rows = np.column_stack([slopes * [lobe.mx, lobe.my], 0.5 * np.log2(constant), density])
+    return rows.astype(np.float32)
+
+
+def rings_table(lobe: Lobe, n: int) -> Floats:
+    """Samples of the `rings` integrator: rings, or a line where one roughness exceeds three times the other."""
+    ggx = lobe.distribution == "ggx"
+    (rings, s_rings), (line, s_line) = ring_pattern(n, ggx), line_pattern(n, ggx)
+    share = line_share(lobe)
+    order = along_axis(rings, lobe)[1] if share > 0 else np.arange(n)
+    factor = np.exp((1 - share) * np.log(s_rings[order]) + share * np.log(s_line))
+    return table(blended(rings, line, lobe), factor, lobe)
+
+
+def fis_table(lobe: Lobe, n: int) -> Floats:
+    """Filtered importance sampling (Colbert & Krivanek 2007): Hammersley points, filter 1/(n pdf), no bias."""
+    ggx = lobe.distribution == "ggx"
+    u1, u2 = hammersley(n).T
+    r = radius(u1, ggx)
+    slopes = np.stack([r * np.cos(2 * np.pi * u2), r * np.sin(2 * np.pi * u2)], axis=-1)
+    return table(slopes, 1 / relative_density(slopes, ggx), lobe)
+
+
+def lobe_table(lobe: Lobe, n: int) -> Floats:
+    """The thesis's pattern: a centre and a ring (or a line) equally spaced in angle within the lobe's border."""
+    ring = np.concatenate([[[0.0, 0.0]], (1 - RING_XI1) * _circle(n - 1)]) if n > 1 else np.zeros((1, 2))
+    t = (2 * np.arange(n) + 1) / n - 1
+    of_border = blended(ring, np.stack([t, np.zeros(n)], axis=-1), lobe)
+    share = np.hypot(of_border[:, 0], of_border[:, 1])  # 1 - xi1 (4.13)
+    at_border = np.divide(of_border, share[:, None], out=np.zeros_like(of_border), where=share[:, None] > 0)
+    limit = at_border * border(lobe)
+    length = np.hypot(limit[:, 0], limit[:, 1])
+    scale = np.divide(
+        np.tan(share * np.arctan(length)), length, out=np.zeros_like(length), where=length > 0
+    )  # slope = tan(theta_h)
+    slopes = limit * scale[:, None] / [lobe.mx, lobe.my]
+    return table(slopes, np.ones(n), lobe)
+
+
+def _circle(count: int) -> Floats:
+    phi = 2 * np.pi * np.arange(count) / max(1, count)
+    return np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+
+
+def border(lobe: Lobe) -> Floats:
+    """Slopes (2,) along t and b of the lobe's border, outside which 1 % of it lies (4.10)."""
+    return float(radius(1 - BORDER_MASS, lobe.distribution == "ggx")) * np.array([lobe.mx, lobe.my])
+
+
+def automatic_n(material: Material) -> int:
+    """Samples that a material needs: few for mirrors, more the wider its widest lobe."""
+    m = max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
+    steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
+    return next((n for limit, n in steps if m <= limit), 19)

@@ -1,0 +1,229 @@
+"""A baked scene on the GPU: vertices, light maps, cube maps and the bind groups that hold them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.realtime.baked import BakedScene, Probe
+from lambent.realtime.cube_mips import HALF_MAX, finite, mip_chain
+from lambent.realtime.device import WEBGPU_LIMITS
+from lambent.realtime.frame_data import OBJECT_DTYPE, lobe_data, material_data, sample_data
+from lambent.realtime.integrators import Integrator
+from lambent.realtime.split_sum import prefiltered_cube
+from lambent.store.contract import ObjectRecord
+
+Floats = NDArray[np.floating]
+LOOKUPS = {"plain": 0, "planes": 1, "distance": 2}
+PLANE_STEP = 6  # plane counts are padded to multiples of this: each count is a pipeline of its own
+VERTEX_FLOATS = 11  # position, normal, tangent, uv2
+
+_FRAGMENT = wgpu.ShaderStage.FRAGMENT
+_BOTH = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
+_UNIFORM = {"buffer": {"type": "uniform"}}
+_STORAGE = {"buffer": {"type": "read-only-storage"}}
+_SAMPLER = {"sampler": {"type": "filtering"}}
+_CUBE = {"texture": {"sample_type": "float", "view_dimension": "cube"}}
+_FLAT = {"texture": {"sample_type": "float", "view_dimension": "2d"}}
+
+
+def device_needs(scene: BakedScene) -> dict[str, int]:
+    """Limits above WebGPU's defaults that a scene needs; give them to `device.open_device`."""
+    needs = {"max-buffer-size": max(len(scene.positions) * VERTEX_FLOATS * 4, scene.faces.size * 4)}
+    if scene.irradiance is not None:
+        needs["max-texture-dimension-2d"] = max(scene.irradiance.shape[:2])
+    return {name: value for name, value in needs.items() if value > WEBGPU_LIMITS[name]}
+
+
+class Layouts:
+    """Bind group layouts: 0 frame, 1 material, 2 object, 3 light maps."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+        self.frame = self._make(_BOTH, _UNIFORM, _SAMPLER)
+        self.material = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _STORAGE)
+        self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE)
+        self.light = self._make(_FRAGMENT, _FLAT, _FLAT)
+        self.cube = self._make(_FRAGMENT, _CUBE)
+
+    def _make(self, visibility: int, *kinds: dict[str, Any]) -> Any:
+        entries = [{"binding": i, "visibility": visibility, **kind} for i, kind in enumerate(kinds)]
+        return self._device.create_bind_group_layout(entries=entries)
+
+    def group(self, layout: Any, *resources: Any) -> Any:
+        """Bind group of `resources` (buffers, samplers, views) in the layout's order."""
+        entries = [
+            {"binding": i, "resource": {"buffer": r} if isinstance(r, wgpu.GPUBuffer) else r}
+            for i, r in enumerate(resources)
+        ]
+        return self._device.create_bind_group(layout=layout, entries=entries)
+
+
+def cube_texture(device: Any, levels: list[Floats], format: str = "rgba16float") -> Any:
+    """Cube texture of MIP levels (6, n, n, 3) or, for r16float, (6, n, n, 1)."""
+    n = levels[0].shape[1]
+    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    texture = device.create_texture(size=(n, n, 6), format=format, mip_level_count=len(levels), usage=usage)
+    for level, values in enumerate(levels):
+        half = _with_alpha(values) if format == "rgba16float" else np.minimum(values, HALF_MAX).astype(np.float16)
+        size = half.shape[1]
+        device.queue.write_texture(
+            {"texture": texture, "mip_level": level},
+            np.ascontiguousarray(half),
+            {"bytes_per_row": size * half.shape[3] * 2, "rows_per_image": size},
+            (size, size, 6),
+        )
+    return texture
+
+
+def _with_alpha(rgb: Floats) -> NDArray[np.float16]:
+    rgba = np.ones((*rgb.shape[:-1], 4), np.float16)
+    rgba[..., :3] = np.minimum(rgb, HALF_MAX)
+    return rgba
+
+
+def flat_texture(device: Any, rgb: Floats | None) -> Any:
+    """Half-float texture of (H, W, 3); one black texel where there is none."""
+    rgba = _with_alpha(np.zeros((1, 1, 3), np.float32) if rgb is None else finite(rgb)[0])
+    height, width = rgba.shape[:2]
+    usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+    texture = device.create_texture(size=(width, height, 1), format="rgba16float", usage=usage)
+    device.queue.write_texture({"texture": texture}, rgba, {"bytes_per_row": width * 8}, (width, height, 1))
+    return texture
+
+
+def inverse_depth(distance: Floats) -> Floats:
+    """(6, N, N, 1): 1/max(|x|, |y|, |z|) of the points at `distance` (6, N, N) along each texel; linear over planes."""
+    from lambent.core.cubemap import face_directions
+
+    n = distance.shape[1]
+    length = np.linalg.norm(face_directions(n), axis=-1)
+    safe = np.clip(np.nan_to_num(distance, nan=HALF_MAX, posinf=HALF_MAX), 1e-3, HALF_MAX)
+    return np.asarray(length / safe)[..., None]
+
+
+class Light:
+    """A probe's cube maps on the GPU; the prefiltered one is made when split-sum asks for it."""
+
+    def __init__(self, device: Any, probe: Probe | None, sampler: Any) -> None:
+        self._device, self._sampler = device, sampler
+        self._prefiltered: Any = None
+        radiance = np.zeros((6, 1, 1, 3), np.float32) if probe is None else finite(probe.radiance)[0]
+        distance = None if probe is None else probe.distance
+        self.centre = (0.0, 0.0, 0.0) if probe is None else probe.centre
+        self.texels = float(np.log2(radiance.shape[1] / 2))  # half the log2 of N^2/4 texels per unit area (4.17)
+        self._radiance = cube_texture(device, mip_chain(radiance))
+        depth = np.full((6, 1, 1, 1), 1e-4, np.float32) if distance is None else inverse_depth(distance)
+        self.depth_view = cube_texture(device, [depth], "r16float").create_view(dimension="cube")
+        self.radiance_view = self._radiance.create_view(dimension="cube")
+        planes = np.zeros((0, 4), np.float32) if probe is None else np.asarray(probe.planes, np.float32)
+        self.plane_count = -(-len(planes) // PLANE_STEP) * PLANE_STEP
+        about_centre = np.zeros((max(1, self.plane_count), 4), np.float32)  # a zero plane is never approached
+        about_centre[: len(planes)] = planes
+        about_centre[: len(planes), 3] += planes[:, :3] @ np.asarray(self.centre, np.float32)
+        self.planes = device.create_buffer_with_data(data=about_centre, usage=wgpu.BufferUsage.STORAGE)
+        self.has_distance = distance is not None
+
+    def replace_radiance(self, cube: Floats) -> None:
+        """Show other light, (6, N, N, 3) of the same N."""
+        self._radiance = cube_texture(self._device, mip_chain(finite(cube)[0]))
+        self.radiance_view, self._prefiltered = self._radiance.create_view(dimension="cube"), None
+
+    def view(self, prefiltered: bool) -> Any:
+        if not prefiltered:
+            return self.radiance_view
+        if self._prefiltered is None:
+            self._prefiltered = prefiltered_cube(self._device, self._radiance, self._sampler)
+        return self._prefiltered.create_view(dimension="cube")
+
+    def lookup(self, wanted: str) -> str:
+        """The look-up to use where `wanted` is "auto" or cannot be had: planes, else the distance map, else plain."""
+        if wanted not in ("auto", *LOOKUPS):
+            raise UserError("unknown look-up", got=wanted, expected="auto, " + ", ".join(LOOKUPS))
+        possible = {"planes": self.plane_count > 0, "distance": self.has_distance, "plain": True}
+        return wanted if possible.get(wanted, False) else next(name for name, can in possible.items() if can)
+
+
+class MaterialBuffers:
+    """A material's uniforms and samples; written again only when the material, the integrator or n changes."""
+
+    def __init__(self, device: Any, layouts: Layouts) -> None:
+        self._device, self._layouts = device, layouts
+        self._written: tuple[Any, ...] = ()
+        self._buffers: list[Any] = []
+        self.group: Any = None
+
+    def update(self, material: Material, how: Integrator, n: int) -> None:
+        if self._written == (material, id(how), n):
+            return
+        self._written = (material, id(how), n)
+        lobes = material.lobes if how.specular else ()
+        data = [material_data(material), lobe_data(lobes), sample_data(lobes, how, n)]
+        if [d.nbytes for d in data] != [b.size for b in self._buffers]:
+            usages = [wgpu.BufferUsage.UNIFORM, wgpu.BufferUsage.STORAGE, wgpu.BufferUsage.STORAGE]
+            self._buffers = [
+                self._device.create_buffer(size=d.nbytes, usage=usage | wgpu.BufferUsage.COPY_DST)
+                for d, usage in zip(data, usages, strict=True)
+            ]
+            self.group = self._layouts.group(self._layouts.material, *self._buffers)
+        for buffer, values in zip(self._buffers, data, strict=True):
+            self._device.queue.write_buffer(buffer, 0, values.tobytes())
+
+
+class ObjectResources:
+    """One object: its range of the index buffer, its light and its bind groups."""
+
+    def __init__(self, device: Any, layouts: Layouts, record: ObjectRecord, light: Light) -> None:
+        self.record, self.light, self._layouts = record, light, layouts
+        data = np.zeros(1, OBJECT_DTYPE)
+        data["centre"][0] = (*light.centre, light.texels)
+        data["emission"][0, :3] = record.emission
+        self._uniform = device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
+        self._groups: dict[tuple[bool, int], Any] = {}
+
+    def group(self, prefiltered: bool) -> Any:
+        key = (prefiltered, id(self.light.radiance_view))
+        if key not in self._groups:
+            light = self.light
+            self._groups = {k: v for k, v in self._groups.items() if k[1] == key[1]}
+            self._groups[key] = self._layouts.group(
+                self._layouts.object, self._uniform, light.planes, light.view(prefiltered), light.depth_view
+            )
+        return self._groups[key]
+
+
+class SceneResources:
+    """Everything of a baked scene that stays on the GPU from frame to frame."""
+
+    def __init__(self, device: Any, scene: BakedScene, layouts: Layouts) -> None:
+        self.scene = scene
+        self.sampler = device.create_sampler(
+            mag_filter="linear", min_filter="linear", mipmap_filter="linear",
+            address_mode_u="clamp-to-edge", address_mode_v="clamp-to-edge", address_mode_w="clamp-to-edge",
+        )  # fmt: skip
+        vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2], axis=1)
+        self.vertices = device.create_buffer_with_data(
+            data=np.ascontiguousarray(np.nan_to_num(vertices), np.float32), usage=wgpu.BufferUsage.VERTEX
+        )
+        self.indices = device.create_buffer_with_data(
+            data=np.ascontiguousarray(scene.faces, np.uint32), usage=wgpu.BufferUsage.INDEX
+        )
+        self._light_maps = [flat_texture(device, scene.irradiance), flat_texture(device, scene.irradiance_back)]
+        self.light_group = layouts.group(layouts.light, *(t.create_view() for t in self._light_maps))
+        environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
+        self._environment = cube_texture(device, [environment])
+        self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
+        lights: dict[int, Light] = {}
+        self.objects = []
+        for record in scene.record.objects:
+            probe = scene.probe_of(record)
+            key = id(probe) if probe in scene.probes.values() else id(record)
+            if key not in lights:
+                lights[key] = Light(device, probe, self.sampler)
+            self.objects.append(ObjectResources(device, layouts, record, lights[key]))
+        self.materials = {name: MaterialBuffers(device, layouts) for name in scene.record.materials}

@@ -1,0 +1,35 @@
+"""Shaders are assembled from files: `#include "name.wgsl"` on a line of its own, every file at most once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+FOLDERS = (Path(__file__).parent / "shaders", Path(__file__).parents[1] / "materials")
+_INCLUDE = re.compile(r'^#include "([\w.-]+)"$', re.MULTILINE)
+
+
+def assemble(*names: str) -> str:
+    """WGSL of the named files and all they include, in order of need.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where a file is in none of `FOLDERS`.
+    """
+    done: dict[str, str] = {}
+    for name in names:
+        _add(name, done)
+    return "\n".join(done.values())
+
+
+def _add(name: str, done: dict[str, str]) -> None:
+    if name in done:
+        return
+    path = next((folder / name for folder in FOLDERS if (folder / name).is_file()), None)
+    if path is None:
+        raise FileNotFoundError(f"shader {name} is in none of {[str(folder) for folder in FOLDERS]}")
+    text = path.read_text(encoding="utf-8")
+    for inner in _INCLUDE.findall(text):
+        _add(inner, done)
+    done[name] = _INCLUDE.sub("", text)

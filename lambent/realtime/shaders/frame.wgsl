@@ -1,0 +1,17 @@
+// What every pass of a frame knows (group 0). Matches FRAME_DTYPE in frame_data.py.
+
+struct Frame {
+    clip_from_world: mat4x4f,
+    eye: vec4f,
+    across: vec4f,   // the ray of clip position (x, y) is forward + x across + y up
+    up: vec4f,
+    forward: vec4f,
+    show: vec4f,     // weights of: diffuse, specular, sky, unused
+    first_sample: u32, // index of this frame's first sample of a progressive series
+    view_transform: u32,
+    encode_srgb: u32,
+    exposure: f32,   // factor on radiance, 2^EV
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var linear_sampler: sampler;

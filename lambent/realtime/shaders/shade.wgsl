@@ -1,0 +1,38 @@
+// Light of a pixel: emission, diffuse from the light map, and each lobe by the integrator that this file is built with.
+
+#include "vertex.wgsl"
+#include "surface.wgsl"
+
+@group(3) @binding(0) var light_map: texture_2d<f32>;
+@group(3) @binding(1) var light_map_back: texture_2d<f32>;
+
+const GRAZING = 1e-3; // least cos_o: interpolated normals turn away from the viewer at silhouettes
+const HALF_MAX = 6e4; // below the largest half float, so that a resolve never meets infinity
+
+fn shading_frame(v: Varyings, facing: f32) -> Surface {
+    let n = normalize(v.n_world) * facing;
+    let along = v.t_world - n * dot(n, v.t_world);
+    let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
+    let t = normalize(select(cross(n, other), along, dot(along, along) > 1e-8));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy));
+}
+
+@fragment fn shade_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let s = shading_frame(v, select(-1.0, 1.0, front));
+    let view = normalize(frame.eye.xyz - v.p_world);
+    let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), GRAZING)));
+
+    let e_front = textureSampleLevel(light_map, linear_sampler, v.uv2, 0.0).rgb;
+    let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
+    let e_here = select(e_back, e_front, front);
+    let e_beyond = select(e_front, e_back, front);
+    let diffuse = (material.kd.rgb * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI; // 4.1
+    let emitted = select(vec3f(0.0), object.emission.rgb, front);
+
+    var specular = vec3f(0.0);
+    for (var i = 0u; i < LOBES; i++) {
+        specular += integrate(i, wo, s);
+    }
+    let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular;
+    return vec4f(clamp(light, vec3f(0.0), vec3f(HALF_MAX)), 1.0);
+}

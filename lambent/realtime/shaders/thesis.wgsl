@@ -1,0 +1,45 @@
+// The estimates as published (thesis M, 4.24 and 4.25): uniform samples within the lobe, one filter size per pixel.
+//     4.24: L = sum L_i cos^2 f / sum p cos        4.25: L = sum L_i cos^2 f^2/p / sum f cos
+// f = p q with q = F/((cos_i cos_o)^alpha h_z), and p only up to a factor, which cancels.
+
+#include "surface.wgsl"
+
+override FORMULA: u32 = 25u;
+
+fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
+    let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
+    return 2.0 * dot(wo, h) * h - wo;
+}
+
+fn tangent_of_angle(a: vec3f, b: vec3f) -> f32 {
+    return tan(min(acos(clamp(dot(a, b), -1.0, 1.0)), 1.5));
+}
+
+fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
+    let lobe = lobes[index].lobe;
+    let border = lobes[index].border;
+    let centre = vec3f(-wo.xy, wo.z);
+    let u = tangent_of_angle(centre, reflected(wo, vec2f(border.x, 0.0)));
+    let v = tangent_of_angle(centre, reflected(wo, vec2f(0.0, border.y)));
+    let half_log2_omega = 0.5 * log2(max(LAMBENT_PI * u * v / f32(SAMPLES), 1e-20)); // 4.14, 4.15
+    var sum = vec3f(0.0);
+    var weights = vec3f(0.0);
+    for (var k = 0u; k < SAMPLES; k++) {
+        let sample = samples[index * SAMPLES + k];
+        let h = vec3f(sample.xy, 1.0) * inverseSqrt(1.0 + dot(sample.xy, sample.xy));
+        let cos_d = dot(wo, h);
+        let wi = 2.0 * cos_d * h - wo;
+        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
+        let p = sample.w / (h.z * h.z * h.z * cos_d);
+        let q = gain(lobe, wi, wo, h) / wi.z;
+        let light = incident(s, on_side(lobe, wi), half_log2_omega);
+        if (FORMULA == 24u) {
+            sum += light * wi.z * wi.z * p * q;
+            weights += vec3f(p * wi.z);
+        } else {
+            sum += light * wi.z * wi.z * p * q * q;
+            weights += p * q * wi.z;
+        }
+    }
+    return select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30));
+}

@@ -1,0 +1,18 @@
+// The one vertex stage of depth and shade passes; @invariant, so that their depths agree to the bit.
+
+#include "frame.wgsl"
+
+struct Varyings {
+    @invariant @builtin(position) position: vec4f,
+    // centroid: at the edge of a triangle the pixel's centre may lie outside, where normals extrapolate
+    @location(0) @interpolate(perspective, centroid) p_world: vec3f,
+    @location(1) @interpolate(perspective, centroid) n_world: vec3f,
+    @location(2) @interpolate(perspective, centroid) t_world: vec3f,
+    @location(3) @interpolate(perspective, centroid) uv2: vec2f,
+}
+
+@vertex fn vertex_main(
+    @location(0) position: vec3f, @location(1) normal: vec3f, @location(2) tangent: vec3f, @location(3) uv2: vec2f,
+) -> Varyings {
+    return Varyings(frame.clip_from_world * vec4f(position, 1.0), position, normal, tangent, uv2);
+}
