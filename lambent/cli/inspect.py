@@ -1,0 +1,198 @@
+"""`lambent inspect`: what a file is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lambent.cli.console import Json, plain, show, table
+from lambent.core.errors import UserError
+
+ALBEDO_AT_DEG = (0, 30, 60)
+HEAD_BYTES = 16
+PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
+Facts = dict[str, Any]
+
+
+def command(
+    file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, picture; or builtin:room.")],
+    plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
+    json: Json = False,
+) -> None:
+    """Say what a file of ours or theirs is: format, dimensions, symmetry, albedo, faults.
+
+    Example: lambent inspect brushed.bsdf --plot brushed.png
+    """
+    if plot is not None:
+        from lambent.core.images import check_writable
+
+        check_writable(plot, (".png", ".pdf", ".svg"))
+    facts = plain(inspector_of(file)(file, plot))
+    rows = [(name.replace("_", " "), _words(value)) for name, value in facts.items() if value not in ([], {}, None)]
+    show(facts, table(rows), json)
+
+
+def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
+    """The function that understands a file, chosen by its place and its first bytes."""
+    path = Path(file)
+    if file.startswith("builtin:") or path.suffix.lower() in (".toml", ".glb", ".gltf", ".obj"):
+        return inspect_scene
+    if path.is_dir():
+        return inspect_store
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(HEAD_BYTES)
+    except OSError as error:
+        raise UserError(f"cannot be read ({error.strerror})", file=file) from error
+    if head.startswith(PICTURES):
+        return inspect_picture
+    if head.lstrip().startswith(b"{"):
+        return inspect_material
+    return inspect_table
+
+
+def inspect_table(file: str, plot: Path | None) -> Facts:
+    """A measured table: what the file says, how much of it is usable, its albedo."""
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from lambent.core.frames import direction
+    from lambent.materials import measured
+
+    measurement = measured.load(Path(file))
+    info, samples = measurement.info, measurement.samples()
+    if plot is not None:
+        _plot(plot, "measured", measurement.eval, Path(file).name, info.transmits)
+    wi = direction(np.radians(ALBEDO_AT_DEG), 0.0)
+    near, far = measurement.reflectivity(wi), measurement.transmissivity(wi)
+    return {
+        "is": "measured table",
+        "format": info.format,
+        "sizes": info.sizes,
+        "symmetry": "isotropic" if info.isotropic else "anisotropic",
+        "channels": info.channels,
+        "sides": "reflection and transmission" if info.transmits else "reflection",
+        "stored": info.stored,
+        "tuples_used": len(samples),
+        "tuples_left_out": asdict(samples.left_out),
+        "reflectivity": _at_angles(near),
+        "transmissivity": _at_angles(far) if info.transmits else None,
+        "peak_per_sr": float(samples.f.max()),
+        "notes": info.notes,
+    }
+
+
+def inspect_material(file: str, plot: Path | None) -> Facts:
+    """A material document: its numbers, its albedo, where it comes from."""
+    import numpy as np
+
+    from lambent.cli.fit import parameters
+    from lambent.core.frames import direction
+    from lambent.materials.bsdf import MaterialBSDF
+    from lambent.materials.document import load_material
+
+    material = load_material(Path(file))
+    bsdf = MaterialBSDF(material)
+    if plot is not None:
+        _plot(plot, material.name, bsdf.eval, Path(file).name, material.transmits)
+    provenance = material.provenance.model_dump(mode="json") if material.provenance else {}
+    return {
+        "is": "material",
+        "name": material.name,
+        "parameters": "\n" + parameters(material),
+        "albedo": _at_angles(bsdf.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))),
+        "source": {key: value for key, value in provenance.items() if value and not isinstance(value, dict | list)},
+        "errors": provenance.get("errors"),
+        "notes": provenance.get("notes"),
+    }
+
+
+def inspect_scene(file: str, plot: Path | None) -> Facts:
+    """A scene: what is in it and what its loader repaired."""
+    from lambent.scenes import load_scene
+
+    _no_plot(file, plot)
+    scene = load_scene(file)
+    low, high = scene.bounds
+    return {
+        "is": "scene",
+        "name": scene.name,
+        "objects": len(scene.objects),
+        "triangles": sum(len(o.mesh.faces) for o in scene.objects),
+        "materials": sorted(scene.materials),
+        "environment": type(scene.environment).__name__ if scene.environment else "none",
+        "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
+        "cameras": [camera.name for camera in scene.cameras],
+        "paths": [path.name for path in scene.paths],
+        "size_m": (high - low).round(3),
+        "warnings": scene.warnings,
+    }
+
+
+def inspect_store(file: str, plot: Path | None) -> Facts:
+    """A store: which arrays it holds, complete or not, and whether every chunk on disk is sound."""
+    from lambent.store.store import Store
+
+    _no_plot(file, plot)
+    store = Store.open(Path(file))
+    return {
+        "is": "store",
+        "arrays": {a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()},
+        "documents": sorted(store.documents),
+        "inputs": store.inputs,
+    }
+
+
+def inspect_picture(file: str, plot: Path | None) -> Facts:
+    """A picture: size and range of its linear values."""
+    from lambent.core.colour import luminance
+    from lambent.core.images import read_image
+
+    _no_plot(file, plot)
+    image = read_image(Path(file))
+    return {
+        "is": "picture",
+        "size": [image.shape[1], image.shape[0]],
+        "luminance_mean": float(luminance(image).mean()),
+        "lowest": float(image.min()),
+        "highest": float(image.max()),
+        "mean_rgb": image.mean(axis=(0, 1), dtype=float),
+    }
+
+
+def _health(store: Any, artefact: Any) -> str:
+    if not artefact.complete:
+        return str(artefact.state)
+    try:
+        store.read(artefact.name)
+    except UserError as error:
+        return error.message
+    return "complete"
+
+
+def _at_angles(values: Any) -> Facts:
+    """{"30 deg": mean over channels} of values (angles, channels)."""
+    return {f"{angle} deg": float(value.mean()) for angle, value in zip(ALBEDO_AT_DEG, values, strict=True)}
+
+
+def _plot(path: Path, name: str, evaluate: Any, title: str, transmits: bool) -> None:
+    from lambent.materials.plots import plot_plane_of_incidence
+
+    plot_plane_of_incidence(path, {name: evaluate}, title=title, transmits=transmits)
+
+
+def _no_plot(file: str, plot: Path | None) -> None:
+    if plot is not None:
+        raise UserError("only tables and materials are plotted", file=file, field="--plot")
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_words(item)}" for key, item in value.items())
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return ", ".join(map(_words, value)) if isinstance(value, list) else str(value)

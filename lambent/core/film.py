@@ -1,0 +1,71 @@
+"""Films: H.264 in MP4, frame by frame, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.files import atomic_path
+
+Frame = NDArray[np.uint8]
+# The matrix is converted and named: players take small films for BT.601 and large ones for BT.709 when it is not.
+_BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
+          "-color_trc", "bt709", "-color_range", "tv"]  # fmt: skip
+_CONSTANT_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
+
+
+@contextmanager
+def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterator[Callable[[Frame], None]]:
+    """Function that takes the next frame, (height, width, 3) uint8 encoded; the film is there on leaving.
+
+    Nothing is left where an error or an interruption leaves the block. No frame is kept in memory.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in .mp4.
+    width, height : int
+        Even, as 4:2:0 chroma needs; see `even_size`.
+
+    Raises
+    ------
+    UserError
+        Where there is no ffmpeg or it fails.
+    """
+    import imageio_ffmpeg
+
+    assert width % 2 == 0 and height % 2 == 0, f"odd size {width}x{height}"
+    with atomic_path(path) as beside:
+        try:
+            writer = imageio_ffmpeg.write_frames(
+                str(beside),
+                (width, height),
+                fps=fps,
+                codec="libx264",
+                pix_fmt_out="yuv420p",
+                quality=None,
+                macro_block_size=2,
+                output_params=[*_BT709, *_CONSTANT_QUALITY],
+            )
+            writer.send(None)
+
+            def write(frame: Frame) -> None:
+                assert frame.shape == (height, width, 3) and frame.dtype == np.uint8, (frame.shape, frame.dtype)
+                writer.send(np.ascontiguousarray(frame))
+
+            try:
+                yield write
+            finally:
+                writer.close()
+        except (OSError, RuntimeError) as error:
+            raise UserError(f"film could not be written ({error})", file=path) from error
+
+
+def even_size(width: int, height: int) -> tuple[int, int]:
+    """The size cut to even numbers, at least 2 x 2."""
+    return max(2, width - width % 2), max(2, height - height % 2)
