@@ -1,0 +1,297 @@
+"""Scene in, store out: geometry, light map, environment and probes.
+
+    store = bake(load_scene("builtin:room"), Path("room.store"), quality="preview")
+
+Every artefact carries the hash of what it was made from; what has not changed is not baked again, and a bake that was
+interrupted, even by kill -9, goes on where it was and ends with the same arrays, bit for bit.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake import atlas as atlases
+from lambent.bake import keys
+from lambent.bake.engine import engine
+from lambent.bake.quality import Quality, quality_named
+from lambent.bake.work import run_tiles, seed_of
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.files import sha256_of
+from lambent.core.progress import Progress, silent
+from lambent.scenes.scene import Scene
+from lambent.store.contract import (
+    TIMINGS,
+    CameraRecord,
+    PathRecord,
+    SceneRecord,
+    is_two_sided,
+    needs_probe,
+    probe_name,
+    write_scene_record,
+)
+from lambent.store.store import Store
+
+Array = NDArray[np.floating]
+KINDS = ("geometry", "light_map", "environment", "probe")
+NEEDS = {"geometry": (), "light_map": ("geometry",), "environment": (), "probe": ("geometry", "light_map")}
+log = logging.getLogger(__name__)
+
+
+def bake(
+    scene: Scene,
+    store_path: Path,
+    *,
+    quality: str | Quality = "preview",
+    only: Collection[str] | None = None,
+    resume: bool = True,
+    progress: Progress = silent,
+    seed: int = 0,
+) -> Store:
+    """Bake a scene into a store, or bring a store up to date.
+
+    Parameters
+    ----------
+    quality : {'preview', 'normal', 'final'} or Quality
+    only : collection of {'geometry', 'light_map', 'environment', 'probe'}, optional
+        Kinds to bake; what they need is baked too. All by default.
+    resume : bool
+        False bakes everything anew, even what is up to date.
+    seed : int
+        The same seed gives the same arrays.
+
+    Returns
+    -------
+    Store
+        Changed inputs are told by the logger and kept in the document "changes".
+    """
+    kinds = _with_needs(KINDS if only is None else only)
+    job = _Bake(scene, store_path, quality_named(quality), resume, progress, seed)
+    steps: dict[str, Callable[[], None]] = {
+        "geometry": job.geometry,
+        "environment": job.environment,
+        "light_map": job.light_map,
+        "probe": job.probes,
+    }
+    for kind, step in steps.items():
+        if kind in kinds:
+            step()
+    return job.store
+
+
+def _with_needs(only: Collection[str]) -> set[str]:
+    for kind in only:
+        if kind not in KINDS:
+            hint = did_you_mean(kind, KINDS)
+            raise UserError("unknown kind of artefact", got=kind, expected=", ".join(KINDS), hint=hint)
+    return {need for kind in only for need in (kind, *NEEDS[kind])}
+
+
+def inputs_of(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files a scene was read from, by file name."""
+    return {path.name: sha256_of(path) for path in scene.sources}
+
+
+def changed_inputs(store: Store, scene: Scene) -> list[str]:
+    """Names of the scene's files that are not what the store was baked from."""
+    now = inputs_of(scene)
+    return sorted(name for name in now.keys() | store.inputs.keys() if now.get(name) != store.inputs.get(name))
+
+
+class _Bake:
+    """One run: the scene, the store, and what the steps share."""
+
+    def __init__(self, scene: Scene, path: Path, quality: Quality, resume: bool, progress: Progress, seed: int) -> None:
+        if not scene.objects:
+            raise UserError("scene has no objects", field=scene.name)
+        self.scene, self.quality, self.progress, self.seed = scene, quality, progress, seed
+        existing = Store.open(path) if (Path(path) / "manifest.json").exists() else None
+        changes = changed_inputs(existing, scene) if existing else []
+        if changes:
+            log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
+        self.store = Store.create(path, inputs_of(scene))
+        self.store.set_document("changes", changes)
+        if not resume:
+            self.store.forget_all()
+        geometry = keys.geometry_parts(scene)
+        self.geometry_key = keys.key_of("geometry", quality.light_map_texels, *geometry)
+        q = [quality.light_map_samples, quality.light_map_noise, quality.max_depth, seed]
+        looks = keys.material_parts(scene)
+        self.light_map_key = keys.key_of("light_map", self.geometry_key, looks, keys.light_parts(scene), q)
+        self.environment_key = keys.key_of(
+            "environment", quality.environment_texels, keys.environment_part(scene.environment)
+        )
+
+    @contextmanager
+    def _timed(self, name: str) -> Iterator[None]:
+        """Add the seconds of a step to the document "timings", even when it is interrupted."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            timings = dict(self.store.documents.get(TIMINGS, {}))
+            timings[name] = round(timings.get(name, 0.0) + time.perf_counter() - start, 3)
+            self.store.set_document(TIMINGS, timings)
+
+    def _current(self, name: str, key: str) -> bool:
+        return name in self.store and self.store.artefact(name).key == key
+
+    def geometry(self) -> None:
+        """Split meshes with second coordinates, and the scene record."""
+        names = ("positions", "normals", "tangents", "uv", "uv2", "faces")
+        if not all(self._current(f"geometry/{name}", self.geometry_key) for name in names):
+            self._forget_times("geometry")
+            with self._timed("geometry"):
+                atlas = atlases.unwrap(self.scene, self.quality.light_map_texels, self.progress)
+                meta = {"light_map_size": [atlas.width, atlas.height]}
+                for name, array in atlases.merged(atlas).items():
+                    self.store.put(f"geometry/{name}", "geometry", array, key=self.geometry_key, meta=meta)
+        write_scene_record(self.store, scene_record_of(self.scene))
+
+    def _forget_times(self, name: str) -> None:
+        self.store.set_document(TIMINGS, {k: v for k, v in self.store.documents.get(TIMINGS, {}).items() if k != name})
+
+    @cached_property
+    def merged(self) -> dict[str, Array]:
+        names = ("positions", "normals", "tangents", "uv", "uv2", "faces")
+        return {name: self.store.read(f"geometry/{name}") for name in names}
+
+    @cached_property
+    def atlas(self) -> atlases.Atlas:
+        width, height = self.store.artefact("geometry/uv2").meta["light_map_size"]
+        return atlases.separated(self.scene, self.merged, width, height)
+
+    def environment(self) -> None:
+        from lambent.bake.environment import environment_cube
+
+        name = "environment/radiance"
+        if self._current(name, self.environment_key):
+            return
+        with self._timed("environment"):
+            self.progress(0, 1, "environment")
+            n = self.quality.environment_texels if self.scene.environment else 16
+            cube = environment_cube(self.scene.environment, n)
+            self.store.put(name, "environment", cube, key=self.environment_key)
+            self.progress(1, 1, "environment")
+
+    def light_map(self) -> None:
+        sides = ["irradiance"]
+        if any(is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects):
+            sides.append("irradiance_back")
+        if all(self._current(f"light_map/{side}", self.light_map_key) for side in sides):
+            return
+        with self._timed("light_map"):
+            from lambent.bake.light_map import finished
+            from lambent.bake.texels import chart_labels, texels_of
+
+            texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
+            labels = chart_labels(self.merged, texels)
+            for side in sides:
+                raw = self._raw_light_map(texels, side)
+                self.progress(0, 1, "denoising")
+                clean, meta = finished(raw, labels)
+                name = f"light_map/{side}"
+                self.store.put(name, "light_map", clean, key=self.light_map_key, meta=self._meta(**meta))
+
+    def _raw_light_map(self, texels: Any, side: str) -> Array:
+        from lambent.bake.light_map import TILE, tile_samples
+
+        name = "light_map/raw" if side == "irradiance" else "light_map/raw_back"
+        shape, chunks = (2, texels.height, texels.width, 4), (2, TILE, TILE, 4)
+        writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
+        if writer.missing:
+            scene, sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0)
+            covered = np.zeros(texels.width * texels.height, bool)
+            covered[texels.index[sides.valid.any(axis=1)]] = True
+            covered = covered.reshape(texels.height, texels.width)
+            run_tiles(
+                writer,
+                lambda region, tile_seed: tile_samples(scene, sides, region, tile_seed, self.quality),
+                seed=self.seed,
+                progress=self.progress,
+                what="light map" if side == "irradiance" else "light map, far sides",
+                cost=lambda region: 1 + float(covered[region[1], region[2]].sum()),
+            )
+        writer.finish()
+        return self.store.read(name)
+
+    def _lit_sides(self, texels: Any, sign: float) -> tuple[Any, Any]:
+        """The scene, and which points of it are lit on the side of this sign."""
+        from lambent.bake.light_map import Sides
+        from lambent.bake.mitsuba_scene import SceneBuilder
+        from lambent.bake.solids import SolidTest
+
+        builder = SceneBuilder(self.atlas.scene)
+        scene = builder.build()
+        points, flat = texels.positions.reshape(-1, 3), sign * texels.flat.reshape(-1, 3)
+        ours = np.ones(len(points), bool)
+        if sign < 0:
+            ours = np.repeat(self._two_sided_faces()[texels.face].reshape(-1), 1)
+        valid = ours.copy()
+        valid[ours] = ~SolidTest(builder, scene).embedded(points[ours], flat[ours])
+        return scene, Sides(texels, sign, valid.reshape(texels.face.shape))
+
+    def _two_sided_faces(self) -> NDArray[np.bool_]:
+        two_sided = [is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects]
+        return np.repeat(two_sided, [len(o.mesh.faces) for o in self.scene.objects])
+
+    def probes(self) -> None:
+        wanted = [o.name for o in self.scene.objects if needs_probe(self.scene.materials[o.material])]
+        keys_of = {name: self._probe_key(name) for name in wanted}
+        missing = [n for n in wanted if not self._current(probe_name(n, "planes"), self._planes_key(n, keys_of[n]))]
+        if not missing:
+            return
+        self._forget_times("probe")
+        with self._timed("probe"):
+            from lambent.bake.probe_set import ProbeSet
+
+            front, back = self.store.read("light_map/irradiance"), None
+            if "light_map/irradiance_back" in self.store:
+                back = self.store.read("light_map/irradiance_back")
+            probes = ProbeSet(self.atlas, front, back)
+            for i, name in enumerate(missing):
+                self.progress(i, len(missing), f"probe of {name}")
+                result, meta = probes.bake(name, self.quality, seed_of(self.seed, "probe", name))
+                for part in ("radiance", "distance", "planes"):
+                    key = self._planes_key(name, keys_of[name]) if part == "planes" else keys_of[name]
+                    self.store.put(probe_name(name, part), "probe", result[part], key=key, meta=self._meta(**meta))
+            self.progress(1, 1, "probes")
+
+    def _probe_key(self, name: str) -> str:
+        q = self.quality
+        centre = self.scene.probe_centres.get(name)
+        return keys.key_of("probe", self.light_map_key, name, centre, q.probe_texels, q.probe_samples, self.seed)
+
+    def _planes_key(self, name: str, probe_key: str) -> str:
+        given = self.scene.probe_planes.get(name)
+        return keys.key_of("probe", probe_key, None if given is None else np.asarray(given, float))
+
+    def _meta(self, **more: Any) -> dict[str, Any]:
+        return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
+
+
+def scene_record_of(scene: Scene) -> SceneRecord:
+    """What the store says of the scene besides its arrays."""
+
+    def camera(c: Any) -> CameraRecord:
+        return CameraRecord(name=c.name, position=c.position, target=c.target, up=c.up, fov_y_deg=c.fov_y_deg)
+
+    low, high = (tuple(float(x) for x in corner) for corner in scene.bounds)
+    return SceneRecord(
+        name=scene.name,
+        objects=atlases.object_records(scene),
+        materials=dict(scene.materials),
+        cameras=tuple(camera(c) for c in scene.cameras),
+        paths=tuple(PathRecord(name=p.name, keys=tuple(map(camera, p.keys)), seconds=p.seconds) for p in scene.paths),
+        exposure_ev=scene.exposure_ev,
+        bounds=(low, high),  # type: ignore[arg-type]
+        warnings=scene.warnings,
+    )

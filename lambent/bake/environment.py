@@ -1,0 +1,56 @@
+"""The environment as a cube map, sun disc included."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.engine import engine
+from lambent.bake.mitsuba_scene import environment_dict
+from lambent.core.cubemap import directions_at, face_directions
+from lambent.core.frames import normalize
+from lambent.scenes.scene import Environment, SunSky
+
+Array = NDArray[np.floating]
+GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine one where the sun may be
+SUN_RADIUS = np.radians(0.27)
+HALF_MAX = 65504.0  # a picture's brightest pixels may be brighter: they are cut here
+TEXELS_AT_ONCE = 1 << 16
+
+
+def environment_cube(environment: Environment | None, n: int) -> NDArray[np.float16]:
+    """(6, n, n, 3) float16 mean radiance of each texel, W/(sr m^2); black without an environment."""
+    cube = np.zeros((6 * n * n, 3))
+    if environment is not None:
+        engine()
+        emitter = mi.load_dict(environment_dict(environment))
+        emitter.set_scene(mi.load_dict({"type": "scene", "environment": emitter}))
+        for start in range(0, len(cube), TEXELS_AT_ONCE):
+            texels = np.arange(start, min(start + TEXELS_AT_ONCE, len(cube)))
+            cube[texels] = _means(emitter, texels, n, GRID)
+        if isinstance(environment, SunSky):
+            sunny = _near(normalize(np.asarray(environment.sun_direction, float)), n)
+            cube[sunny] = _means(emitter, sunny, n, FINE_GRID)
+    return np.minimum(cube, HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
+
+
+def _means(emitter: object, texels: NDArray[np.integer], n: int, grid: int) -> Array:
+    """Mean radiance (k, 3) over a regular grid of samples in each texel."""
+    face, row, column = np.unravel_index(texels, (6, n, n))
+    sub = (np.arange(grid) + 0.5) / grid
+    s = (column[:, None, None] + sub[None, None, :]) / n * 2 - 1
+    t = (row[:, None, None] + sub[None, :, None]) / n * 2 - 1
+    s, t = np.broadcast_arrays(s, t)
+    w = normalize(directions_at(np.broadcast_to(face[:, None, None], s.shape), s, t)).reshape(-1, 3)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(w))
+    si.wi = mi.Vector3f(np.ascontiguousarray(-w.T, dtype=np.float32))
+    radiance = np.array(emitter.eval(si))  # type: ignore[attr-defined]
+    return np.asarray(radiance.T.reshape(len(texels), -1, 3).mean(axis=1))
+
+
+def _near(sun: Array, n: int) -> NDArray[np.integer]:
+    """Texels that the sun disc may touch."""
+    cosine = normalize(face_directions(n)).reshape(-1, 3) @ sun
+    return np.flatnonzero(cosine > np.cos(SUN_RADIUS + 2 * np.sqrt(2) / n))

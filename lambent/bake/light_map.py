@@ -1,0 +1,136 @@
+"""The light map: irradiance at every texel, path traced through the true materials.
+
+A tile is sampled in passes of SAMPLES_PER_PASS; even and odd passes are summed apart, so that half their difference
+tells the noise. The raw sums stay in the store (`light_map/raw`): a bake goes on from them after any interruption.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake import paths
+from lambent.bake.denoise import denoise, fill
+from lambent.bake.quality import Quality
+from lambent.bake.texels import POINTS, Texels
+from lambent.core.colour import luminance
+from lambent.core.sequences import hammersley, r2
+
+Array = NDArray[np.floating]
+TILE = 128  # texels per side of a chunk
+SAMPLES_PER_PASS = 32
+HALF_MAX = 65504.0
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Which of a map's points can be lit, on one side of the surfaces.
+
+    texels as baked; `sign` +1 for the normal's side, -1 for the other; valid (K, POINTS) bool: false for points
+    within a solid, and, on the far side, for objects that light does not cross.
+    """
+
+    texels: Texels
+    sign: float
+    valid: NDArray[np.bool_]
+
+
+def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, quality: Quality) -> Array:
+    """Raw content of one tile: (2, h, w, 4) float32, the two halves' sums of irradiance and their sample counts."""
+    rows, columns = region[1], region[2]
+    height, width = rows.stop - rows.start, columns.stop - columns.start
+    row, column = np.divmod(sides.texels.index, sides.texels.width)
+    inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
+    mine = np.flatnonzero(inside & sides.valid.any(axis=1))
+    raw = np.zeros((2, height * width, 4), np.float32)
+    if not len(mine):
+        return raw.reshape(2, height, width, 4)
+    points = _Points(sides, mine)
+    sums = np.zeros((2, len(mine), 3))
+    fewest, most = quality.light_map_samples
+    passes = 0
+    while passes * SAMPLES_PER_PASS < most:
+        for half in (0, 1):
+            sums[half] += _sum_of_pass(scene, points, (seed, passes), quality.max_depth)
+            passes += 1
+        samples = passes * SAMPLES_PER_PASS
+        if samples >= fewest and relative_noise(sums * 2 / samples) <= quality.light_map_noise:
+            break
+    place = (row[mine] - rows.start) * width + column[mine] - columns.start
+    raw[:, place, :3] = sums
+    raw[:, place, 3] = passes * SAMPLES_PER_PASS / 2
+    return raw.reshape(2, height, width, 4)
+
+
+def relative_noise(halves: Array) -> float:
+    """Root mean square error of the mean of two estimates (2, ..., 3), over its mean; 0 for black."""
+    half, mean = luminance(halves[0] - halves[1]) / 2, luminance(halves).mean()
+    return float(np.sqrt(np.mean(half**2)) / mean) if mean > 0 else 0.0
+
+
+class _Points:
+    """The sample points of some texels on the device: invalid points are replaced by valid ones of the same texel."""
+
+    def __init__(self, sides: Sides, mine: NDArray[np.integer]) -> None:
+        valid = sides.valid[mine]
+        choice = np.where(valid, np.arange(POINTS), np.argmax(valid, axis=1)[:, None])[..., None]
+        t, take = sides.texels, np.take_along_axis
+        self.count = len(mine)
+        self.position = _vectors(take(t.positions[mine], choice, axis=1))
+        self.normal = _vectors(take(t.normals[mine], choice, axis=1) * sides.sign)
+        self.flat = _vectors(take(t.flat[mine], choice, axis=1) * sides.sign)
+
+
+def _vectors(array: Array) -> Any:
+    return mi.Vector3f(np.ascontiguousarray(array.reshape(-1, 3).T, dtype=np.float32))
+
+
+def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], max_depth: int) -> Array:
+    """Sum (n, 3) of SAMPLES_PER_PASS samples of irradiance per texel.
+
+    Every texel sees the same two stratified point sets, each shifted by an offset of its own (Cranley & Patterson
+    1976).
+    """
+    n, samples = points.count, SAMPLES_PER_PASS
+    rng = np.random.default_rng(seed)
+    shifts = rng.random((4, n), dtype=np.float32)
+    thread = dr.arange(mi.UInt32, n * samples)
+    texel, k = thread // samples, thread % samples
+    point = texel * POINTS + (k // 2) % POINTS  # the low bit already steers the azimuth of Hammersley points
+    at = paths.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
+    u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
+    u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(int(rng.integers(1 << 32)), n * samples)
+    e = paths.irradiance(scene, sampler, at, u_bsdf, u_emitter, max_depth)
+    e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
+    dr.eval(e)
+    return np.stack([np.array(dr.block_sum(channel, samples)) for channel in (e.x, e.y, e.z)], axis=-1)
+
+
+def _shifted(points: Array, shifts: Array, k: Any, texel: Any) -> Any:
+    u = [
+        dr.gather(mi.Float, mi.Float(points[:, axis].astype(np.float32)), k)
+        + dr.gather(mi.Float, mi.Float(shifts[axis]), texel)
+        for axis in (0, 1)
+    ]
+    return mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1]))
+
+
+def finished(raw: Array, labels: NDArray[np.integer]) -> tuple[Array, dict[str, float]]:
+    """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and what to note: noise and samples."""
+    count = raw[..., 3]
+    known = count[0] > 0
+    if not known.any():
+        return np.zeros((*known.shape, 3), np.float16), {"noise": 0.0, "samples": 0.0}
+    halves = raw[..., :3] / np.maximum(count, 1)[..., None]
+    noise = relative_noise(halves[:, known])
+    filled = fill(halves.mean(axis=0), known, labels)
+    clean = fill(denoise(filled), known, labels)
+    meta = {"noise": noise, "samples": float(count.sum(axis=0)[known].mean())}
+    return np.minimum(clean, HALF_MAX).astype(np.float16), meta

@@ -1,0 +1,112 @@
+"""Probes: what an object would mirror, as cube maps of radiance and distance from one point.
+
+The scene is traced without the object, with the light map as radiance cache: a diffuse surface shows its baked light,
+a glossy one is traced on through its lobes, so that mirrors in mirrors are right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake import paths
+from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
+from lambent.core.cubemap import face_directions
+from lambent.core.frames import normalize
+from lambent.store.contract import FAR
+
+Array = NDArray[np.floating]
+HALF_MAX = 65504.0
+PATHS_AT_ONCE = 1 << 21
+MIRROR_DEPTH = 6  # glossy surfaces in a row
+
+
+class LightMapCache:
+    """Diffuse radiance of surfaces, from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other."""
+
+    def __init__(self, builder: SceneBuilder, irradiance: Array, irradiance_back: Array | None) -> None:
+        materials = [builder.scene.materials[o.material] for o in builder.scene.objects]
+        self._numbers = builder.object_numbers()
+        self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
+        self._transmitted = mi.Color3f(np.array([m.kt_d for m in materials], np.float32).T / np.float32(np.pi))
+        self._front = _texture(irradiance)
+        self._back = _texture(irradiance_back) if irradiance_back is not None else None
+
+    def __call__(self, si: Any, active: Any) -> Any:
+        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
+        uv2 = si.shape.eval_attribute_3(UV2_ATTRIBUTE, si, active)
+        uv2 = mi.Point2f(uv2.x, uv2.y)
+        front = mi.Color3f(self._front.eval(uv2, active))
+        back = mi.Color3f(self._back.eval(uv2, active)) if self._back is not None else mi.Color3f(0.0)
+        outside = mi.Frame3f.cos_theta(si.wi) > 0
+        reflected = dr.gather(mi.Color3f, self._reflected, number, active)
+        transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)
+        this_side, other_side = dr.select(outside, front, back), dr.select(outside, back, front)
+        return reflected * this_side + transmitted * other_side
+
+
+def _texture(image: Array) -> Any:
+    return mi.Texture2f(mi.TensorXf(image.astype(np.float32)), wrap_mode=dr.WrapMode.Clamp)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """radiance (6, N, N, 3) float16, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side."""
+
+    radiance: NDArray[np.float16]
+    distance: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+def bake_probe(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int, seed: int) -> Probe:
+    """Trace a probe. `scene` is without the object and, as its builder was told, without diffuse terms."""
+    texels = 6 * n * n
+    per_pass = max(1, min(samples, PATHS_AT_ONCE // texels))
+    passes = -(-samples // per_pass)
+    rng = np.random.default_rng(seed)
+    total = np.zeros((texels, 3))
+    for _ in range(passes):
+        total += _pass(scene, cache, centre, n, per_pass, int(rng.integers(1 << 32)))
+    radiance = np.minimum(total / (passes * per_pass), HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
+    return Probe(radiance, *_geometry(scene, centre, n))
+
+
+def _pass(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int, seed: int) -> Array:
+    sampler = mi.load_dict({"type": "independent"})
+    width = 6 * n * n * samples
+    sampler.seed(seed, width)
+    texel = dr.arange(mi.UInt32, width) // samples
+    column, row, face = texel % n, texel // n % n, texel // (n * n)
+    jitter = sampler.next_2d()
+    s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
+    origin = mi.Point3f(*map(float, centre))
+    ray = mi.Ray3f(origin + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
+    value = paths.radiance(scene, sampler, paths.camera_start(ray), MIRROR_DEPTH, cache)
+    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    dr.eval(value)
+    return np.stack([np.array(dr.block_sum(channel, samples)) for channel in (value.x, value.y, value.z)], axis=-1)
+
+
+def _direction(face: Any, s: Any, t: Any) -> Any:
+    """core.cubemap.directions_at, for the path tracer."""
+    directions = [(1, -t, -s), (-1, -t, s), (s, 1, t), (s, -1, -t), (s, -t, 1), (-s, -t, -1)]
+    w = mi.Vector3f(0.0)
+    for number, components in enumerate(directions):
+        w = dr.select(face == number, mi.Vector3f(*components), w)
+    return w
+
+
+def _geometry(scene: Any, centre: Array, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Distance and normal at the texels' centres."""
+    w = normalize(face_directions(n)).reshape(-1, 3).T.astype(np.float32)
+    direction = mi.Vector3f(np.ascontiguousarray(w))
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(*map(float, centre)), direction), mi.RayFlags.Minimal, True)
+    distance = dr.select(si.is_valid(), dr.minimum(si.t, FAR), FAR)
+    normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
+    normal = dr.select(si.is_valid(), normal, -direction)
+    return np.array(distance).reshape(6, n, n), np.array(mi.Vector3f(normal)).T.reshape(6, n, n, 3).astype(np.float32)

@@ -1,0 +1,89 @@
+"""Where an object's probe stands.
+
+- Where the scene says so; else
+- above a flat object (floor, mirror, table top), on the side of the middle of the scene: half the object's length,
+  half the free way and EYE_HEIGHT are upper bounds of the height; else
+- in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.solids import SolidTest
+from lambent.core.cubemap import face_directions
+from lambent.core.frames import normalize
+from lambent.scenes.scene import Mesh
+
+Array = NDArray[np.floating]
+EYE_HEIGHT = 1.6  # metres
+FLAT_SHARE = 0.9  # of an object's area with normals along one axis
+CLEARANCE = 0.02  # metres beyond the surface of the solid that a centre is moved out of
+MOVES = 4
+ENCLOSING_SHARE = 0.5  # of the directions that see the object's own outer sides
+
+
+def probe_centre(builder: SceneBuilder, name: str, without: Any) -> Array:
+    """(3,) float64 world position; `without` is the Mitsuba scene without the object."""
+    scene = builder.scene
+    if name in scene.probe_centres:
+        return np.asarray(scene.probe_centres[name], float)
+    mesh = scene.object(name).mesh
+    low, high = (np.asarray(corner, float) for corner in mesh.bounds)
+    centre = (low + high) / 2
+    axis = flat_axis(mesh)
+    if axis is not None:
+        return _above(mesh, centre, axis, np.mean(scene.bounds, axis=0), without)
+    return _moved_out(centre, SolidTest(builder, without), without)
+
+
+def flat_axis(mesh: Mesh) -> Array | None:
+    """Unit normal of a flat object, None of any other."""
+    corners = mesh.positions[mesh.faces].astype(float)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    if area.sum() <= 0:
+        return None
+    n = normalize(cross)
+    values, vectors = np.linalg.eigh(np.einsum("t,ti,tj->ij", area / area.sum(), n, n))
+    return np.asarray(vectors[:, 2]) if values[2] > FLAT_SHARE else None
+
+
+def _above(mesh: Mesh, centre: Array, axis: Array, middle: Array, without: Any) -> Array:
+    axis = axis if axis @ (middle - centre) >= 0 else -axis
+    top = centre + axis * ((mesh.positions - centre) @ axis).max()
+    size = float(np.ptp(mesh.positions, axis=0).max())
+    free = float(_distances(without, top + axis * 1e-3, axis[None])[0])
+    return np.asarray(top + axis * min(EYE_HEIGHT, size / 2, free / 2))
+
+
+def _moved_out(centre: Array, solids: SolidTest, without: Any) -> Array:
+    directions = normalize(face_directions(4).reshape(-1, 3))
+    for _ in range(MOVES):
+        up = np.array([[0.0, 1.0, 0.0]])
+        both = solids.embedded(np.stack([centre, centre]), np.concatenate([up, -up]))
+        if not both.all():
+            break
+        t = _distances(without, centre, directions)
+        centre = centre + directions[np.argmin(t)] * (t.min() + CLEARANCE)
+    return centre
+
+
+def _distances(scene: Any, origin: Array, directions: Array) -> Array:
+    ray = mi.Ray3f(mi.Point3f(*map(float, origin)), mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32)))
+    return np.asarray(np.array(scene.ray_intersect_preliminary(ray).t), float)
+
+
+def encloses(builder: SceneBuilder, name: str, centre: Array, whole: Any) -> bool:
+    """Whether the probe at `centre` is surrounded by the object itself, as by a room of one mesh: then it stays in."""
+    w = normalize(face_directions(8).reshape(-1, 3))
+    ray = mi.Ray3f(mi.Point3f(*map(float, centre)), mi.Vector3f(np.ascontiguousarray(w.T, dtype=np.float32)))
+    si = whole.ray_intersect(ray, mi.RayFlags.Minimal, True)
+    facing = (np.array(si.n).T * w).sum(axis=1) < 0
+    own = np.array(si.shape == mi.ShapePtr(builder.meshes[name]))
+    return bool((facing & own).mean() > ENCLOSING_SHARE)

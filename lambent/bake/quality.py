@@ -1,0 +1,44 @@
+"""How much work a bake puts into each artefact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lambent.core.errors import UserError, did_you_mean
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Sizes in texels per side, samples per texel, bounces.
+
+    Light map tiles get samples until their relative noise (root mean square, before denoising) is below
+    `light_map_noise`, within the two bounds.
+    """
+
+    name: str
+    light_map_texels: int
+    light_map_samples: tuple[int, int]
+    light_map_noise: float
+    max_depth: int
+    environment_texels: int
+    probe_texels: int
+    probe_samples: int
+
+
+QUALITIES = {
+    quality.name: quality
+    for quality in (
+        Quality("preview", 512, (64, 128), 0.10, 8, 256, 128, 16),
+        Quality("normal", 1024, (128, 1024), 0.04, 12, 512, 256, 64),
+        Quality("final", 2048, (256, 8192), 0.015, 24, 1024, 256, 512),
+    )
+}
+
+
+def quality_named(name: str | Quality) -> Quality:
+    """The quality of this name; a `Quality` is itself."""
+    if isinstance(name, Quality):
+        return name
+    if name not in QUALITIES:
+        raise UserError("unknown quality", got=name, expected=", ".join(QUALITIES), hint=did_you_mean(name, QUALITIES))
+    return QUALITIES[name]

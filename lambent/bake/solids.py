@@ -1,0 +1,66 @@
+"""What lies within solid matter: there is no light, and nothing to bake."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.core.sequences import cosine_hemisphere, hammersley
+from lambent.scenes.scene import Mesh
+
+Array = NDArray[np.floating]
+RAYS = 16
+EMBEDDED_SHARE = 0.25  # of a point's rays that end on the inner side of a solid
+POINTS_AT_ONCE = 1 << 16
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether every edge joins exactly two faces of opposite direction, once coincident vertices are one."""
+    _, vertex = np.unique(mesh.positions, axis=0, return_inverse=True)
+    corners = vertex.reshape(-1)[mesh.faces.astype(np.int64)]
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    edges = edges[edges[:, 0] != edges[:, 1]]
+    code = edges[:, 0] * (len(vertex) + 1) + edges[:, 1]
+    back = edges[:, 1] * (len(vertex) + 1) + edges[:, 0]
+    return len(np.unique(code)) == len(code) and bool(np.array_equal(np.sort(code), np.sort(back)))
+
+
+class SolidTest:
+    """Tells points within closed, opaque objects, by the inner sides their rays meet."""
+
+    def __init__(self, builder: SceneBuilder, scene: Any) -> None:
+        materials = builder.scene.materials
+        solid = [is_closed(o.mesh) and not materials[o.material].transmits for o in builder.scene.objects]
+        self._scene, self._numbers = scene, builder.object_numbers()
+        self._solid = mi.UInt32(np.array(solid, np.uint32))
+
+    def embedded(self, positions: Array, normals: Array) -> NDArray[np.bool_]:
+        """For points (n, 3) on surfaces of normals (n, 3): whether they lie within a solid. (n,) bool."""
+        return np.concatenate(
+            [np.zeros(0, bool)]
+            + [
+                self._share_of_inner_sides(positions[i : i + POINTS_AT_ONCE], normals[i : i + POINTS_AT_ONCE])
+                > EMBEDDED_SHARE
+                for i in range(0, len(positions), POINTS_AT_ONCE)
+            ]
+        )
+
+    def _share_of_inner_sides(self, positions: Array, normals: Array) -> Array:
+        n = len(positions)
+        thread = dr.arange(mi.UInt32, n * RAYS)
+        at, k = thread // RAYS, thread % RAYS
+        si = dr.zeros(mi.SurfaceInteraction3f, n * RAYS)
+        si.p = dr.gather(mi.Point3f, mi.Point3f(positions.T.astype(np.float32)), at)
+        si.n = mi.Normal3f(dr.gather(mi.Vector3f, mi.Vector3f(normals.T.astype(np.float32)), at))
+        local = mi.Vector3f(cosine_hemisphere(hammersley(RAYS)).T.astype(np.float32))
+        direction = mi.Frame3f(si.n).to_world(dr.gather(mi.Vector3f, local, k))
+        hit = self._scene.ray_intersect(si.spawn_ray(direction), mi.RayFlags.Minimal, True)
+        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, hit.shape), hit.is_valid())
+        solid = dr.gather(mi.UInt32, self._solid, number, hit.is_valid()) > 0
+        inner = hit.is_valid() & solid & (dr.dot(hit.n, direction) > 0)
+        return np.array(dr.block_sum(dr.select(inner, 1.0, 0.0), RAYS)) / RAYS
