@@ -1,0 +1,34 @@
+"""`lambent bench`: the measurements of this project, on this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lambent.cli.console import Json, progress_bar, show, table
+
+
+def command(
+    name: Annotated[str, typer.Argument(help="Which one; an unknown name lists them.")],
+    quick: Annotated[bool, typer.Option("--quick", help="The same rows at a smaller size, under a minute.")] = False,
+    input_: Annotated[list[Path] | None, typer.Option("--input", help="Run it on your own file. Repeatable.")] = None,
+    json: Json = False,
+) -> None:
+    """Measure, and print the rows with the machine they were measured on.
+
+    Example: lambent bench fit --quick --json
+    """
+    from lambent.bench.registry import run_bench
+
+    with progress_bar() as progress:
+        report = run_bench(name, quick=quick, inputs=input_ or [], progress=progress)
+    names = list(dict.fromkeys(key for row in report["rows"] for key in row))
+    rows = [tuple(names), *(tuple(_word(row.get(key, "")) for key in names) for row in report["rows"])]
+    summary = [(key, _word(value)) for key, value in {**report["machine"], **report["summary"]}.items()]
+    show(report, f"{table(rows)}\n\n{table(summary)}", json)
+
+
+def _word(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,173 @@
+"""`lambent render`: stills and films of a store, without a window."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lambent.cli.console import Json, parse_size, progress_bar, say, show
+from lambent.core.errors import UserError, did_you_mean
+
+if TYPE_CHECKING:
+    from lambent.core.progress import Progress
+    from lambent.store.contract import CameraRecord, SceneRecord
+    from lambent.store.store import Store
+
+PATH_TRACER = "path"
+FILM = ".mp4"
+DEFAULT_SPP = {PATH_TRACER: 64, "qmc": 256}
+Picture = Callable[["CameraRecord", "Progress"], Any]
+
+
+def command(
+    store: Annotated[Path, typer.Argument(help="Folder of a baked store.")],
+    output: Annotated[Path, typer.Option("-o", help="Picture (.png, .exr, .hdr) or film (.mp4).")],
+    camera: Annotated[str | None, typer.Option(help="Camera by name. [default: the first]")] = None,
+    path: Annotated[str | None, typer.Option(help="Camera path by name, for films. [default: the first]")] = None,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
+    integrator: Annotated[
+        str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
+    ] = "rings",
+    samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
+    exposure: Annotated[float | None, typer.Option(help="In EV. [default: the scene's]")] = None,
+    scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
+    fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
+    json: Json = False,
+) -> None:
+    """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through the filmic view transform.
+
+    Example: lambent render room.store --camera entrance -o entrance.png
+    """
+    from lambent.core.film import even_size
+    from lambent.core.images import WRITABLE, check_writable, write_image
+    from lambent.store.contract import scene_record
+    from lambent.store.store import Store
+
+    check_writable(output, (*WRITABLE, FILM))
+    width, height = parse_size(size)
+    opened = Store.open(store)
+    record = scene_record(opened)
+    exposure_ev = record.exposure_ev if exposure is None else exposure
+    film = output.suffix.lower() == FILM
+    if film:
+        width, height = even_size(width, height)
+    began = time.perf_counter()
+    views = _views(record, camera, path, fps if film else None)
+    radiance, shown = pictures(opened, width, height, integrator, samples, exposure_ev, scene)
+    with progress_bar() as progress:
+        if film:
+            _write_film(output, views, shown, (width, height, fps), progress)
+        elif output.suffix.lower() == ".png":
+            from PIL import Image
+
+            from lambent.core.files import atomic_path
+
+            with atomic_path(output) as beside:
+                Image.fromarray(shown(views[0], progress)).save(beside)
+        else:
+            write_image(output, radiance(views[0], progress))
+    seconds = time.perf_counter() - began
+    facts = {
+        "file": output,
+        "width": width,
+        "height": height,
+        "integrator": integrator,
+        "frames": len(views),
+        "seconds": seconds,
+    }
+    show(facts, f"{output}: {width}x{height}, {len(views)} frame(s), {integrator}, {seconds:.1f} s", json)
+
+
+def pictures(
+    store: Store,
+    width: int,
+    height: int,
+    integrator: str,
+    samples: int | None,
+    exposure_ev: float,
+    scene: str | None = None,
+) -> tuple[Picture, Picture]:
+    """Two functions of (camera, progress): radiance (height, width, 3) float32, and the shown uint8 picture."""
+    from lambent.core.colour import filmic, srgb_encode
+    from lambent.core.images import to_bytes
+
+    if integrator == PATH_TRACER:
+        radiance = _path_traced(store, width, height, samples or DEFAULT_SPP[PATH_TRACER], scene)
+    else:
+        from lambent.realtime.device import open_device
+        from lambent.realtime.frame import FrameState, Renderer
+
+        renderer = Renderer(open_device(), store)
+        for text in renderer.missing:
+            say(f"note: {text}")
+
+        def state(camera: CameraRecord) -> FrameState:
+            n = samples if integrator != "qmc" else None
+            return FrameState(camera, width, height, integrator=integrator, n=n, exposure_ev=exposure_ev)
+
+        def radiance(camera: CameraRecord, progress: Progress) -> Any:
+            if integrator == "qmc":
+                return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
+            return renderer.image(state(camera))
+
+        if integrator != "qmc":
+            return radiance, lambda camera, progress: renderer.display_image(state(camera))
+
+    return radiance, lambda camera, progress: to_bytes(srgb_encode(filmic(radiance(camera, progress), exposure_ev)))
+
+
+def _path_traced(store: Store, width: int, height: int, spp: int, place: str | None) -> Picture:
+    from lambent.bake.bake import changed_inputs
+    from lambent.bake.engine import engine
+    from lambent.cli.bake import scene_of
+
+    scene = scene_of(store, place)
+    for name in changed_inputs(store, scene):
+        say(f"note: {name} has changed since the store was baked")
+    engine()
+    from lambent.bake.reference import render_reference
+
+    # A CameraRecord has the fields of a scene's Camera.
+    return lambda camera, progress: render_reference(scene, camera, width, height, spp, progress=progress)[0]  # type: ignore[arg-type]
+
+
+def _write_film(
+    output: Path, views: list[CameraRecord], shown: Picture, form: tuple[int, int, int], progress: Progress
+) -> None:
+    from lambent.core.film import film_writer
+    from lambent.core.progress import silent
+
+    with film_writer(output, *form) as write:
+        for index, view in enumerate(views):
+            write(shown(view, silent))
+            progress(index + 1, len(views), "frames")
+
+
+def _views(record: SceneRecord, camera: str | None, path: str | None, fps: int | None) -> list[CameraRecord]:
+    """One camera, or, with `fps`, those along a path."""
+    if fps is None:
+        if path is not None:
+            raise UserError("a path makes a film", field="--path", hint="write to a name that ends in .mp4")
+        return [_named("camera", record.cameras, camera)]
+    if camera is not None:
+        raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
+    from lambent.store.camera_paths import camera_at
+
+    way = _named("path", record.paths, path)
+    return [camera_at(way, index / fps) for index in range(max(2, round(way.seconds * fps)))]
+
+
+def _named(kind: str, choices: Iterable[Any], name: str | None) -> Any:
+    found = {choice.name: choice for choice in choices}
+    if not found:
+        raise UserError(f"scene has no {kind}", hint=f"add one to the scene, [[{kind}s]]")
+    if name is None:
+        return next(iter(found.values()))
+    if name not in found:
+        hint = did_you_mean(name, found)
+        raise UserError(f"no {kind} of this name", field=f"--{kind}", got=name, expected=", ".join(found), hint=hint)
+    return found[name]
