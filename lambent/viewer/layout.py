@@ -17,6 +17,13 @@ FONT = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
 FONT_PX = 15.0
 PANELS = (scene, view, material, statistics, help)
 OPEN_AT_START = (scene, view, material)
+COLOURS = {
+    imgui.Col_.window_bg: (0.11, 0.115, 0.125, 1.0),
+    imgui.Col_.popup_bg: (0.14, 0.145, 0.155, 1.0),
+    imgui.Col_.frame_bg: (0.20, 0.21, 0.23, 1.0),
+    imgui.Col_.frame_bg_hovered: (0.26, 0.28, 0.32, 1.0),
+    imgui.Col_.frame_bg_active: (0.30, 0.34, 0.40, 1.0),
+}
 _COLUMN = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
     | imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_nav
@@ -30,7 +37,8 @@ def set_style() -> None:
     style = imgui.get_style()
     style.window_rounding, style.frame_rounding, style.grab_rounding = 0, 3, 3
     style.window_border_size = 0
-    style.set_color_(imgui.Col_.window_bg, (0.11, 0.115, 0.125, 1.0))
+    for part, colour in COLOURS.items():
+        style.set_color_(part, colour)
 
 
 def picture_rect(state: ViewerState, width: float, height: float) -> Rect:

@@ -7,7 +7,6 @@ nothing is drawn any more.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 REST_S = 0.25
@@ -29,16 +28,21 @@ class Pacer:
     def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
         self.accumulate_to = accumulate_to
         self.moving_scale = 0.5 if slow_adapter else 1.0
-        self._shown: Hashable = None
+        self._shown: object = None
         self._changed_s = 0.0
         self._accumulated = 0
         self._last: Plan | None = None
 
     @property
+    def shown(self) -> object:
+        """The picture that the window shows or is about to."""
+        return self._shown
+
+    @property
     def accumulated(self) -> int:
         return self._accumulated
 
-    def plan(self, picture: Hashable, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
+    def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
         """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
         if picture != self._shown:
             self._shown, self._changed_s, self._accumulated = picture, now_s, 0

@@ -8,20 +8,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.frames import normalize
+from lambent.realtime.camera import image_plane
 from lambent.store.contract import CameraRecord, ObjectRecord
 
 Floats = NDArray[np.floating]
 STEP_M = 0.5  # a floor higher above the feet than this is a table, not a stair
 
 
-def ray_through(camera: CameraRecord, x: float, y: float, aspect: float) -> tuple[Floats, Floats]:
-    """Origin and unit direction of the ray through the picture point (x, y) in [0, 1]^2, y downwards."""
-    forward = _unit(np.subtract(camera.target, camera.position))
-    right = _unit(np.cross(forward, camera.up))
-    up = np.cross(right, forward)
-    tangent = math.tan(math.radians(camera.fov_y_deg) / 2)
-    direction = forward + (2 * x - 1) * tangent * aspect * right + (1 - 2 * y) * tangent * up
-    return np.array(camera.position, float), _unit(direction)
+def ray_through(camera: CameraRecord, x: float, y: float, width: int, height: int) -> tuple[Floats, Floats]:
+    """Origin and unit direction of the ray through the picture point (x, y) in pixels, y downwards."""
+    across, up, forward = image_plane(camera, width, height)
+    return np.array(camera.position, float), normalize(
+        forward + (2 * x / width - 1) * across + (1 - 2 * y / height) * up
+    )
 
 
 class Geometry:
@@ -86,7 +86,3 @@ def _box_entry(origin: Floats, direction: Floats, box: Floats) -> float:
     t = np.where(np.isnan(t), np.array([[-np.inf], [np.inf]]), t)  # in a face's plane, parallel to it
     enter, leave = np.minimum(*t).max(), np.maximum(*t).min()
     return math.inf if leave < max(enter, 0) - 1e-6 else max(float(enter), 0.0)
-
-
-def _unit(v: Floats) -> Floats:
-    return v / max(float(np.linalg.norm(v)), 1e-20)

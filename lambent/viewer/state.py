@@ -10,6 +10,7 @@ from typing import Literal
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
+from lambent.store.camera_paths import camera_at
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
 
 Mode = Literal["orbit", "walk"]
@@ -104,6 +105,7 @@ class Statistics:
     """What the last frame cost. Times in ms; `gpu_ms` is empty where the adapter has no timers."""
 
     adapter: str = ""
+    integrator: str = ""
     frame_ms: float = 0.0
     gpu_ms: Mapping[str, float] = field(default_factory=dict)
     draw_calls: int = 0
@@ -163,6 +165,29 @@ class ViewerState:
 
     def jump(self, camera: CameraRecord) -> None:
         self.camera, self.path = camera, None
+
+    @property
+    def playing(self) -> bool:
+        return self.path is not None and self.path.playing
+
+    def play(self, dt_s: float) -> None:
+        """Go on along a path that is playing; it stops at its end."""
+        if self.path is None or not self.path.playing:
+            return
+        self.path.time_s = min(self.path.time_s + dt_s, self.path.path.seconds)
+        self.path.playing = self.path.time_s < self.path.path.seconds
+        self.camera = camera_at(self.path.path, self.path.time_s)
+
+    def scrub(self, path: PathRecord, time_s: float) -> None:
+        """Stand where `path` leads at `time_s`."""
+        self.path, self.camera = PathPlay(path, time_s, playing=False), camera_at(path, time_s)
+
+    def toggle(self, path: PathRecord) -> None:
+        """Pause a path that plays; play one that is paused, from its start when it is over."""
+        if self.path is None or self.path.path != path or self.path.time_s >= path.seconds:
+            self.path = PathPlay(path)
+        else:
+            self.path.playing = not self.path.playing
 
     def move(self, camera: CameraRecord) -> None:
         """Take a camera the user moved; that ends a path being shown."""

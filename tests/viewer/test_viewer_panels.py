@@ -83,7 +83,7 @@ def test_material_sliders(panels, state):
     panels.drag("alpha", 0.1, 0.6)
     assert state.edits.current("brass").lobes[0].alpha == pytest.approx(0.6, abs=0.05)
     panels.drag("##values", 0.1, 0.2)
-    for undone in range(4):
+    for _ in range(4):
         panels.click("undo")
     assert state.edits.edited == {}
     panels.click("redo")

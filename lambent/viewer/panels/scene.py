@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from lambent.viewer.state import PathPlay, ViewerState
+from lambent.viewer.state import ViewerState
 
 TITLE = "Scene"
 LISTED = 6
@@ -49,25 +49,18 @@ def _cameras(state: ViewerState) -> None:
 
 def _path(state: ViewerState) -> None:
     imgui.separator_text("camera path")
-    names = [path.name for path in state.scene.paths]
-    current = state.path.path if state.path else state.scene.paths[0]
-    _, index = imgui.combo("path", names.index(current.name), names)
-    chosen = state.scene.paths[index]
-    if chosen != current:
-        state.path = PathPlay(chosen)
-    playing = state.path is not None and state.path.playing
-    if imgui.button("pause" if playing else "play", (64, 0)):
-        _toggle(state, chosen)
+    paths = state.scene.paths
+    current = state.path.path if state.path else paths[0]
+    index = paths.index(current)
+    changed, index = imgui.combo("path", index, [path.name for path in paths])
+    chosen = paths[index]
+    if changed:
+        state.scrub(chosen, 0.0)
+    if imgui.button("pause" if state.playing else "play", (64, 0)):
+        state.toggle(chosen)
     imgui.same_line()
     imgui.set_next_item_width(-1)
     time_s = state.path.time_s if state.path else 0.0
-    moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s")
+    moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
     if moved:
-        state.path = PathPlay(chosen, time_s, playing=False)
-
-
-def _toggle(state: ViewerState, chosen: object) -> None:
-    if state.path is None:
-        state.path = PathPlay(chosen)  # type: ignore[arg-type]
-    else:
-        state.path.playing = not state.path.playing
+        state.scrub(chosen, time_s)

@@ -13,6 +13,7 @@ def draw(state: ViewerState) -> None:
     width, height = s.resolution
     table = [
         ("adapter", s.adapter),
+        ("integrator", s.integrator),
         ("frame", f"{s.frame_ms:.1f} ms"),
         ("picture", f"{width} x {height}"),
         ("samples per pixel", str(s.samples)),

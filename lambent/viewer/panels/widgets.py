@@ -15,8 +15,7 @@ RGB = tuple[float, float, float]
 
 def choice(label: str, value: str, options: Sequence[str]) -> str:
     """A drop-down list."""
-    index = options.index(value)
-    changed, index = imgui.combo(label, index, list(options))
+    _, index = imgui.combo(label, options.index(value), list(options))
     return options[index]
 
 

@@ -1,0 +1,230 @@
+"""The window: opens a store, carries events into the state, draws what the state says, sleeps when nothing changes."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.frame import Renderer
+from lambent.realtime.resources import device_needs
+from lambent.store.store import Store
+from lambent.viewer.input import Input
+from lambent.viewer.picking import Geometry
+from lambent.viewer.picture import CHOICES, Picture
+from lambent.viewer.state import Mode, ViewerState
+
+MODES: dict[str, Mode] = {"walk": "walk", "view": "orbit"}
+MAX_FPS = 60
+BEFORE_IMGUI = -100  # its own handlers stand at -99 and stop what they use, so that ours would not see a hover
+SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
+FOR_IMGUI_ONLY = ("char", "resize", "pointer_leave")
+EVENTS = ("pointer_down", "pointer_move", "pointer_up", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
+
+
+def run(
+    store_path: Path,
+    mode: str = "walk",
+    *,
+    size: tuple[int, int] = (1680, 1050),
+    frames: int | None = None,
+    folder: Path | None = None,
+) -> None:
+    """Show a baked store in a window; returns when it is closed.
+
+    Parameters
+    ----------
+    store_path : Path
+        A store that holds at least geometry and the scene record.
+    mode : {"walk", "view"}
+        Start on foot, or orbiting the camera's target.
+    size : (width, height)
+        Of the window, in logical pixels.
+    frames : int, optional
+        Draw this many frames without a pause, then close.
+    folder : Path, optional
+        Where pictures and materials are saved; by default the working folder.
+
+    Raises
+    ------
+    UserError
+        Where there is no display or adapter, the store is none, or the mode is unknown.
+    """
+    if mode not in MODES:
+        raise UserError("unknown mode", got=mode, expected=" or ".join(MODES))
+    check_display()
+    scene = read_baked(Store.open(store_path))
+    state = ViewerState.of(scene.record, CHOICES, MODES[mode], folder=folder or Path.cwd(), missing=scene.missing)
+    geometry = Geometry(scene.positions, scene.faces, scene.record.objects)
+    picture = Picture(Renderer(open_device(device_needs(scene)), scene))
+    Window(state, geometry, picture, size=size, frames=frames).run()
+
+
+def check_display() -> None:
+    """`UserError` where no window can be opened."""
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        if not glfw.init():
+            raise UserError("no display", hint="use `lambent render`, or `lambent demo --headless`")
+
+
+class FirstError:
+    """Keeps the first error raised inside it and calls `then`; the event loop would log it and go on."""
+
+    def __init__(self, then: Callable[[], None]) -> None:
+        self._then = then
+        self.error: Exception | None = None
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> bool:
+        if not isinstance(error, Exception):
+            return False
+        self.error = self.error or error
+        self._then()
+        return True
+
+
+class Window:
+    """One window of rendercanvas with Dear ImGui. `run` shows it until it is closed."""
+
+    def __init__(
+        self,
+        state: ViewerState,
+        geometry: Geometry,
+        picture: Picture,
+        *,
+        size: tuple[int, int],
+        frames: int | None = None,
+    ) -> None:
+        # Imported here: they need a display.
+        from rendercanvas.glfw import RenderCanvas, loop
+        from wgpu.utils.imgui import ImguiRenderer
+
+        from lambent.viewer import layout
+
+        self.state, self._picture, self._frames = state, picture, frames
+        self._loop, self._layout, self._device = loop, layout, picture.device
+        self.canvas = RenderCanvas(size=size, title=f"Lambent: {state.scene.name}", max_fps=MAX_FPS)
+        context = self.canvas.get_wgpu_context()
+        # Not an sRGB format: Dear ImGui's colours are meant to be blended as they are, and the picture comes encoded.
+        surface = context.get_preferred_format(picture.device.adapter).removesuffix("-srgb")
+        context.configure(device=picture.device, format=surface)
+        self._imgui = ImguiRenderer(picture.device, self.canvas)
+        self._imgui.set_gui(self._gui)
+        layout.set_style()
+        self._context = context
+        self._registered: Any = None  # the picture's view that `_texture` stands for
+        self._texture: Any = None
+        self._input = Input(geometry, layout.picture_rect(state, *size))
+        self._popup_open = False
+        self._extra_frames = 0
+        self._drawn_s = state.clock()
+        self._moving = False  # between this frame and the next
+        self._wake_at_s: float | None = None
+        self._failed = FirstError(then=lambda: loop.call_soon(self.canvas.close))
+        self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
+
+    def run(self) -> None:
+        """Show the window until it is closed; raises what went wrong meanwhile."""
+        self.canvas.request_draw(self._draw)
+        self._loop.run()
+        if self._failed.error is not None:
+            raise self._failed.error
+
+    def _on_event(self, event: dict[str, Any]) -> None:
+        self._extra_frames = SETTLE_FRAMES
+        self.canvas.request_draw()
+        if event["event_type"] in FOR_IMGUI_ONLY:
+            return
+        with self._failed:
+            io = self._imgui.backend.io
+            has_keys = io.want_text_input or io.want_capture_keyboard
+            self._input.handle(self.state, event, ui_has_mouse=self._popup_open, ui_has_keys=has_keys)
+
+    def _draw(self) -> None:
+        with self._failed:
+            self._advance()
+            self._show()
+            self._schedule()
+
+    def _advance(self) -> None:
+        """Bring the state to this moment: walk, go on along the path, forget old messages."""
+        state, now_s = self.state, self.state.clock()
+        since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
+        dt_s = since_last_s if self._moving else 0.0  # the sleep before a first step is not walked through
+        self._input.walk(state, dt_s)
+        state.play(dt_s)
+        state.drop_old_messages()
+        self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
+
+    def _show(self) -> None:
+        """Draw the picture where it is out of date, then the interface over it."""
+        state = self.state
+        self._input.picture = self._layout.picture_rect(state, *self.canvas.get_logical_size())
+        self._picture.update(state, self._input.picture, self.canvas.get_pixel_ratio())
+        self._register()
+        if state.screenshot_wanted:
+            state.screenshot_wanted = False
+            self._picture.save(state)
+        self._clear()
+        self._imgui.render()
+
+    def _register(self) -> None:
+        """Tell Dear ImGui of the picture's texture, where that is a new one."""
+        if self._registered is self._picture.view:
+            return
+        if self._texture is not None:
+            self._imgui.backend.unregister_texture(self._texture)
+        self._registered = self._picture.view
+        self._texture = self._imgui.backend.register_texture(self._registered)
+
+    def _gui(self) -> None:
+        self._popup_open = self._layout.draw(self.state, self._texture)
+
+    def _clear(self) -> None:
+        encoder = self._device.create_command_encoder()
+        view = self._context.get_current_texture().create_view()
+        attachment = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        encoder.begin_render_pass(color_attachments=[attachment]).end()
+        self._device.queue.submit([encoder.finish()])
+
+    def _schedule(self) -> None:
+        """Ask for the next frame where there will be something new; otherwise sleep."""
+        if self._frames is not None:
+            self._frames -= 1
+            if self._frames <= 0:
+                self._loop.call_soon(self.canvas.close)
+        self._extra_frames = max(0, self._extra_frames - 1)
+        self._moving = self._input.walking or self.state.playing
+        if self._moving or self._extra_frames or self._frames is not None:
+            self.canvas.request_draw()
+        waits = [m.until_s - self.state.clock() for m in self.state.messages]
+        due = self._picture.wait_s(self.state)
+        if due is not None:
+            waits.append(due)
+        if waits:
+            self._wake_in(max(0.0, min(waits)))
+
+    def _wake_in(self, seconds: float) -> None:
+        at_s = self.state.clock() + seconds
+        if self._wake_at_s is not None and self._wake_at_s <= at_s:
+            return  # an earlier frame will look again
+        self._wake_at_s = at_s
+
+        def wake() -> None:
+            if self._wake_at_s == at_s:
+                self._wake_at_s = None
+                self.canvas.request_draw()
+
+        if seconds > 0:
+            self._loop.call_later(seconds, wake)
+        else:
+            wake()

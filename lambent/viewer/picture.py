@@ -1,0 +1,139 @@
+"""The picture in the window: which frame is due, where it is drawn, what it cost, how it is saved."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from lambent.core.colour import srgb_decode
+from lambent.core.images import write_image
+from lambent.realtime.device import adapter_info
+from lambent.realtime.frame import DISPLAY_FORMAT, QMC_N, SHOW, FrameState, Renderer
+from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.passes.tonemap import VIEW_TRANSFORMS
+from lambent.realtime.patterns import RINGS
+from lambent.realtime.resources import LOOKUPS
+from lambent.viewer.input import Rect
+from lambent.viewer.pacing import Pacer, Plan
+from lambent.viewer.state import Choices, Statistics, ViewerState
+
+CHOICES = Choices(
+    integrators=tuple(name for name, how in INTEGRATORS.items() if how.specular),
+    view_transforms=("filmic", *(name for name in VIEW_TRANSFORMS if name != "filmic")),
+    shows=tuple(SHOW),
+    lookups=("auto", *LOOKUPS),
+    sample_counts=tuple(n for n in RINGS if n <= 19),
+)
+# At rest: frames of the progressive series, and samples per pixel and lobe in each. Software takes one sample at a
+# time, so that a frame is short and the window answers in between.
+REST_FRAMES = 128
+SOFTWARE_N = 1
+
+
+class Picture:
+    """Draws what a state shows into `view`, a texture of the picture's size or smaller."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer, self.device = renderer, renderer.device
+        adapter = adapter_info(renderer.device)
+        self._adapter = adapter.name
+        self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
+        self._pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
+        self.view: Any = None
+        self._size: tuple[int, int] = (0, 0)
+
+    def update(self, state: ViewerState, rect: Rect, pixel_ratio: float) -> None:
+        """Draw the next frame where one is due."""
+        wanted = frame_state(state, round(rect.width * pixel_ratio), round(rect.height * pixel_ratio))
+        now_s = state.clock()
+        plan = self._pacer.plan(wanted, now_s, refine=state.refine, adaptive=state.adaptive_resolution)
+        if plan is None:
+            return
+        frame = self._planned(wanted, plan)
+        self._fit(frame.width, frame.height)
+        started = time.perf_counter()
+        self._renderer.draw(frame, self.view, DISPLAY_FORMAT)
+        # Waiting keeps the queue short, so that a frame shows the latest event, and tells what a frame costs.
+        self._renderer.finish()
+        seconds = time.perf_counter() - started
+        self._pacer.drawn(plan)
+        self._pacer.cost(plan, seconds)
+        state.statistics = self._statistics(seconds)
+
+    def wait_s(self, state: ViewerState) -> float | None:
+        """Seconds until a frame is due although nothing changes; None: never."""
+        return self._pacer.wait_s(state.clock(), refine=state.refine)
+
+    def save(self, state: ViewerState) -> None:
+        """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance."""
+        name = free_name(state.folder, state.scene.name)
+        frame = self._pacer.shown
+        assert isinstance(frame, FrameState), "saved before the first frame"
+        if self._pacer.accumulated:
+            frame = self._planned(frame, Plan(1.0, self._pacer.accumulated))
+        try:
+            write_image(state.folder / f"{name}.exr", self._renderer.image(frame))
+            display = self._renderer.display_image(frame)
+            write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
+        except OSError as error:
+            state.say(f"picture not saved: {error}")
+        else:
+            state.say(f"saved {name}.png and {name}.exr")
+
+    def _planned(self, frame: FrameState, plan: Plan) -> FrameState:
+        if plan.accumulate is not None:
+            return replace(frame, integrator="qmc", n=self._rest_n, accumulate=plan.accumulate)
+        width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
+        return replace(frame, width=width, height=height)
+
+    def _fit(self, width: int, height: int) -> None:
+        if self._size == (width, height):
+            return
+        self._size = (width, height)
+        usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING
+        texture = self.device.create_texture(size=(width, height, 1), format=DISPLAY_FORMAT, usage=usage)
+        self.view = texture.create_view()
+
+    def _statistics(self, seconds: float) -> Statistics:
+        drawn = self._renderer.statistics
+        return Statistics(
+            adapter=self._adapter,
+            integrator=drawn["integrator"],
+            frame_ms=seconds * 1e3,
+            gpu_ms=drawn["gpu_ms"],
+            draw_calls=drawn["draw_calls"],
+            resolution=(drawn["width"], drawn["height"]),
+            samples=drawn["samples_per_pixel"],
+            accumulated=self._pacer.accumulated * self._rest_n,
+            accumulate_to=REST_FRAMES * self._rest_n,
+        )
+
+
+def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
+    """The frame that shows the state at full size."""
+    return FrameState(
+        state.camera,
+        width,
+        height,
+        integrator=state.integrator,
+        n=state.n,
+        exposure_ev=state.exposure_ev,
+        view_transform=state.view_transform,
+        materials=dict(state.edits.edited),
+        lookup=state.lookup,
+        show=state.show,
+    )
+
+
+def free_name(folder: Path, stem: str) -> str:
+    """`stem` with the first number that is not taken in `folder`, without characters that file systems refuse."""
+    plain = "".join(c if c.isalnum() or c in "._-" else "-" for c in stem).strip(".-") or "picture"
+    number = 1
+    while any((folder / f"{plain}-{number:03}{suffix}").exists() for suffix in (".png", ".exr")):
+        number += 1
+    return f"{plain}-{number:03}"
