@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -25,6 +25,7 @@ def command(
     Example: lambent compare reference.exr frame.exr -o difference.png
     """
     from lambent.core.images import check_writable, read_image, write_image
+    from lambent.core.metrics import compare
 
     if output is not None:
         check_writable(output, (".png",))
@@ -32,7 +33,7 @@ def command(
     if pictures[0].shape != pictures[1].shape:
         sizes = ["{1}x{0}".format(*picture.shape) for picture in pictures]
         raise UserError("pictures differ in size", file=test, got=sizes[1], expected=f"{sizes[0]} as {reference}")
-    result, difference = measure(*pictures, radiance=_is_radiance(reference) and _is_radiance(test))
+    result, difference = compare(*pictures, radiance=_is_radiance(reference) and _is_radiance(test))
     if output is not None:
         from lambent.core.colour import srgb_decode
 
@@ -47,25 +48,6 @@ def command(
             *result["flip_worst_tile_at"], **result)),
     ]  # fmt: skip
     show(result, table(rows), json)
-
-
-def measure(reference: Any, test: Any, *, radiance: bool) -> tuple[dict[str, Any], Any]:
-    """All figures for two linear pictures, and the FLIP error in false colour (encoded)."""
-    from lambent.core import metrics
-    from lambent.core.colour import srgb_encode
-
-    shown = metrics.display_pair(reference, test) if radiance else (srgb_encode(reference), srgb_encode(test))
-    flip = metrics.flip(*shown)
-    return {
-        "size": [reference.shape[1], reference.shape[0]],
-        "compared_as": "radiance" if radiance else "display",
-        "psnr_db": metrics.psnr(*shown),
-        "rmse_rgb": metrics.rmse_rgb(reference, test),
-        "rmse_lab": metrics.rmse_lab(reference, test),
-        "flip_mean": flip.mean,
-        "flip_worst_tile": flip.worst_tile,
-        "flip_worst_tile_at": flip.worst_tile_at,
-    }, flip.picture
 
 
 def _is_radiance(path: Path) -> bool:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from lambent.core.errors import UserError
+from lambent.core.plain import plain
 from lambent.core.progress import Progress
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
@@ -21,19 +20,6 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON
 def show(result: Mapping[str, Any], text: str, as_json: bool) -> None:
     """Print the result of a command: `text` for people, `result` for machines."""
     typer.echo(json.dumps(plain(result), indent=1, allow_nan=False) if as_json else text)
-
-
-def plain(value: Any) -> Any:
-    """`value` as JSON knows it: arrays and tuples as lists, paths as text, what is not finite as null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | set):
-        return [plain(item) for item in value]
-    if hasattr(value, "tolist"):  # numpy
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

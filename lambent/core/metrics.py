@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.colour import rgb_to_lab
+from lambent.core.colour import rgb_to_lab, srgb_encode
 
 Floats = NDArray[np.floating[Any]]
 TILE = 16  # pixels
@@ -65,6 +65,22 @@ def flip(reference: Floats, test: Floats) -> Flip:
     error, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)
     picture, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=True, computeMeanError=False)
     return Flip(np.asarray(error)[..., 0] if np.ndim(error) == 3 else np.asarray(error), np.asarray(picture))
+
+
+def compare(reference: Floats, test: Floats, *, radiance: bool) -> tuple[dict[str, Any], Floats]:
+    """All figures for two linear pictures, and the FLIP error in false colour (encoded)."""
+    shown = display_pair(reference, test) if radiance else (srgb_encode(reference), srgb_encode(test))
+    seen = flip(*shown)
+    return {
+        "size": [reference.shape[1], reference.shape[0]],
+        "compared_as": "radiance" if radiance else "display",
+        "psnr_db": psnr(*shown),
+        "rmse_rgb": rmse_rgb(reference, test),
+        "rmse_lab": rmse_lab(reference, test),
+        "flip_mean": seen.mean,
+        "flip_worst_tile": seen.worst_tile,
+        "flip_worst_tile_at": seen.worst_tile_at,
+    }, seen.picture
 
 
 def tile_means(error: Floats, tile: int = TILE) -> Floats:
