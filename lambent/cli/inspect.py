@@ -55,35 +55,14 @@ def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
 
 
 def inspect_table(file: str, plot: Path | None) -> Facts:
-    """A measured table: what the file says, how much of it is usable, its albedo."""
-    from dataclasses import asdict
-
-    import numpy as np
-
-    from lambent.core.frames import direction
+    """A measured table: what the file says, how much of it is usable, its albedo, its faults."""
     from lambent.materials import measured
+    from lambent.materials.measured import inspection
 
     measurement = measured.load(Path(file))
-    info, samples = measurement.info, measurement.samples()
     if plot is not None:
-        _plot(plot, "measured", measurement.eval, Path(file).name, info.transmits)
-    wi = direction(np.radians(ALBEDO_AT_DEG), 0.0)
-    near, far = measurement.reflectivity(wi), measurement.transmissivity(wi)
-    return {
-        "is": "measured table",
-        "format": info.format,
-        "sizes": info.sizes,
-        "symmetry": "isotropic" if info.isotropic else "anisotropic",
-        "channels": info.channels,
-        "sides": "reflection and transmission" if info.transmits else "reflection",
-        "stored": info.stored,
-        "tuples_used": len(samples),
-        "tuples_left_out": asdict(samples.left_out),
-        "reflectivity": _at_angles(near),
-        "transmissivity": _at_angles(far) if info.transmits else None,
-        "peak_per_sr": float(samples.f.max()),
-        "notes": info.notes,
-    }
+        _plot(plot, "measured", measurement.eval, Path(file).name, measurement.info.transmits)
+    return {"is": "measured table", **inspection.inspect_table(measurement)}
 
 
 def inspect_material(file: str, plot: Path | None) -> Facts:

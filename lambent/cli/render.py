@@ -43,7 +43,7 @@ def command(
     Example: lambent render room.store --camera entrance -o entrance.png
     """
     from lambent.core.film import even_size
-    from lambent.core.images import WRITABLE, check_writable, write_image
+    from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
     from lambent.store.contract import scene_record
     from lambent.store.store import Store
 
@@ -62,12 +62,7 @@ def command(
         if film:
             _write_film(output, views, shown, (width, height, fps), progress)
         elif output.suffix.lower() == ".png":
-            from PIL import Image
-
-            from lambent.core.files import atomic_path
-
-            with atomic_path(output) as beside:
-                Image.fromarray(shown(views[0], progress)).save(beside)
+            write_shown(output, shown(views[0], progress))
         else:
             write_image(output, radiance(views[0], progress))
     seconds = time.perf_counter() - began

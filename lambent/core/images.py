@@ -80,9 +80,20 @@ def write_image(path: Path, image: NDArray[Any]) -> None:
         elif path.suffix.lower() == ".hdr":
             beside.write_bytes(rgbe.encode(rgb))
         else:
-            from PIL import Image as Pillow
+            _save_png(beside, to_bytes(srgb_encode(rgb)))
 
-            Pillow.fromarray(to_bytes(srgb_encode(rgb))).save(beside, format="PNG")
+
+def write_shown(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write what a display shows, (H, W, 3) uint8 encoded, as PNG, atomically."""
+    check_writable(path, (".png",))
+    with atomic_path(path) as beside:
+        _save_png(beside, picture)
+
+
+def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:
+    from PIL import Image as Pillow
+
+    Pillow.fromarray(picture).save(path, format="PNG")
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
