@@ -188,7 +188,7 @@ def _sheet(angles_deg: Floats, f: Floats, symmetry: Symmetry, path: Path) -> She
 
 
 def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None:
-    """Write `table` as gonio text with the quantity asked for, atomically; six significant digits.
+    """Write `table` as gonio text with the quantity asked for, atomically; six significant digits of the values.
 
     Parameters
     ----------
@@ -199,12 +199,13 @@ def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None
     """
     channels = ("",) if table.info.channels == 1 else ("_r", "_g", "_b")
     names = " ".join([*ANGLES, *(quantity + channel for channel in channels)])
+    formats = ["%.8g"] * len(ANGLES) + ["%.6g"] * len(channels)
     with atomic_path(Path(path)) as beside, beside.open("w", encoding="utf-8") as file:
         file.write(f"# name: {table.name}\n# symmetry: {table.symmetry}\n{names}\n")
         for sheets, far in ((table.reflected, False), (table.transmitted, True)):
             for theta_i, row in zip(table.theta_i_deg, sheets, strict=False):
                 for phi_i, sheet in zip(table.phi_i_deg, row, strict=True):
-                    np.savetxt(file, _columns(theta_i, phi_i, sheet, far, quantity), fmt="%.6g")
+                    np.savetxt(file, _columns(theta_i, phi_i, sheet, far, quantity), fmt=formats)
 
 
 def _columns(theta_i_deg: float, phi_i_deg: float, sheet: Sheet, far: bool, quantity: Quantity) -> Floats:

@@ -13,6 +13,7 @@ from lambent.materials.measured.protocol import MeasuredTable
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
 _PAIRS = 4096
+_REACH_DEG = 60  # of the pairs that are swapped: both are then inside the usual incident grids
 
 
 def inspect_table(table: MeasuredTable) -> dict[str, Any]:
@@ -26,7 +27,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `tuples`: used, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent`, `negative_percent` of the tuples, `albedo_max`,
         `energy_above_one` (whether it exceeds 1), `non_reciprocal_percent` (mean of |f(wi, wo) - f(wo, wi)| over the
-        mean of f, of the reflection, directions up to 75 degrees).
+        mean of f, of the reflection, directions up to 60 degrees).
     """
     info, samples = table.info, table.samples()
     wi = direction(np.radians(_THETA_I_DEG), 0.0)
@@ -62,7 +63,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
 def _non_reciprocity(table: MeasuredTable) -> float:
     """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f: evenly spread pairs, and pairs near the mirror direction."""
     u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
-    wi, wo = (_within_75_degrees(u[:, k : k + 2]) for k in (0, 2))
+    wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
     near = direction(*_mirrored(wi, u[:, 2:]))
     pairs = (np.concatenate([wi, wi]), np.concatenate([wo, near]))
     forth, back = table.eval(*pairs), table.eval(*pairs[::-1])
@@ -70,12 +71,12 @@ def _non_reciprocity(table: MeasuredTable) -> float:
     return float(np.abs(forth - back).mean() / mean) if mean > 0 else 0.0
 
 
-def _within_75_degrees(u: Floats) -> Floats:
-    return direction(np.arccos(1 - u[:, 0] * (1 - np.cos(np.radians(75)))), 2 * np.pi * u[:, 1])
+def _within_reach(u: Floats) -> Floats:
+    return direction(np.arccos(1 - u[:, 0] * (1 - np.cos(np.radians(_REACH_DEG)))), 2 * np.pi * u[:, 1])
 
 
 def _mirrored(wi: Floats, u: Floats) -> tuple[Floats, Floats]:
     """(theta, phi) up to 10 degrees around the mirror direction of wi."""
     theta = np.arccos(wi[:, 2]) + np.radians(20) * (u[:, 0] - 0.5)
     phi = np.arctan2(wi[:, 1], wi[:, 0]) + np.pi + np.radians(20) * (u[:, 1] - 0.5)
-    return theta.clip(0, np.radians(80)), phi
+    return theta.clip(0, np.radians(_REACH_DEG)), phi

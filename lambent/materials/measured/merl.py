@@ -87,9 +87,8 @@ class MerlTable(IntegratedTable):
 
     @cached_property
     def _filled(self) -> Floats:
-        """(theta_h, theta_d, phi_d, 3) float32 f in 1/sr without holes."""
-        f = np.moveaxis(self._raw, 0, -1).astype(np.float32) * SCALES.astype(np.float32)
-        return fill_holes(f, self._measured)
+        """(theta_h, theta_d, phi_d, 3) f in 1/sr without holes."""
+        return fill_holes(np.moveaxis(self._raw, 0, -1) * SCALES, self._measured)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3), trilinear between bin centres; 0 where wi or wo is below the surface."""
@@ -120,7 +119,9 @@ class MerlTable(IntegratedTable):
         wi, wo = directions_of(theta_h, theta_d, phi_d)
         exists = (wi[..., 2] > 0) & (wo[..., 2] > 0)
         cell_h = (((i + 1) / shape[0]) ** 2 - (i / shape[0]) ** 2) * np.pi / 2
-        weight = 4 * np.cos(theta_d) * np.sin(theta_d) * np.sin(theta_h) * cell_h
+        turns = 2 * np.pi * 2  # phi_h runs round, and phi_d + pi is the same bin
+        cell_d = (np.pi / 2 / shape[1]) * (np.pi / shape[2]) * np.sin(theta_d)
+        weight = 4 * np.cos(theta_d) * np.sin(theta_h) * cell_h * cell_d * turns
         f = np.moveaxis(self._raw, 0, -1)[exists] * SCALES
         shadowed = np.asarray((f < 0).any(axis=1))
         wi, wo = _turned_to_phi_0(wi[exists], wo[exists])

@@ -153,7 +153,7 @@ class RglTable(IntegratedTable):
         if not self._with_jacobian:
             return np.ones((len(u_m), 1))
         whole = Corners((np.zeros(1), np.zeros(1)), (theta_i, phi_i))
-        u_i = np.stack([_u_of_theta(theta_i), _u_of_phi(phi_i)], axis=-1)
+        u_i = np.stack([_u_of_theta(theta_i), _u_of_phi(0 * phi_i if self._isotropic else phi_i)], axis=-1)
         sigma = bilinear(self._sigma, whole, u_i)
         factor: Floats = np.divide(bilinear(self._ndf, whole, u_m), 4 * sigma, out=np.zeros(len(u_m)), where=sigma > 0)
         return factor[:, None]

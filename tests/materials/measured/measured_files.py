@@ -1,0 +1,62 @@
+"""Small files of every format, made from functions whose answer is known."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from lambent.materials.document import Lobe, Material
+
+
+def tensor_bytes(fields: dict[str, np.ndarray], types: dict[str, int] | None = None) -> bytes:
+    """An RGL tensor file with `fields`."""
+    kinds = {np.dtype("u1"): 1, np.dtype("f4"): 10}
+    head_size = 18 + sum(13 + len(name) + 8 * a.ndim for name, a in fields.items())
+    head, body = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)), b""
+    for name, array in fields.items():
+        head += struct.pack("<H", len(name)) + name.encode() + struct.pack("<H", array.ndim)
+        head += struct.pack("<BQ", (types or {}).get(name, kinds[array.dtype]), head_size + len(body))
+        head += struct.pack(f"<{array.ndim}Q", *array.shape)
+        body += array.tobytes()
+    return head + body
+
+
+def rgl_fields(phi_i: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
+    """Tensors of a made-up material that varies with all it may; sigma of an isotropic one not with phi."""
+    random = np.random.default_rng(seed)
+    theta_i = np.array([0.0, 0.5, 1.0, np.pi / 2], dtype=np.float32)
+    incident = (len(phi_i), len(theta_i))
+    sigma = random.uniform(0.5, 1, (3, 8)).astype(np.float32)
+    return {
+        "description": np.frombuffer(b"made up", dtype=np.uint8),
+        "phi_i": phi_i.astype(np.float32),
+        "theta_i": theta_i,
+        "ndf": random.uniform(0.5, 1, (3, 8)).astype(np.float32),
+        "sigma": np.repeat(sigma[:1], 3, axis=0) if len(phi_i) == 1 else sigma,
+        "vndf": random.uniform(0.2, 1, (*incident, 9, 12)).astype(np.float32),
+        "luminance": random.uniform(0.5, 1, (*incident, 6, 6)).astype(np.float32),
+        "rgb": random.uniform(0.1, 1, (*incident, 3, 6, 6)).astype(np.float32),
+        "jacobian": np.array([1], dtype=np.uint8),
+    }
+
+
+def merl_bytes(f: np.ndarray) -> bytes:
+    """A MERL file of f (theta_h, theta_d, phi_d, 3) in 1/sr; NaN becomes -1."""
+    raw = np.nan_to_num(f / (np.array([1, 1.15, 1.66]) / 1500), nan=-1.0)
+    return struct.pack("<3i", *f.shape[:3]) + np.moveaxis(raw, -1, 0).astype("<f8").tobytes()
+
+
+def cornell_text(rows: np.ndarray, wavelengths_nm: np.ndarray) -> str:
+    """A Cornell file."""
+    lines = ["# made up", str(len(wavelengths_nm)), " ".join(f"{w:g}" for w in wavelengths_nm)]
+    return "\n".join(lines + [" ".join(f"{v:.8g}" for v in row) for row in rows]) + "\n"
+
+
+def cornell_rows(value: float = 0.2, count: int = 60, wavelengths: int = 5) -> np.ndarray:
+    random = np.random.default_rng(0)
+    angles = random.uniform((0, 0, 0, 0), (1.2, 6.2, 1.2, 6.2), (count, 4))
+    return np.column_stack([angles, np.full((count, wavelengths), value)])
+
+
+GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4, 0.4, 0.4), mx=0.2, my=0.2),))

@@ -1,0 +1,209 @@
+"""Gonio tables: text round trip, quantities, symmetries, half-vector reconstruction, the software device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured import load
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, outgoing_grid, synthesise
+from tests.materials.measured.measured_files import GLOSSY
+
+WHITE = (1.0, 1.0, 1.0)
+BRUSHED = Material(
+    name="brushed", kd=(0.05,) * 3, lobes=(Lobe(mx=0.2, my=0.1, r0=WHITE, k=(0.8, 0.7, 0.6), alpha=0.5),)
+)
+FOIL = Material(
+    name="foil",
+    kd=(0.3,) * 3,
+    lobes=(Lobe(side="transmission", mx=0.25, my=0.25, k=(0.6, 0.6, 0.6), r0=(0.1,) * 3, alpha=0.5),),
+)
+CLEAN = {"noise": 0.0, "floor": 0.0}
+
+
+def test_text_round_trip(tmp_path: Path) -> None:
+    for material, setup in ((BRUSHED, ANISOTROPIC), (FOIL, ISOTROPIC)):
+        table = synthesise(material, replace(setup, step_deg=10, fine_deg=5))
+        for quantity in ("f", "f_cos", "p"):
+            path = tmp_path / "table.txt"
+            write_gonio(path, table, quantity)
+            back = load(path)
+            assert back.info.stored == quantity and back.info.file == "table.txt"
+            assert (back.symmetry, back.name) == (table.symmetry, material.name)
+            ours, theirs = table.samples(), back.samples()
+            assert ours.left_out == theirs.left_out and ours.left_out.shadowed > 0
+            np.testing.assert_allclose(theirs.f, ours.f, rtol=2e-5)
+            np.testing.assert_allclose(theirs.wo, ours.wo, atol=1e-7)
+            np.testing.assert_allclose(theirs.weight, ours.weight, rtol=1e-3)
+
+
+def test_columns_say_the_quantity(tmp_path: Path) -> None:
+    """The same numbers under f and p differ by exactly the cosine."""
+    path = tmp_path / "a"
+    rows = "".join(f"0 0 {t} {p} 0.25\n" for t in (0, 60) for p in (0, 120, 240))
+    table = {}
+    for quantity in ("f", "p", "f_cos"):
+        path.write_text(f"theta_i phi_i theta_o phi_o {quantity}\n{rows}")
+        table[quantity] = load(path).samples()
+    np.testing.assert_allclose(table["f"].f[:, 0], 0.25)
+    np.testing.assert_allclose(table["p"].f[:, 0], [0.25] * 3 + [0.5] * 3)
+    np.testing.assert_allclose(table["p"].p[:, 0], 0.25)
+    np.testing.assert_array_equal(table["p"].f, table["f_cos"].f)
+
+
+def test_not_measured_negative_and_separators(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    values = iter(["nan", "-1", "-0.001", "inf", "0.2", "0.3", "0.4", "0.5"])
+    rows = "".join(f"0, 0, {t}, {p}, {next(values)}\n" for t in (0, 40) for p in (0, 90, 180, 270))
+    path.write_text(f"# comment\n\ntheta_i, phi_i, theta_o, phi_o, f\n{rows}")
+    left_out = load(path).samples().left_out
+    assert (left_out.shadowed, left_out.negative) == (3, 1)
+    assert "symmetry not stated" in load(path).info.notes[0]
+
+
+def test_transmission_is_beyond_90_degrees() -> None:
+    table = synthesise(FOIL, replace(ISOTROPIC, **CLEAN))
+    samples = table.samples()
+    assert table.info.transmits and samples.transmitted.any() and (samples.wi[:, 2] > 0).all()
+    truth = MaterialBSDF(FOIL)
+    np.testing.assert_allclose(truth.eval(samples.wi, samples.wo), samples.f, rtol=1e-9)
+    wi = direction(np.radians([0, 20, 45]), 0.0)
+    np.testing.assert_allclose(table.albedo(wi), truth.albedo(wi, samples=16384), rtol=0.03)
+    np.testing.assert_allclose(table.reflectivity(wi), 0.3, rtol=0.02)
+    np.testing.assert_allclose(table.eval(wi * (1, 1, -1), wi * (-1, -1, 1)), table.eval(wi, wi * (-1, -1, -1)))
+
+
+def test_weights_tile_the_hemisphere() -> None:
+    samples = synthesise(GLOSSY, replace(ISOTROPIC, sector_deg=0, grazing_deg=84, **CLEAN)).samples()
+    one = samples.wi[:, 2] == samples.wi[0, 2]
+    last_edge = np.radians(82.5 + 1.25)
+    assert samples.weight[one].sum() == pytest.approx(2 * np.pi * (1 - np.cos(last_edge)), rel=1e-6)
+
+
+def test_half_vector_beats_quadrilinear_on_a_lobe() -> None:
+    """Between two incident directions a narrow lobe moves; blending makes two of it (thesis, figure 3.1)."""
+    table = synthesise(BRUSHED, replace(ANISOTROPIC, **CLEAN))
+    wi = np.broadcast_to(direction(np.radians(42), np.radians(38)), (3000, 3))
+    wo = wi * (-1, -1, 1) + np.random.default_rng(0).normal(0, 0.1, (3000, 3))
+    wo = wo / np.linalg.norm(wo, axis=1, keepdims=True)
+    wo = wo[wo[:, 2] > 0.2]
+    truth = MaterialBSDF(BRUSHED).eval(wi[: len(wo)], wo)
+    error = {
+        way: np.abs(replace(table, reconstruction=way).eval(wi[: len(wo)], wo) - truth).sum() / truth.sum()
+        for way in ("half_vector", "quadrilinear")
+    }
+    assert error["half_vector"] < 0.03 < 0.2 < error["quadrilinear"]
+
+
+def test_quadrilinear_keeps_a_retro_reflector() -> None:
+    """A bump towards the light stays where it was measured; aligning on the half vector would move it."""
+    from lambent.materials.measured.synthetic import record
+
+    def retro(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        return np.exp(-(np.arccos(np.sum(wi * wo, axis=1).clip(-1, 1)) ** 2) / 0.3)[:, None]
+
+    table = record(retro, "retro", replace(ISOTROPIC, sector_deg=0, step_deg=5, **CLEAN))
+    wi = direction(np.radians(np.array([26.0, 40, 54])), 0.0)
+    wo = direction(np.radians(np.array([20.0, 30, 60])), 0.1)
+    aligned = replace(table, reconstruction="quadrilinear").eval(wi, wo)
+    np.testing.assert_allclose(aligned, retro(wi, wo), rtol=0.1)
+    assert np.abs(table.eval(wi, wo) - retro(wi, wo)).max() > 2 * np.abs(aligned - retro(wi, wo)).max()
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "phi_i"),
+    [("quadrant", range(0, 91, 15)), ("half", range(0, 180, 15)), ("none", range(0, 360, 15))],
+)
+def test_symmetries_give_the_same_material(hemisphere, symmetry: str, phi_i: range) -> None:
+    setup = replace(ANISOTROPIC, symmetry=symmetry, phi_i_deg=tuple(phi_i), **CLEAN, step_deg=5, fine_deg=2.5)
+    table = synthesise(BRUSHED, setup)
+    wi, wo = hemisphere(2000, 1, 60), hemisphere(2000, 2, 75)
+    truth = MaterialBSDF(BRUSHED).eval(wi, wo)
+    assert np.abs(table.eval(wi, wo) - truth).sum() / truth.sum() < 0.05
+
+
+def test_isotropic_table_turns_with_the_pair(hemisphere) -> None:
+    table = synthesise(GLOSSY, replace(ISOTROPIC, step_deg=5, fine_deg=5))
+    wi, wo = hemisphere(100, 1), hemisphere(100, 2)
+    c, s = np.cos(1.1), np.sin(1.1)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    np.testing.assert_allclose(table.eval(wi @ turn.T, wo @ turn.T), table.eval(wi, wo), rtol=1e-6, atol=1e-9)
+
+
+def test_half_a_turn_of_an_isotropic_table_is_mirrored(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    rows = "".join(f"20 0 {t} {p} {0.1 + p / 1000}\n" for t in (0, 30, 60) for p in (0, 60, 120, 180))
+    path.write_text(f"# symmetry: isotropic\ntheta_i phi_i theta_o phi_o f\n{rows}")
+    table = load(path)
+    wi, wo = direction(np.radians(20), 0.0), direction(np.radians(30), np.radians(np.array([60.0, 300.0])))
+    quadrilinear = replace(table, reconstruction="quadrilinear")
+    np.testing.assert_allclose(quadrilinear.eval(np.broadcast_to(wi, (2, 3)), wo)[:, 0], 0.16)
+
+
+def test_noise_is_seeded_and_of_the_stated_size() -> None:
+    setup = replace(ISOTROPIC, floor=0.0, noise=0.05, step_deg=5)
+    first, again, other = (synthesise(GLOSSY, replace(setup, seed=s)).samples() for s in (1, 1, 2))
+    np.testing.assert_array_equal(first.f, again.f)
+    assert (first.f != other.f).any()
+    ratio = first.f / MaterialBSDF(GLOSSY).eval(first.wi, first.wo)
+    assert ratio.std() == pytest.approx(0.05, rel=0.05) and ratio.mean() == pytest.approx(1, abs=0.002)
+
+
+def test_sector_hides_what_is_near_the_lamp() -> None:
+    table = synthesise(GLOSSY, replace(ISOTROPIC, sector_deg=8))
+    sheet = table.reflected[3][0]
+    wo = direction(*np.radians(np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij")))
+    near = wo @ direction(np.radians(33), 0.0) > np.cos(np.radians(8))
+    np.testing.assert_array_equal(np.isnan(sheet.f).all(axis=-1), near)
+    assert near.any()
+
+
+def test_outgoing_grid_is_closer_at_the_mirror_direction() -> None:
+    theta, phi = outgoing_grid(47, 0, ISOTROPIC)
+    assert np.diff(theta)[(theta[:-1] > 40) & (theta[:-1] < 53)].max() <= 1.0 + 1e-9
+    assert np.diff(phi)[np.abs(phi[:-1] - 180) < 8].max() * np.sin(np.radians(47)) <= 1.0 + 1e-3
+    assert np.diff(theta).max() <= 2.5 and np.diff(phi).max() <= 2.5
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("theta_i phi_i theta_o phi_o\n0 0 0 0\n", "do not say what they hold"),
+        ("theta_i phi_i theta_o phi_o value\n0 0 0 0 1\n", "do not say what they hold"),
+        ("theta_i phi_i theta_o phi_o f_r f_g\n0 0 0 0 1 1\n", "do not say what they hold"),
+        ("theta_i phi_i theta_o phi_o p\n", "no rows"),
+        ("theta_i phi_i theta_o phi_o p\n# only this\n", "no rows"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 x\n", "row is broken"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 10\n", "row is broken"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1 2\n", "number of columns"),
+        ("theta_i phi_i theta_o phi_o p\n95 0 0 0 1\n", "outside its range"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 200 0 1\n", "outside its range"),
+        ("theta_i phi_i theta_o phi_o p\n0 nan 20 0 1\n", "outside its range"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 nan\n", "no value was measured"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 -3\n", "no measured value"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 10 0 1\n0 0 10 50 1\n", "do not form a grid"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 0 0 0 1\n", "do not form a grid"),
+        ("theta_i phi_i theta_o phi_o p\n0 0 0 0 1\n20 40 0 0 1\n", "do not form a grid"),
+        ("# symmetry: isotropc\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n", "did you mean 'isotropic'"),
+        ("# symmetry: quadrant\ntheta_i phi_i theta_o phi_o p\n0 0 0 0 1\n0 100 0 0 1\n", "more than the symmetry"),
+    ],
+)
+def test_broken_files(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "a"
+    path.write_text(text)
+    with pytest.raises(UserError, match=expected):
+        load(path)
+
+
+def test_impossible_setups() -> None:
+    for change in ({"theta_i_deg": (0, 95)}, {"fine_deg": 9.0}, {"phi_i_deg": (0.0, 90.0)}, {"theta_i_deg": (20, 10)}):
+        with pytest.raises(UserError):
+            replace(ISOTROPIC, **change)
