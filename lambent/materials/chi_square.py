@@ -20,6 +20,7 @@ Function = Callable[[Floats], Floats]  # (..., 3) directions -> (...) or (..., m
 CHUNK = 1 << 18
 LEAST_EXPECTED = 5.0  # cells below this many expected samples are pooled: the statistic is not chi-square there
 HIDDEN_PEAK = 4.0  # a pilot this many times above the mean of its cell: the nodes have missed something
+FEW_PILOTS = 32  # cells with fewer are steered by the samples too, so that the edge of a narrow lobe is not missed
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
@@ -52,14 +53,14 @@ def chi_square(sample: Function, density: Function, *, samples: int = 1_000_000,
     pilot = sample(rng.random((samples // 16, 3)))
     cells = adapted_cells(pilot)
     observed = np.zeros(len(cells) + 1)
-    no_pilot = np.bincount(_cell_of(pilot, cells), minlength=len(cells) + 1) == 0
+    few_pilots = np.bincount(_cell_of(pilot, cells), minlength=len(cells) + 1) < FEW_PILOTS
     steering, left = [pilot], samples
     while left:
         w = sample(rng.random((min(left, CHUNK), 3)))
         left -= len(w)
         index = np.where((density(w) > 0) & (w[:, 2] != 0), _cell_of(w, cells), len(cells))
         observed += np.bincount(index, minlength=len(observed))
-        steering.append(w[no_pilot[index] & (index < len(cells))])
+        steering.append(w[few_pilots[index] & (index < len(cells))])
     shares = integrate_cells(density, cells, np.concatenate(steering))
     integral = float(shares.sum())
     expected = samples * np.append(shares, max(1 - integral, 0.0))

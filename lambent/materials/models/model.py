@@ -1,0 +1,109 @@
+"""What an analytic model is: named parameters with their bounds, and eval, sample and pdf on arrays.
+
+Conventions as everywhere: directions (..., 3) in the local frame, wi to the light, wo to the viewer, f in 1/sr without
+the cosine, one row of RGB per direction. A model is two-sided unless it says otherwise.
+
+The metadata of a parameter is written once, here, and feeds fitting bounds, validation, sliders and documentation.
+"""
+
+from __future__ import annotations
+
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError, did_you_mean
+
+Floats = NDArray[np.floating]
+Value = float | tuple[float, float, float]
+
+PROPERTIES: dict[str, str] = {
+    "reciprocal": "f does not change when wi and wo are swapped",
+    "sampled": "samples follow pdf, and the albedo by sampling is the albedo by quadrature",
+    "passive": "no direction returns more light than arrives, for any parameters within bounds",
+    "lossless": "with the parameters of `white` all light returns, from every direction",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One user-controlled variable. `rgb` parameters take one value per channel; `log` is how sliders and fits move."""
+
+    name: str
+    low: float
+    high: float
+    default: float
+    meaning: str
+    unit: str = "1"
+    scale: Literal["linear", "log"] = "linear"
+    rgb: bool = False
+
+    def checked(self, value: object) -> Value:
+        """`value` as float, or as RGB for an rgb parameter; a `UserError` where it is no number within the bounds."""
+        try:
+            numbers = np.asarray(value, float)
+        except (TypeError, ValueError):
+            numbers = np.array(np.nan)
+        shapes: list[tuple[int, ...]] = [(), (3,)] if self.rgb else [()]
+        if numbers.shape not in shapes or not np.all((numbers >= self.low) & (numbers <= self.high)):
+            kind = "a number or RGB" if self.rgb else "a number"
+            raise UserError(
+                self.meaning, field=self.name, got=value, expected=f"{kind} from {self.low:g} to {self.high:g}"
+            )
+        if self.rgb:
+            red, green, blue = (float(v) for v in np.broadcast_to(numbers, 3))
+            return red, green, blue
+        return float(numbers)
+
+
+class Model(ABC):
+    """A reflection model with its parameter values; subclasses name themselves and fill in the class variables."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]  # author, year, title, equations
+    parameters: ClassVar[tuple[Parameter, ...]]
+    white: ClassVar[Mapping[str, Value]]  # parameters that should reflect everything
+    known_deficiencies: ClassVar[Mapping[str, str]] = {}  # name in PROPERTIES -> why the model does not have it
+
+    def __init__(self, **values: object) -> None:
+        known = {p.name: p for p in self.parameters}
+        for given in values:
+            if given not in known:
+                hint = did_you_mean(given, known)
+                raise UserError(f"the {self.name} model has no such parameter", field=given, hint=hint)
+        self.values: dict[str, Value] = {n: p.checked(values.get(n, p.default)) for n, p in known.items()}
+
+    def number(self, name: str) -> float:
+        """Value of a scalar parameter."""
+        value = self.values[name]
+        assert isinstance(value, float), f"{name} is an RGB parameter"
+        return value
+
+    def rgb(self, name: str) -> Floats:
+        """Value (3,) of an RGB parameter."""
+        return np.asarray(self.values[name])
+
+    @abstractmethod
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr, without the cosine."""
+
+    @abstractmethod
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        """Density (...) in 1/sr of `sample` given wo; 0 where it never goes."""
+
+    @abstractmethod
+    def sample(self, wo: Floats, u: Floats) -> Floats:
+        """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1); rejected samples have wi.z = 0 or pdf 0."""
+
+    @classmethod
+    def shader(cls) -> str | None:
+        """WGSL of the model, from the file beside its own that ends in .wgsl; None where there is none."""
+        file = Path(inspect.getfile(cls)).with_suffix(".wgsl")
+        return file.read_text(encoding="utf-8") if file.is_file() else None

@@ -1,0 +1,87 @@
+"""The whole material as a mixture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF, components, selection, specular_only
+from lambent.materials.document import Lobe, Material
+from tests.tools.chi_square import assert_sampler
+from tests.tools.reciprocity import assert_reciprocal
+
+MIXTURES = {
+    "diffuse": Material(kd=0.5, kt_d=0.3),
+    "two lobes": Material(
+        kd=0.003,
+        lobes=(
+            Lobe(k=0.57, mx=0.0046, my=0.0267, r0=0.94, alpha=0.5),
+            Lobe(k=0.54, mx=0.013, my=0.1199, r0=0.84, alpha=0.38),
+        ),
+    ),
+    "foil": Material(
+        kd=0.3,
+        kt_d=0.1,
+        lobes=(
+            Lobe(k=0.78, mx=0.124, my=0.136, r0=0.029, alpha=0.5),
+            Lobe(k=0.67, mx=0.25, my=0.17, r0=0.75, alpha=0.6, side="transmission", distribution="ggx"),
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0, 130.0], ids=["normal", "oblique", "grazing", "from below"])
+@pytest.mark.parametrize("name", MIXTURES)
+def test_sampler_follows_its_density(name, theta_deg, tmp_path):
+    assert_sampler(MaterialBSDF(MIXTURES[name]), theta_deg, 200.0, tmp_path)
+
+
+@pytest.mark.parametrize("name", MIXTURES)
+def test_reciprocal(name):
+    assert_reciprocal(MaterialBSDF(MIXTURES[name]))
+
+
+def test_a_lobe_that_crosses_the_horizon_is_rejected():
+    """Its samples must not pass for those of the diffuse transmission on the far side (the estimate grew too bright)."""
+    bsdf = MaterialBSDF(Material(kt_d=0.5, lobes=(Lobe(mx=1.0, my=1.0, r0=0.9),)))
+    wo = np.tile(direction(np.radians(80), 0.0), (100_000, 1))
+    u = np.random.default_rng(0).random(wo.shape)
+    wi = bsdf.sample(wo, u)
+    from_lobe = u[:, 0] >= selection(components(wo), bsdf.material)[1]
+    rejected = from_lobe & (wi[:, 2] == 0)
+    assert rejected.mean() > 0.05 and not (from_lobe & (wi[:, 2] < 0)).any()
+    assert (bsdf.pdf(wi, wo)[rejected] == 0).all() and (bsdf.eval(wi, wo)[rejected] == 0).all()
+
+
+def test_no_lobe_is_left_unsampled_where_fresnel_vanishes_at_wo():
+    """r0 = 0 at normal incidence: F(wo.n) is 0, f is not."""
+    bsdf = MaterialBSDF(Material(lobes=(Lobe(mx=1.5, my=1.5, r0=0.0),)))
+    wo, wi = direction(0.0, 0.0), direction(1.2, 0.3)
+    assert bsdf.eval(wi, wo).min() > 0 and bsdf.pdf(wi, wo) > 0
+
+
+@pytest.mark.parametrize("name", MIXTURES)
+def test_selection_is_a_probability(name):
+    wo = direction(np.linspace(0, np.pi, 50), 0.3)
+    total = sum(selection(components(wo), MIXTURES[name]))
+    np.testing.assert_allclose(total, 1, rtol=1e-12)
+
+
+def test_black_material_is_black_and_finite():
+    bsdf = MaterialBSDF(Material())
+    wo = np.tile(direction(0.5, 0.0), (100, 1))
+    wi = bsdf.sample(wo, np.random.default_rng(0).random((100, 3)))
+    assert np.isfinite(wi).all() and (bsdf.pdf(wi, wo) == 0).all() and (bsdf.eval(wi, wo) == 0).all()
+
+
+def test_albedo_of_diffuse_is_its_coefficient():
+    material = Material(kd=(0.2, 0.4, 0.6), kt_d=0.1)
+    albedo = MaterialBSDF(material).albedo(direction(0.7, 0.1), samples=100_000)
+    np.testing.assert_allclose(albedo, [0.3, 0.5, 0.7], rtol=0.01)
+    assert not MaterialBSDF(specular_only(material)).albedo(direction(0.7, 0.1)).any()
+
+
+def test_float32_input_is_computed_in_float64():
+    wo, wi = direction(0.5, 0.0).astype(np.float32), direction(0.6, 3.0).astype(np.float32)
+    assert MaterialBSDF(MIXTURES["foil"]).eval(wi, wo).dtype == np.float64

@@ -1,0 +1,118 @@
+"""One lobe: sampler, density and value belong together, in every corner that is rendered."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials import lobes
+from lambent.materials.bsdf import MaterialBSDF, components
+from lambent.materials.check import RECIPROCITY_LIMIT, reciprocity_error
+from lambent.materials.document import Lobe, Material
+from tests.tools.chi_square import assert_sampler, sampler_test
+
+SHAPES = {
+    "isotropic": {"mx": 0.3, "my": 0.3},
+    "anisotropic": {"mx": 0.05, "my": 0.4, "alpha": 0.43},
+    "narrow": {"mx": 0.005, "my": 0.005, "alpha": 0.5},
+    "brushed": {"mx": 0.0068, "my": 0.0297},
+    "extreme": {"mx": 0.003, "my": 1.5},
+}
+LOBES = {
+    f"{name}-{distribution}-{side}": Lobe(side=side, distribution=distribution, r0=0.5, **shape)
+    for name, shape in SHAPES.items()
+    for distribution in ("beckmann", "ggx")
+    for side in ("reflection", "transmission")
+    if side == "reflection" or name in ("isotropic", "brushed")
+}
+
+
+def pairs(count=2000, seed=0):
+    rng = np.random.default_rng(seed)
+    u = rng.random((2, 2, count))
+    return [direction(np.arccos(2 * z - 1), 2 * np.pi * phi) for z, phi in u]
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0], ids=["normal", "oblique", "grazing"])
+@pytest.mark.parametrize("name", LOBES)
+def test_sampler_follows_its_density(name, theta_deg, tmp_path):
+    assert_sampler(MaterialBSDF(Material(lobes=(LOBES[name],))), theta_deg, 30.0, tmp_path)
+
+
+@pytest.mark.parametrize("name", LOBES)
+def test_reciprocal(name):
+    assert reciprocity_error(MaterialBSDF(Material(lobes=(LOBES[name],)))) < RECIPROCITY_LIMIT
+
+
+@pytest.mark.parametrize("name", LOBES)
+def test_weight_is_value_over_density(name):
+    lobe = LOBES[name]
+    wo, _ = pairs()
+    u = np.random.default_rng(1).random((2, len(wo)))
+    wo = components(wo)
+    wi = lobes.sample(wo, *u, lobe)
+    p = lobes.pdf(wi, wo, lobe)
+    got = np.stack(lobes.weight(wi, wo, lobe), axis=-1)
+    expected = np.stack(lobes.evaluate(wi, wo, lobe), axis=-1) * np.abs(wi[2] / np.where(p > 0, p, 1))[:, None]
+    assert (p > 0).mean() > 0.3
+    np.testing.assert_allclose(got, expected, rtol=1e-6)
+
+
+def test_a_pdf_wrong_by_two_per_cent_is_noticed_and_explained(tmp_path):
+    """The tool itself: the right pdf passes; 2 % too high, or roughness 2 % too wide, does not, and a picture says so."""
+    right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
+
+    class TooHigh(MaterialBSDF):
+        def pdf(self, wi, wo):
+            return 1.02 * super().pdf(wi, wo)
+
+    class TooWide(MaterialBSDF):
+        def pdf(self, wi, wo):
+            return MaterialBSDF(Material(lobes=(Lobe(mx=0.204, my=0.204),))).pdf(wi, wo)
+
+    assert sampler_test(right, 40, 0).p_value > 1e-3
+    for kind in (TooHigh, TooWide):
+        with pytest.raises(AssertionError, match="do not follow the density"):
+            assert_sampler(kind(right.material), 40, 0, tmp_path)
+        picture = tmp_path / "chi_square.png"
+        assert picture.stat().st_size > 10_000
+        picture.unlink()
+
+
+def test_values_by_hand():
+    """Normal incidence and exitance: f = r0 / (4 pi mx my); GGX has the same peak; transmission has 1 - r0."""
+    n = (0.0, 0.0, 1.0)
+    for distribution in ("beckmann", "ggx"):
+        lobe = Lobe(mx=0.1, my=0.2, r0=0.3, distribution=distribution)
+        assert lobes.evaluate(n, n, lobe)[0] == pytest.approx(0.3 / (4 * np.pi * 0.02))
+        across = lobe.model_copy(update={"side": "transmission"})
+        assert lobes.evaluate((0.0, 0.0, -1.0), n, across)[0] == pytest.approx(0.7 / (4 * np.pi * 0.02))
+        assert lobes.evaluate(n, n, across)[0] == 0
+
+
+def test_brushed_along_t_is_sharp_along_t():
+    """mx is the slope along t: off the peak in the t-n plane a lobe with small mx falls faster than in the b-n plane."""
+    lobe, n = Lobe(mx=0.05, my=0.3), (0.0, 0.0, 1.0)
+    along, across = (direction(0.3, phi) for phi in (0.0, np.pi / 2))
+    assert lobes.evaluate(tuple(along), n, lobe)[0] < 0.1 * lobes.evaluate(tuple(across), n, lobe)[0]
+
+
+def test_two_sided():
+    """A pair mirrored at the sheet scatters alike."""
+    wi, wo = pairs()
+    flip = np.array([1, 1, -1])
+    for lobe in LOBES.values():
+        above = lobes.evaluate(components(wi), components(wo), lobe)
+        below = lobes.evaluate(components(wi * flip), components(wo * flip), lobe)
+        np.testing.assert_array_equal(above, below)
+
+
+def test_density_of_half_vectors_integrates_to_one():
+    """The projected microfacet area, integral of D h_z, is 1 for both distributions."""
+    z = (np.arange(4000) + 0.5) / 4000
+    phi = (np.arange(400) + 0.5) / 400 * 2 * np.pi
+    h = direction(np.arccos(z)[:, None], phi[None, :])
+    for distribution in ("beckmann", "ggx"):
+        d = lobes.distribution(components(h), Lobe(mx=0.3, my=0.5, distribution=distribution))
+        assert (d * h[..., 2]).mean() * 2 * np.pi == pytest.approx(1, abs=1e-3)
