@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import os
+import shutil
+import sys
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -69,11 +74,20 @@ def choose_adapter() -> Any:
     UserError
         Where this machine has no adapter at all; names the package that mends it.
     """
+    _have_runtime_folder()
     adapters = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info.get("backend_type") != "OpenGL"]
     if not adapters:
         raise UserError("no graphics adapter found", expected="Vulkan, Metal or Direct3D 12", hint=MEND)
     order = ["DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU"]
     return min(adapters, key=lambda a: order.index(a.info["adapter_type"]) if a.info["adapter_type"] in order else 3)
+
+
+def _have_runtime_folder() -> None:
+    """A private folder for drivers, which complain on stderr where no login manager has made one."""
+    if sys.platform.startswith("linux") and not os.environ.get("XDG_RUNTIME_DIR"):
+        folder = tempfile.mkdtemp(prefix="lambent-")
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
 def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> Any:
