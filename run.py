@@ -10,15 +10,12 @@ system lacks; on Debian and Ubuntu it installs that, elsewhere it prints the one
 and need no network.
 """
 
-import contextlib
 import hashlib
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 HOME = Path(__file__).resolve().parent
@@ -42,9 +39,8 @@ def main(arguments):
         print(__doc__)
         return 0 if arguments[:1] in (["-h"], ["--help"]) else 2
     os.environ["PYTHONUTF8"] = "1"
-    with runtime_folder():
-        set_up(for_tests=arguments[0] == "test")
-        return tasks[arguments[0]](arguments[1:])
+    set_up(for_tests=arguments[0] == "test")
+    return tasks[arguments[0]](arguments[1:])
 
 
 def run_demo(arguments):
@@ -165,17 +161,6 @@ def first_known(names):
     return next((name for name in names if works(["apt-cache", "show", name])), names[0])
 
 
-@contextlib.contextmanager
-def runtime_folder():
-    """XDG_RUNTIME_DIR for graphics drivers, which complain where a login manager has not set it."""
-    if not sys.platform.startswith("linux") or os.environ.get("XDG_RUNTIME_DIR"):
-        yield
-        return
-    with tempfile.TemporaryDirectory(prefix="lambent-") as folder:
-        os.environ["XDG_RUNTIME_DIR"] = folder
-        yield
-
-
 def works(command):
     """Whether a command exists and succeeds, quietly."""
     try:
@@ -194,8 +179,6 @@ def say(text):
 
 
 if __name__ == "__main__":
-    if hasattr(signal, "SIGTERM"):
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that temporary folders go
     try:
         sys.exit(main(sys.argv[1:]))
     except Stop as stop:

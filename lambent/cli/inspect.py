@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,8 +31,7 @@ def command(
 
         check_writable(plot, (".png", ".pdf", ".svg"))
     facts = plain(inspector_of(file)(file, plot))
-    rows = [(name.replace("_", " "), _words(value)) for name, value in facts.items() if value not in ([], {}, None)]
-    show(facts, table(rows), json)
+    show(facts, table(list(_rows(facts))), json)
 
 
 def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
@@ -69,7 +68,6 @@ def inspect_material(file: str, plot: Path | None) -> Facts:
     """A material document: its numbers, its albedo, where it comes from."""
     import numpy as np
 
-    from lambent.cli.fit import parameters
     from lambent.core.frames import direction
     from lambent.materials.bsdf import MaterialBSDF
     from lambent.materials.document import load_material
@@ -82,7 +80,9 @@ def inspect_material(file: str, plot: Path | None) -> Facts:
     return {
         "is": "material",
         "name": material.name,
-        "parameters": "\n" + parameters(material),
+        "kd": material.kd,
+        "kt_d": material.kt_d,
+        **{f"lobe {number}": lobe.model_dump() for number, lobe in enumerate(material.lobes, 1)},
         "albedo": _at_angles(bsdf.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))),
         "source": {key: value for key, value in provenance.items() if value and not isinstance(value, dict | list)},
         "errors": provenance.get("errors"),
@@ -169,9 +169,21 @@ def _no_plot(file: str, plot: Path | None) -> None:
         raise UserError("only tables and materials are plotted", file=file, field="--plot")
 
 
+def _rows(facts: Facts, indent: str = "") -> Iterator[tuple[str, str]]:
+    """(name, words) of every fact that says something; facts within facts are indented."""
+    for name, value in facts.items():
+        label = indent + name
+        if isinstance(value, dict) and value:
+            yield label, ""
+            yield from _rows(value, indent + "  ")
+        elif value not in ([], {}, None):
+            yield label, _words(value)
+
+
 def _words(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key}: {_words(item)}" for key, item in value.items())
     if isinstance(value, float):
         return f"{value:.4g}"
-    return ", ".join(map(_words, value)) if isinstance(value, list) else str(value)
+    if not isinstance(value, list):
+        return str(value)
+    nested = any(isinstance(item, list) for item in value)
+    return ("; " if nested else " " if isinstance(value[0], float) else ", ").join(map(_words, value))

@@ -6,7 +6,10 @@ Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part
 
 from __future__ import annotations
 
+import errno
 import importlib
+import logging
+import os
 import pkgutil
 import sys
 from typing import Annotated
@@ -20,6 +23,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 
 INTERRUPTED = 130
+FAULTS_OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR}
 
 
 def build_app() -> typer.Typer:
@@ -47,6 +51,7 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code; faults of the user are one line on stderr."""
+    logging.basicConfig(format="lambent: %(message)s", level=logging.WARNING)
     try:
         code = build_app()(arguments or ["--help"], prog_name="lambent", standalone_mode=False) or 0
     except UserError as error:
@@ -56,8 +61,13 @@ def run(arguments: list[str]) -> int:
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:
-        sys.stdout = None  # whoever read the output is gone; so nothing is left to flush
+        # Whoever read the output is gone; what is left to flush at exit goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:
+        if error.errno not in FAULTS_OF_THE_DISK:
+            raise
+        return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
     if code == INTERRUPTED:
         sys.stderr.write("lambent: interrupted; what was finished is kept\n")
     return int(code)

@@ -95,7 +95,9 @@ def pictures(
     else:
         from lambent.realtime.device import open_device
         from lambent.realtime.frame import FrameState, Renderer
+        from lambent.realtime.integrators import integrator as named
 
+        named(integrator)  # an unknown one is said before the device is opened
         renderer = Renderer(open_device(), store)
         for text in renderer.missing:
             say(f"note: {text}")

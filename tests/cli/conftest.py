@@ -1,0 +1,48 @@
+"""Runs command lines in this process and captures what they print."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from lambent.cli.main import run
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def lambent(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    """`lambent("fit", path, ...)` gives the exit code, stdout and stderr."""
+
+    def call(*arguments: object) -> Outcome:
+        capfd.readouterr()
+        code = run([str(argument) for argument in arguments])
+        return Outcome(code, *capfd.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def refused(lambent: Callable[..., Outcome]) -> Callable[..., str]:
+    """Runs a command line that must be refused: code 2, nothing on stdout, exactly one line on stderr."""
+
+    def call(*arguments: object) -> str:
+        outcome = lambent(*arguments)
+        assert (outcome.code, outcome.out) == (2, ""), outcome
+        assert outcome.err.startswith("lambent: error: ") and outcome.err.count("\n") == 1, outcome.err
+        return outcome.err
+
+    return call

@@ -1,0 +1,211 @@
+"""Every command: its help, and one clear line for whatever a user gets wrong."""
+
+from __future__ import annotations
+
+import json
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent import __version__, cli
+from lambent.core.images import write_image
+from lambent.materials.document import Lobe, Material
+
+COMMANDS = sorted({info.name for info in pkgutil.iter_modules(cli.__path__)} - {"main", "console"})
+NEEDS_ARGUMENTS = [name for name in COMMANDS if name not in ("doctor", "demo")]
+PICTURE = np.random.default_rng(3).random((32, 48, 3)).astype(np.float32)
+
+
+@pytest.fixture
+def material(tmp_path: Path) -> Path:
+    Material(name="brass", kd=0.1, lobes=(Lobe(k=0.5, mx=0.1, my=0.2),)).save(tmp_path / "brass.json")
+    return tmp_path / "brass.json"
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> tuple[Path, Path]:
+    a, b = tmp_path / "a.png", tmp_path / "b.png"
+    write_image(a, PICTURE)
+    write_image(b, PICTURE * 0.9)
+    return a, b
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_an_example_and_json(lambent, command):
+    outcome = lambent(command, "--help")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert f"Example: lambent {command}" in outcome.out
+    assert "--json" in outcome.out or command in ("walk", "demo")
+
+
+def test_no_command_shows_help(lambent):
+    outcome = lambent()
+    assert outcome.code == 0 and all(name in outcome.out for name in COMMANDS)
+
+
+def test_version(lambent):
+    assert lambent("--version").out == f"{__version__}\n"
+
+
+@pytest.mark.parametrize("command", NEEDS_ARGUMENTS)
+def test_missing_argument(refused, command):
+    assert "Missing argument" in refused(command) or "Missing option" in refused(command)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_unknown_option(refused, command):
+    assert "No such option: --bogus" in refused(command, "--bogus")
+
+
+def test_unknown_command(refused):
+    assert "No such command 'fitt'" in refused("fitt")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit", "absent.bsdf"),
+        ("inspect", "absent.bsdf"),
+        ("check", "absent.json"),
+        ("bake", "absent.toml", "-o", "out.store"),
+        ("bake", "builtin:rom", "-o", "out.store"),
+        ("render", "absent.store", "-o", "a.png"),
+        ("walk", "absent.store"),
+        ("compare", "absent.png", "other.png"),
+        ("bench", "absent"),
+    ],
+)
+def test_what_does_not_exist(refused, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    refused(*arguments)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["fit", "inspect", "check"])
+@pytest.mark.parametrize("content", [b"", b"{", b"\x00" * 100, b"#?RADIANCE\n\n-Y 99999 +X 99999\n", b"v/1\x01\x02"])
+def test_garbage(refused, tmp_path, command, content):
+    (tmp_path / "garbage").write_bytes(content)
+    refused(command, tmp_path / "garbage")
+
+
+def test_every_truncation_of_a_material(refused, material):
+    data = material.read_bytes()
+    for length in range(0, len(data) - 2, 17):
+        material.write_bytes(data[:length])
+        refused("check", material)
+
+
+def test_truncated_pictures(refused, tmp_path):
+    for suffix in (".exr", ".hdr", ".png"):
+        whole, cut = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
+        write_image(whole, PICTURE)
+        data = whole.read_bytes()
+        for share in (0.1, 0.5, 0.9):
+            cut.write_bytes(data[: int(len(data) * share)])
+            refused("compare", whole, cut)
+            refused("inspect", cut)
+
+
+def test_truncated_measurements(refused, shared_data, tmp_path):
+    data = (shared_data / "measured/rgl/paper_white_rgb.bsdf").read_bytes()
+    for share in (0.01, 0.3, 0.999):
+        (tmp_path / "cut").write_bytes(data[: int(len(data) * share)])
+        refused("fit", tmp_path / "cut")
+        refused("inspect", tmp_path / "cut")
+
+
+def test_sizes_must_match(refused, pictures, tmp_path):
+    write_image(tmp_path / "c.png", PICTURE[:, :40])
+    assert "found 40x32; expected 48x32" in refused("compare", pictures[0], tmp_path / "c.png")
+
+
+def test_compare(lambent, pictures, tmp_path):
+    outcome = lambent("compare", *pictures, "-o", tmp_path / "d.png", "--json")
+    assert outcome.code == 0 and (tmp_path / "d.png").exists()
+    facts = outcome.json
+    assert facts["size"] == [48, 32] and 20 < facts["psnr_db"] < 40
+    assert facts["flip_mean"] <= facts["flip_worst_tile"]
+    same = lambent("compare", pictures[0], pictures[0], "--json").json
+    assert same["psnr_db"] is None and same["flip_worst_tile"] == 0
+    assert "inf dB" in lambent("compare", pictures[0], pictures[0]).out
+
+
+def test_wrong_suffix_is_said_before_the_work(refused, pictures, material):
+    refused("compare", *pictures, "-o", "d.txt")
+    refused("fit", material, "-o", "m.txt")
+    refused("inspect", material, "--plot", "p.txt")
+
+
+def test_check_passes_and_fails_by_exit_code(lambent, material):
+    good = lambent("check", material, "--json")
+    assert good.code == 0 and good.json["passed"]
+    Material(name="bright", kd=1.5).save(material)
+    bad = lambent("check", material)
+    assert bad.code == 1 and "not passed" in bad.out
+
+
+def test_inspect_material_and_plot(lambent, material, tmp_path):
+    facts = lambent("inspect", material, "--plot", tmp_path / "p.png", "--json").json
+    assert facts["is"] == "material" and facts["lobe 1"]["my"] == 0.2
+    assert (tmp_path / "p.png").stat().st_size > 10_000
+    assert "mx" in lambent("inspect", material).out
+
+
+def test_inspect_scene(lambent):
+    facts = lambent("inspect", "builtin:box", "--json").json
+    assert facts["is"] == "scene" and facts["objects"] == 8 and facts["cameras"]
+
+
+def test_fit_writes_a_material_that_check_takes(lambent, shared_data, tmp_path):
+    file = shared_data / "measured/cornell/garnet_red.brdf"
+    facts = lambent("fit", file, "-o", tmp_path / "m.json", "--json").json
+    assert set(facts["errors"]) == {"l1", "l2_ngan", "cuberoot", "log"}
+    assert all(facts["errors"][name] <= facts["lambertian_errors"][name] for name in ("cuberoot", "log"))
+    assert json.loads((tmp_path / "m.json").read_text()) == facts["material"]
+    text = lambent("fit", file, "--fix", "r0=0.05")
+    assert "0.0500 0.0500 0.0500  reflectance at normal incidence" in text.out
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [(("--fix", "q=1"), "unknown parameter"), (("--fix", "mx"), "name=value"), (("--range", "mx=2:1"), "empty range"),
+     (("--lobes", "9"), "1 to 4"), (("--metric", "l2"), "unknown metric"), (("--method", "x"), "--method")],
+)  # fmt: skip
+def test_fit_options(refused, shared_data, options, word):
+    assert word in refused("fit", shared_data / "measured/cornell/garnet_red.brdf", *options)
+
+
+def test_an_interruption_is_one_line_and_130(lambent, monkeypatch, material):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lambent.materials.check.check", interrupt)
+    outcome = lambent("check", material)
+    assert (outcome.code, outcome.out) == (130, "")
+    assert outcome.err == "lambent: interrupted; what was finished is kept\n"
+
+
+def test_a_full_disk_is_one_line(lambent, monkeypatch, pictures, tmp_path):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("lambent.core.images.write_image", full)
+    outcome = lambent("compare", *pictures, "-o", tmp_path / "d.png")
+    assert (outcome.code, outcome.err) == (2, "lambent: error: output: cannot be written (No space left on device)\n")
+
+
+def test_a_reader_that_leaves_is_no_error():
+    """`lambent ... | head -1`"""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lambent.cli.main", "inspect", "builtin:box"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.close()
+    assert b"Traceback" not in process.stderr.read()
+    process.stderr.close()
+    process.wait()

@@ -1,0 +1,85 @@
+"""Commands on a store: render without a bake, bake of what is quick, and what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.images import read_image
+from tests.viewer.small_store import write_small_store
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_small_store(tmp_path_factory.mktemp("cli") / "small.store")
+
+
+def test_still_in_every_format(lambent, store, tmp_path):
+    shown = {}
+    for suffix in ("png", "exr", "hdr"):
+        file = tmp_path / f"a.{suffix}"
+        outcome = lambent("render", store, "-o", file, "--size", "96x64", "--camera", "side", "--json")
+        assert outcome.code == 0 and outcome.json["frames"] == 1, outcome
+        shown[suffix] = read_image(file)
+        assert shown[suffix].shape == (64, 96, 3)
+    np.testing.assert_allclose(shown["hdr"], shown["exr"], rtol=0.02, atol=0.01)
+    assert shown["png"].mean() > 0.02
+
+
+def test_exposure_doubles_the_light_of_png_only(lambent, store, tmp_path):
+    for name, ev in (("dark.png", -2), ("bright.png", 0), ("dark.exr", -2), ("bright.exr", 0)):
+        lambent("render", store, "-o", tmp_path / name, "--size", "48x32", "--exposure", ev)
+    pictures = {p.name: read_image(p) for p in tmp_path.iterdir()}
+    assert pictures["dark.png"].mean() < 0.6 * pictures["bright.png"].mean()
+    np.testing.assert_array_equal(pictures["dark.exr"], pictures["bright.exr"])
+
+
+def test_film(lambent, store, tmp_path):
+    outcome = lambent("render", store, "-o", tmp_path / "a.mp4", "--size", "65x48", "--fps", 2, "--json")
+    assert outcome.code == 0, outcome
+    assert (outcome.json["frames"], outcome.json["width"]) == (6, 64)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("-o", "a.gif"), "expected .exr, .hdr, .png, .mp4"),
+        (("-o", "a.png", "--size", "10"), "expected WIDTHxHEIGHT"),
+        (("-o", "a.png", "--size", "0x5"), "expected WIDTHxHEIGHT"),
+        (("-o", "a.png", "--camera", "sied"), "did you mean 'side'?"),
+        (("-o", "a.png", "--path", "tour"), "a path makes a film"),
+        (("-o", "a.mp4", "--camera", "side"), "a film needs a path"),
+        (("-o", "a.mp4", "--path", "tuor"), "did you mean 'tour'?"),
+        (("-o", "a.png", "--integrator", "ring"), "did you mean 'rings'?"),
+        (("-o", "a.png", "--samples", "0"), "--samples"),
+        (("-o", "a.png", "--integrator", "path"), "name it with --scene"),
+    ],
+)
+def test_render_options(refused, store, tmp_path, monkeypatch, options, word):
+    monkeypatch.chdir(tmp_path)
+    assert word in refused("render", store, *options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_inspect_tells_a_damaged_chunk(lambent, tmp_path):
+    store = write_small_store(tmp_path / "s")
+    chunk = next(p for p in (store / "light_map/irradiance/c").rglob("*") if p.is_file())
+    chunk.write_bytes(b"damaged")
+    arrays = lambent("inspect", store, "--json").json["arrays"]
+    assert arrays["light_map/irradiance"].endswith("chunk is damaged")
+    assert arrays["geometry/faces"].endswith("complete")
+
+
+def test_bake_of_the_geometry(lambent, tmp_path):
+    outcome = lambent("bake", "builtin:box", "-o", tmp_path / "s", "--only", "geometry", "--json")
+    assert outcome.code == 0, outcome
+    assert outcome.json["arrays"]["geometry/faces"] == "complete"
+    assert lambent("inspect", tmp_path / "s", "--json").json["is"] == "store"
+
+
+def test_bake_into_a_folder_that_is_something_else(refused, tmp_path):
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert "not a store" in refused("bake", "builtin:box", "-o", tmp_path, "--only", "geometry")
