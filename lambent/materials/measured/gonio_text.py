@@ -20,9 +20,9 @@ import numpy as np
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.files import atomic_path, read_bytes
 from lambent.core.frames import Floats
-from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheet, Symmetry
+from lambent.materials.measured.gonio import FORMAT, PHI_I_RANGE_DEG, GonioTable, Sheet, Symmetry
 
-NAME = "gonio text (columns theta_i phi_i theta_o phi_o and f, f_cos or p)"
+NAME = FORMAT
 LIMIT_BYTES = 1 << 30
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
 Quantity = Literal["f", "f_cos", "p"]
