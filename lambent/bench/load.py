@@ -7,12 +7,12 @@ with its frame; `walk` is a window that closes after one frame and needs a displ
 
 from __future__ import annotations
 
+import json
 import os
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +26,19 @@ RUNS = 5
 SIZE, QUICK_SIZE = (1680, 1050), (640, 400)
 TIMEOUT_S = 300
 
+_TIMED = """
+import json, subprocess, sys, time
+began = time.perf_counter()
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
+seconds = time.perf_counter() - began
+try:
+    import resource
+    peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+except ImportError:
+    peak_mb = None
+print(json.dumps([seconds, peak_mb]))
+sys.exit(code)
+"""
 _WALK = "import sys; from lambent.viewer.app import run; run(sys.argv[1], size=({0}, {1}), frames=1)"
 _GPU = """
 import sys
@@ -37,8 +50,7 @@ from lambent.store.store import Store
 store = Store.open(sys.argv[1])
 renderer = Renderer(open_device(), store)
 renderer.display_image(FrameState(scene_record(store).cameras[0], {0}, {1}))
-counts = wgpu.diagnostics.object_counts.get_dict()
-print("bytes", sum(kind.get("resource_mem") or 0 for kind in counts.values()))
+print("bytes", wgpu.diagnostics.object_counts.get_dict()["total"]["resource_mem"])
 """
 
 
@@ -60,23 +72,13 @@ def run(quick: bool, inputs: Sequence[Path], progress: Progress) -> dict[str, An
 
 def timed(command: list[str]) -> tuple[float, float | None]:
     """(seconds, peak resident memory in MB or None where the system does not tell) of one process."""
-    began = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    assert process.stderr is not None
-    complaint = process.stderr.read()
-    if hasattr(os, "wait4"):
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        peak_mb = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    else:
-        process.wait()
-        peak_mb = None
-    seconds = time.perf_counter() - began
-    process.stderr.close()
-    if process.returncode != 0:
-        last = complaint.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"code {process.returncode}"]
+    # Through a small process of its own: a child's peak starts at what its parent held when it was forked.
+    done = subprocess.run([sys.executable, "-c", _TIMED, *command], capture_output=True, text=True, timeout=TIMEOUT_S)
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or [f"code {done.returncode}"]
         raise UserError(f"command failed ({last[0]})", field=" ".join(command[2:5]))
-    return seconds, peak_mb
+    seconds, peak = json.loads(done.stdout.splitlines()[-1])
+    return seconds, peak
 
 
 def _commands(store: Path, frame: Path, size: tuple[int, int]) -> dict[str, list[str]]:
