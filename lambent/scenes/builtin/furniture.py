@@ -8,7 +8,7 @@ from lambent.scenes.builtin.parts import POLISHED_SCALE, block, thing
 from lambent.scenes.geometry import box, cushion, cylinder, lathe, patch, placed, sphere, tube, turn
 from lambent.scenes.scene import Mesh, SceneObject
 
-TABLE_HIGH, SIDEBOARD_HIGH, PLINTH_HIGH = 0.74, 0.72, 0.78
+TABLE_HIGH, SIDEBOARD_HIGH, PLINTH_HIGH, SHELF_HIGH = 0.74, 0.72, 0.78, 0.773
 
 
 def table() -> list[SceneObject]:
@@ -145,7 +145,7 @@ def shelf() -> list[SceneObject]:
         block((0.525, 0.0, -0.3), (0.55, 0.75, -0.001), 0.002),
         block((-0.527, 0.05, -0.298), (0.527, 0.075, -0.002), 0.002),
         block((-0.527, 0.38, -0.298), (0.527, 0.405, -0.002), 0.002),
-        block((-0.551, 0.748, -0.302), (0.551, 0.773, 0.0), 0.002),
+        block((-0.551, 0.748, -0.302), (0.551, SHELF_HIGH, 0.0), 0.002),
         block((-0.527, 0.06, -0.012), (0.527, 0.75, -0.003), 0.0),
     ]
     rng = np.random.default_rng(4)

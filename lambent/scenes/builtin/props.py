@@ -75,10 +75,20 @@ def pendant(hang: float) -> list[SceneObject]:
     radius = 0.15
     cap = [(0.0, radius + 0.045), (0.012, radius + 0.045), (0.03, radius + 0.03), (0.034, radius - 0.012)]
     return [
-        SceneObject("lamp_globe", sphere(radius, 48, 24), "lamp_glass", (1.0, 1.0, 1.0)),
+        thing("lamp_globe", "lamp_glass", sphere(radius, 48, 24)),
         thing("lamp_cap", "black_steel", lathe([cap[::-1]], 32, 4)),
         thing("lamp_cord", "black_steel", tube([(0, radius + 0.04, 0), (0, hang, 0)], 0.003, 8)),
         thing("lamp_canopy", "black_steel", placed(cylinder(0.05, 0.032, 32, 0.004), (0, hang - 0.03, 0))),
+    ]
+
+
+def shelf_lamp() -> list[SceneObject]:
+    """Small lamp: an opal globe on a turned foot, 0.35 m high."""
+    foot = [(0.055, 0.0), (0.055, 0.008), (0.02, 0.02), (0.012, 0.06), (0.012, 0.13), (0.03, 0.155)]
+    globe = placed(sphere(0.105, 40, 20), (0, 0.248, 0))
+    return [
+        thing("shelf_lamp_globe", "lamp_glass", globe),
+        thing("shelf_lamp_foot", "dark_oak", lathe([[(0, 0), foot[0]], foot, [foot[-1], (0.0, 0.155)]], 32, 3)),
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lambent.scenes.builtin import furniture, props
+from lambent.scenes.builtin.garden import garden
 from lambent.scenes.builtin.parts import at
 from lambent.scenes.builtin.shell import HEIGHT, X, Z, shell
 from lambent.scenes.geometry import turn
@@ -16,7 +17,7 @@ def room() -> list[SceneObject]:
     """Every object of the room, in world space."""
     table_x, _, table_z = TABLE
     on_table, on_sideboard = furniture.TABLE_HIGH, furniture.SIDEBOARD_HIGH
-    objects = [*shell(), *at(furniture.table(), TABLE)]
+    objects = [*shell(), *garden(), *at(furniture.table(), TABLE)]
     for name, x, z, yaw_deg in (
         ("chair_1", table_x - 0.62, table_z - 0.38, 86.0),
         ("chair_2", table_x - 0.56, table_z + 0.42, 94.0),
@@ -24,7 +25,7 @@ def room() -> list[SceneObject]:
         ("chair_4", table_x + 0.02, table_z - 1.06, 4.0),
     ):
         objects += at(furniture.chair(name), (x, 0.0, z), turn("y", yaw_deg))
-    objects += at([props.copper_teapot()], (table_x - 0.08, on_table, table_z - 0.28), turn("y", 200))
+    objects += at([props.copper_teapot()], (table_x - 0.08, on_table, table_z - 0.28), turn("y", -35))
     objects += at([props.vase("vase", "ceramic")], (table_x + 0.12, on_table, table_z + 0.12))
     objects += at(props.bowl(), (table_x - 0.1, on_table, table_z + 0.5))
     objects += at(props.pendant(HEIGHT - 1.75), (table_x, 1.75, table_z))
@@ -34,9 +35,13 @@ def room() -> list[SceneObject]:
     objects += at(furniture.plinth(), (1.75, 0.0, -2.45), turn("y", 20))
     objects += at(furniture.sideboard(), SIDEBOARD)
     objects += at([props.brushed_plate()], (-X, 1.42, SIDEBOARD[2]))
-    objects += at([props.vase("vase_small", "ceramic_blue", 0.7)], (-X + 0.2, on_sideboard, SIDEBOARD[2] - 0.62))
+    objects += at(
+        [props.vase("vase_small", "ceramic_blue", 0.7)], (-X + 0.2, on_sideboard - 0.0005, SIDEBOARD[2] - 0.62)
+    )
     objects += at(props.books_lying(), (-X + 0.22, on_sideboard, SIDEBOARD[2] + 0.55))
-    objects += at(furniture.screen(), (-1.35, 0.0, 1.95))
+    objects += at(furniture.screen(), (-1.35, 0.0, 2.38))
     objects += at(furniture.shelf(), (-1.35, 0.0, Z - 0.016))
-    objects += at([props.vase("vase_red", "ceramic_red", 1.15)], (-1.1, 0.7725, Z - 0.17))
+    on_shelf = furniture.SHELF_HIGH - 0.0005
+    objects += at([props.vase("vase_red", "ceramic_red", 1.15)], (-1.13, on_shelf, Z - 0.17))
+    objects += at(props.shelf_lamp(), (-1.62, on_shelf, Z - 0.17))
     return objects
