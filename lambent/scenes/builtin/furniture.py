@@ -53,9 +53,9 @@ def sofa() -> list[SceneObject]:
     ]
     piping = []
     for s in (-1, 1):
-        body.append(placed(cushion((0.845, 0.19, 0.74), 6.0, 8), (s * 0.42, 0.378, 0.09)))
+        body.append(placed(cushion((0.845, 0.19, 0.74), 6.0, 7), (s * 0.42, 0.378, 0.09)))
         lean = turn("x", -13)
-        body.append(placed(cushion((0.83, 0.46, 0.19), 5.0, 8), (s * 0.42, 0.665, -0.2), lean))
+        body.append(placed(cushion((0.83, 0.46, 0.19), 5.0, 7), (s * 0.42, 0.665, -0.2), lean))
         piping.append(placed(_piping(0.845, 0.74, 6.0), (s * 0.42, 0.378, 0.09)))
         piping.append(placed(_piping(0.83, 0.46, 5.0), (s * 0.42, 0.665, -0.2), lean @ turn("x", 90)))
     feet = [placed(cylinder(0.022, 0.13, 20, 0.003), (x, 0, z)) for x in (-0.96, 0.96) for z in (-0.37, 0.35)]
@@ -79,7 +79,7 @@ def _piping(wide: float, deep: float, exponent: float) -> Mesh:
     # The parameter of a superellipse that spreads points evenly enough round its corners.
     scale = 1 / (np.abs(u) ** exponent + np.abs(v) ** exponent) ** (1 / exponent)
     points = np.stack([u * scale * wide / 2, np.zeros_like(u), v * scale * deep / 2], axis=-1)
-    return tube(points, 0.006, 8, 2, closed=True)
+    return tube(points, 0.006, 6, 2, closed=True)
 
 
 def sideboard() -> list[SceneObject]:
@@ -114,7 +114,7 @@ def plinth() -> list[SceneObject]:
     seat = placed(tube(circle, cord, 16, 4, closed=True), (0, PLINTH_HIGH + cord - 0.001, 0))
     # The sphere touches the ring where their circles of radius `radius` and `cord` do.
     lift = PLINTH_HIGH + cord - 0.001 + np.sqrt((radius + cord) ** 2 - ring**2)
-    ball = placed(sphere(radius, 80, 40), (0, float(lift), 0))
+    ball = placed(sphere(radius, 72, 36), (0, float(lift), 0))
     return [
         thing("plinth", "plaster", base),
         thing("plinth_ring", "dark_oak", seat),
@@ -155,7 +155,7 @@ def shelf() -> list[SceneObject]:
         while x < 0.47:
             thick, tall, deep = rng.uniform(0.018, 0.045), rng.uniform(0.2, 0.28), rng.uniform(0.15, 0.21)
             colour = ("book_red", "book_blue", "book_ochre", "paper")[rng.integers(4)]
-            spines[colour].append(block((x, level - 0.0005, -0.03 - deep), (x + thick, level + tall, -0.03), 0.002))
+            spines[colour].append(block((x, level - 0.0005, -0.03 - deep), (x + thick, level + tall, -0.03)))
             x += thick + 0.0015
     return [
         thing("shelf", "oak", *boards),

@@ -17,7 +17,7 @@ COARSE = 0.05  # light map density of what is only seen from afar
 def garden() -> list[SceneObject]:
     """A half disc of ground before the east wall, closed by a hedge that hides the horizon."""
     trees = ((8.2, -4.6, 2.7, 1.35), (12.0, 3.4, 3.4, 1.8), (10.5, 8.5, 3.0, 1.5))
-    crowns = [placed(cushion((2 * r, 2.2 * r, 2 * r), 2.2, 8), (x, GROUND + y + 0.6, z)) for x, z, y, r in trees]
+    crowns = [placed(cushion((2 * r, 2.2 * r, 2 * r), 2.2, 4), (x, GROUND + y + 0.6, z)) for x, z, y, r in trees]
     trunks = [placed(cylinder(0.11, y, 12), (x, GROUND - 0.05, z)) for x, z, y, _ in trees]
     return [
         thing("terrace", "gravel", _ring(0.0, TERRACE), light_map_scale=COARSE),

@@ -20,10 +20,10 @@ from lambent.scenes.scene import Mesh, SceneObject
 
 
 def copper_teapot() -> SceneObject:
-    return thing("teapot", "copper", teapot(0.27, 12), light_map_scale=POLISHED_SCALE)
+    return thing("teapot", "copper", teapot(0.27, 11), light_map_scale=POLISHED_SCALE)
 
 
-def vase(name: str, material: str, scale: float = 1.0) -> SceneObject:
+def vase(name: str, material: str, scale: float = 1.0, around: int = 48, rows: int = 3) -> SceneObject:
     """Vase 0.32 m high at scale 1, with a foot, a lip and an inside."""
     outside = [(0.045, 0.006), (0.055, 0.03), (0.085, 0.09), (0.09, 0.15), (0.06, 0.22), (0.032, 0.265), (0.034, 0.3),
                (0.05, 0.32)]  # fmt: skip
@@ -31,7 +31,7 @@ def vase(name: str, material: str, scale: float = 1.0) -> SceneObject:
     inside = [(0.047, 0.321), (0.031, 0.3), (0.029, 0.266), (0.057, 0.219), (0.086, 0.149), (0.08, 0.09), (0.0, 0.02)]
     foot = [(0.0, 0.0), (0.042, 0.0)], [(0.042, 0.0), (0.045, 0.002), (0.045, 0.006)]
     profiles = [np.array(p) * scale for p in (*foot, outside, lip, inside)]
-    return thing(name, material, lathe(profiles, 48, 3))
+    return thing(name, material, lathe(profiles, around, rows))
 
 
 def bowl() -> list[SceneObject]:
@@ -41,7 +41,7 @@ def bowl() -> list[SceneObject]:
     inside = [(0.1265, 0.0855), (0.116, 0.052), (0.087, 0.025), (0.0, 0.014)]
     dish = lathe([[(0, 0), (0.043, 0)], [(0.043, 0), (0.045, 0.004)], outside, lip, inside], 48, 4)
     fruit = [
-        placed(sphere(0.039, 28, 16), (0.05 * np.cos(a), 0.06, 0.05 * np.sin(a))) for a in np.radians((80, 200, 320))
+        placed(sphere(0.039, 24, 12), (0.05 * np.cos(a), 0.06, 0.05 * np.sin(a))) for a in np.radians((80, 200, 320))
     ]
     return [thing("bowl", "ceramic", dish), thing("oranges", "orange_peel", *fruit)]
 

@@ -36,12 +36,12 @@ def room() -> list[SceneObject]:
     objects += at(furniture.sideboard(), SIDEBOARD)
     objects += at([props.brushed_plate()], (-X, 1.42, SIDEBOARD[2]))
     objects += at(
-        [props.vase("vase_small", "ceramic_blue", 0.7)], (-X + 0.2, on_sideboard - 0.0005, SIDEBOARD[2] - 0.62)
+        [props.vase("vase_small", "ceramic_blue", 0.7, 40, 2)], (-X + 0.2, on_sideboard - 0.0005, SIDEBOARD[2] - 0.62)
     )
     objects += at(props.books_lying(), (-X + 0.22, on_sideboard, SIDEBOARD[2] + 0.55))
     objects += at(furniture.screen(), (-1.35, 0.0, 2.38))
     objects += at(furniture.shelf(), (-1.35, 0.0, Z - 0.016))
     on_shelf = furniture.SHELF_HIGH - 0.0005
-    objects += at([props.vase("vase_red", "ceramic_red", 1.15)], (-1.13, on_shelf, Z - 0.17))
+    objects += at([props.vase("vase_red", "ceramic_red", 1.15, 40, 2)], (-1.13, on_shelf, Z - 0.17))
     objects += at(props.shelf_lamp(), (-1.62, on_shelf, Z - 0.17))
     return objects
