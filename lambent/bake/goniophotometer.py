@@ -23,15 +23,15 @@ from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, Evaluat
 _BROWN = {"type": "rgb", "value": [0.32, 0.14, 0.055]}
 
 SPECIMENS: dict[str, dict[str, Any]] = {
-    "rough copper": {"type": "roughconductor", "material": "Cu", "distribution": "ggx", "alpha": 0.15},
+    "rough copper": {"type": "roughconductor", "material": "Cu", "distribution": "beckmann", "alpha": 0.15},
     "brushed aluminium": {
         "type": "roughconductor",
         "material": "Al",
-        "distribution": "ggx",
-        "alpha_u": 0.25,
-        "alpha_v": 0.05,
+        "distribution": "beckmann",
+        "alpha_u": 0.05,
+        "alpha_v": 0.25,
     },
-    "varnished wood": {"type": "roughplastic", "distribution": "ggx", "alpha": 0.1, "diffuse_reflectance": _BROWN},
+    "varnished wood": {"type": "roughplastic", "distribution": "beckmann", "alpha": 0.1, "diffuse_reflectance": _BROWN},
     # A pane is two rough interfaces; the thin-sheet model of Burley 2015 is the one Mitsuba has that treats both at
     # once: light goes straight on, spread by both, and no solid angle is squeezed by a refraction. Known fault: at
     # oblique incidence the plugin cuts the far tail of its transmission lobe off (where wo.h changes sign); at this
@@ -45,7 +45,7 @@ SPECIMENS: dict[str, dict[str, Any]] = {
         "diff_trans": 1.0,
     },
 }
-"""Built-in specimens by name. The brushing direction of the aluminium is y: the highlight is wide along x."""
+"""Built-in specimens by name. The aluminium is brushed along x: its highlight is wide along y."""
 
 
 def measure(

@@ -64,13 +64,15 @@ def test_brushed_aluminium_is_anisotropic() -> None:
     assert not table.info.isotropic
     along, across = direction(np.radians(10), 0.0), direction(np.radians(10), np.pi / 2)
     normal = np.array([0, 0, 1.0])
-    assert (table.eval(normal, along) > 3 * table.eval(normal, across)).all()
+    assert (table.eval(normal, across) > 3 * table.eval(normal, along)).all()
 
 
 def test_noise_follows_the_seed() -> None:
     first, again, other = (measure("rough copper", incident=COARSE, seed=seed).samples().f for seed in (0, 0, 1))
     np.testing.assert_array_equal(first, again)
-    assert (first[: len(other)] != other[: len(first)]).mean() > 0.9
+    pairs = first[: len(other)], other[: len(first)]
+    lit = pairs[0] > 0.01  # in the tails both read nothing
+    assert (pairs[0] != pairs[1])[lit].mean() > 0.99
 
 
 def test_a_material_document_needs_no_path_tracer() -> None:
