@@ -99,7 +99,7 @@ def integrate_cells(
 
     Gauss-Legendre 4 x 4; a cell is halved across its longer side, up to `levels` times, while its halves disagree with
     it, or while it hides a peak: a value at a `pilot` direction (n, 3) far above the mean the nodes have seen. The
-    pilots only steer; they add nothing to the sum.
+    pilots only steer; they add nothing to the sum. A step elsewhere than at the horizon costs about 1e-3.
     """
     probe = _rule(function, cells)
     total, floor = np.zeros_like(probe), 0.02 * rtol * np.abs(probe).sum(axis=0) / len(cells)

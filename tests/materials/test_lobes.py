@@ -60,7 +60,7 @@ def test_weight_is_value_over_density(name):
 
 
 def test_a_pdf_wrong_by_two_per_cent_is_noticed_and_explained(tmp_path):
-    """The tool itself: the right pdf passes; 2 % too high, or roughness 2 % too wide, does not, and a picture says so."""
+    """The right pdf passes; 2 % too high, or a roughness 2 % too wide, does not, and a picture shows it."""
     right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
 
     class TooHigh(MaterialBSDF):
@@ -92,7 +92,7 @@ def test_values_by_hand():
 
 
 def test_brushed_along_t_is_sharp_along_t():
-    """mx is the slope along t: off the peak in the t-n plane a lobe with small mx falls faster than in the b-n plane."""
+    """mx is the slope along t: where it is small, the lobe falls faster in the t-n plane than in the b-n plane."""
     lobe, n = Lobe(mx=0.05, my=0.3), (0.0, 0.0, 1.0)
     along, across = (direction(0.3, phi) for phi in (0.0, np.pi / 2))
     assert lobes.evaluate(tuple(along), n, lobe)[0] < 0.1 * lobes.evaluate(tuple(across), n, lobe)[0]

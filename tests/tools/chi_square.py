@@ -66,6 +66,6 @@ def explain(test: ChiSquare, picture: Path) -> str:
     return (
         f"samples do not follow the density: chi-square {test.statistic:.0f} at {test.degrees} degrees of freedom, "
         f"p {test.p_value:.2g}; pdf integrates to {test.pdf_integral:.4f}, which leaves {1 - test.pdf_integral:.4f} to "
-        f"reject, and {test.rejected_share:.4f} were; worst cell cos theta {z0:.4f}..{z1:.4f}, phi {p0:.4f}..{p1:.4f}: {observed[worst]:.0f} observed, "
-        f"{expected[worst]:.1f} expected; see {picture}"
+        f"reject, and {test.rejected_share:.4f} were; worst cell cos theta {z0:.4f}..{z1:.4f}, "
+        f"phi {p0:.4f}..{p1:.4f}: {observed[worst]:.0f} observed, {expected[worst]:.1f} expected; see {picture}"
     )

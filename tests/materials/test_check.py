@@ -1,0 +1,130 @@
+"""The check finds what is wrong, names it, and passes what is right."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.frames import direction
+from lambent.materials import check as module
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.check import check, check_sampler, furnace, normalised
+from lambent.materials.document import Lobe, Material
+
+FOIL = Material(
+    kd=0.76,
+    lobes=(
+        Lobe(k=0.78, mx=0.124, my=0.136, r0=0.029, alpha=0.5),
+        Lobe(side="transmission", k=0.67, mx=0.25, my=0.17, r0=0.75, alpha=0.6),
+    ),
+)
+BRUSHED = Material(lobes=(Lobe(k=0.98, mx=0.0068, my=0.0297, r0=0.84, alpha=0.49),))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """One wo for the sampler: the failure that a test is about, without the other directions."""
+    monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+
+
+def test_a_published_metal_passes_and_the_report_is_json():
+    report = check(BRUSHED)
+    assert report.passed and not report.warnings and report.reciprocity_error < 1e-9
+    data = json.loads(json.dumps(report.to_json()))
+    assert data["passed"] and np.shape(data["furnace"]["albedo"]) == (24, 4, 3) and len(data["sampler"]) == 3
+
+
+def test_more_light_than_arrives_is_a_warning_with_its_angle(quick):
+    report = check(FOIL)
+    assert report.passed and "theta 89" in report.warnings[0] and report.furnace.highest[0] > 1.5
+
+
+def test_a_material_that_would_light_up_a_room_fails(quick):
+    report = check(Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),)))
+    assert not report.passed and "without bound" in report.failures[0]
+
+
+class NotReciprocal(MaterialBSDF):
+    def eval(self, wi, wo):
+        return super().eval(wi, wo) * (1 + 1e-3 * wi[..., 2:])
+
+
+class WrongPdf(MaterialBSDF):
+    def pdf(self, wi, wo):
+        return 1.02 * super().pdf(wi, wo)
+
+
+class LeavesAPartUnsampled(MaterialBSDF):
+    """Sampler and pdf agree with each other, but never go to the far side, where f is not 0."""
+
+    def __init__(self, material):
+        super().__init__(material)
+        self.near_side = MaterialBSDF(material.model_copy(update={"kt_d": (0.0, 0.0, 0.0)}))
+
+    def pdf(self, wi, wo):
+        return self.near_side.pdf(wi, wo)
+
+    def sample(self, wo, u):
+        return self.near_side.sample(wo, u)
+
+
+@pytest.mark.parametrize(
+    ("kind", "complaint"),
+    [(NotReciprocal, "not reciprocal"), (WrongPdf, "do not follow the density"), (WrongPdf, "by quadrature")],
+)
+def test_what_is_wrong_is_named(quick, kind, complaint):
+    report = check(kind(Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.2),))))
+    assert any(complaint in failure for failure in report.failures), report.failures
+
+
+def test_a_part_that_is_never_sampled_shows_in_the_two_albedos(quick):
+    report = check(LeavesAPartUnsampled(Material(kd=0.5, kt_d=0.2)))
+    assert any("by sampling" in failure for failure in report.failures), report.failures
+    assert not any("follow the density" in failure for failure in report.failures)
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 60.0, 88.0])
+def test_albedo_of_lambert_is_exact(theta_deg):
+    one = check_sampler(MaterialBSDF(Material(kd=0.5, kt_d=0.25)), theta_deg, 10.0, samples=100_000)
+    assert one.albedo_quadrature == pytest.approx(0.75, rel=1e-4) and one.pdf_integral == pytest.approx(1, abs=1e-4)
+
+
+def test_furnace_of_a_tight_mirror():
+    """A narrow lobe with alpha = 1/2 and r0 = 1 is a mirror: albedo 1 wherever the horizon cuts nothing off."""
+    result = furnace(Material(lobes=(Lobe(mx=0.005, my=0.005, r0=1, alpha=0.5),)))
+    below_85 = np.array(result.theta_deg) < 85
+    np.testing.assert_allclose(result.albedo[below_85], 1, atol=2e-3)
+
+
+@pytest.mark.parametrize("material", [FOIL, Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))])
+def test_normalised_does_not_exceed_one(material):
+    tame = normalised(material)
+    assert furnace(material).highest[0] > 1 >= furnace(tame).highest[0]
+    assert tame.kd == material.kd and [o.mx for o in tame.lobes] == [o.mx for o in material.lobes]
+    _, theta, phi = furnace(material).highest
+    assert check_sampler(MaterialBSDF(tame), theta, phi, samples=200_000).albedo_quadrature <= 1.002
+
+
+def test_normalised_leaves_alone_what_needs_nothing():
+    assert normalised(BRUSHED) is BRUSHED
+
+
+def test_normalised_refuses_diffuse_terms_over_one():
+    with pytest.raises(UserError, match="kd"):
+        normalised(Material(kd=0.8, kt_d=0.3))
+
+
+def test_the_check_is_deterministic_and_shows_progress(quick):
+    seen = []
+    first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))
+    assert first.to_json() == check(FOIL, seed=3).to_json()
+    assert seen[0][0] == 0 and seen[-1][0] == seen[-1][1]
+
+
+def test_from_below_is_as_from_above():
+    bsdf = MaterialBSDF(FOIL)
+    above, below = direction(0.6, 0.2), direction(np.pi - 0.6, 0.2)
+    np.testing.assert_allclose(bsdf.albedo(above, samples=50_000), bsdf.albedo(below, samples=50_000), rtol=0.02)

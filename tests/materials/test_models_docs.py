@@ -1,0 +1,56 @@
+"""The example in docs/adding-a-model.md works as it stands: discovered, sound, and its shader says the same."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials import models as package
+from tests.materials.test_models import HARNESS
+from tests.tools.shader_parity import assert_parity, run_wgsl
+
+PAGE = Path(__file__).parents[2] / "docs" / "adding-a-model.md"
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def phong(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    (folder / "phong.py").write_text(blocks("python")[0], encoding="utf-8")
+    (folder / "phong.wgsl").write_text(blocks("wgsl")[0], encoding="utf-8")
+    assert "phong" not in package.models()
+    package.__path__.append(str(folder))
+    yield package.model_named("phong")
+    package.__path__.remove(str(folder))
+    del sys.modules[f"{package.__name__}.phong"]
+
+
+@pytest.mark.parametrize("prop", HARNESS)
+def test_property(phong, prop):
+    if prop in phong.known_deficiencies:
+        with pytest.raises(AssertionError):
+            HARNESS[prop](phong)
+    else:
+        HARNESS[prop](phong)
+
+
+def test_shader_says_the_same(phong):
+    rng = np.random.default_rng(0)
+    z, phi = rng.uniform(-1, 1, (2, 5000)), rng.uniform(0, 2 * np.pi, (2, 5000))
+    wi, wo = direction(np.arccos(z), phi).astype(np.float32)
+    expected = phong(ks=1.0, exponent=8.0).eval(wi.astype(float), wo.astype(float))[:, 0]
+    got = run_wgsl(phong.shader(), "lambent_phong(wi, wo, 8.0)", {"wi": wi, "wo": wo})
+    assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
+
+
+def test_the_snippet_that_uses_it_runs(phong, capsys):
+    exec(compile(blocks("python")[1], str(PAGE), "exec"), {})
+    assert capsys.readouterr().out == "True\n"
