@@ -19,7 +19,7 @@ from lambent.store.contract import ObjectRecord, needs_probe
 
 Array = NDArray[np.floating]
 PIECE_FACES = 4000  # more per piece is slower, fewer cost seams
-PADDING_TEXELS = 3  # between charts: bilinear look-ups and one MIP level stay within a chart's own texels
+PADDING_TEXELS = 2  # between charts, so that a bilinear look-up stays within the texels of its own chart
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ Mask = NDArray[np.bool_]
 SHIFTS = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)]
 RINGS = 16  # texels grown by nearest neighbours; what is farther from any chart is never looked up
 
+RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
+
 
 def fill(values: Array, known: Mask, labels: NDArray[np.integer] | None = None) -> Array:
     """Grow known texels into unknown ones: (H, W, C) with no black left.
@@ -56,7 +58,10 @@ def denoise(irradiance: Array) -> Array:
     """A noisy light map (H, W, 3) without gutters, denoised by Open Image Denoise's light map filter."""
     import pyoidn
 
-    noisy = np.ascontiguousarray(irradiance, dtype=np.float32)
+    if not irradiance.any():
+        return irradiance  # the filter would scale up its own rounding
+    rim = ((RIM, RIM), (RIM, RIM), (0, 0))
+    noisy = np.ascontiguousarray(np.pad(irradiance, rim, mode="symmetric"), dtype=np.float32)
     clean = np.zeros_like(noisy)
     with pyoidn.Device() as device:
         device.commit()
@@ -68,4 +73,4 @@ def denoise(irradiance: Array) -> Array:
         error = device.get_error()
         if error is not None:
             raise RuntimeError(f"denoising failed: {error}")
-    return np.maximum(clean, 0.0)
+    return np.maximum(clean[RIM:-RIM, RIM:-RIM], 0.0)

@@ -16,6 +16,7 @@ from lambent.core.frames import normalize
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]
 POINTS = 4  # per texel
+PULL = 0.25  # texels
 CANDIDATES_AT_ONCE = 1 << 21  # (triangle, texel) pairs tested in one go: some 200 MB
 
 
@@ -40,6 +41,7 @@ def texels_of(geometry: dict[str, Array], width: int, height: int) -> Texels:
     """Surface points of all texels of a light map; `geometry` as in `atlas.merged`."""
     corners = geometry["uv2"][geometry["faces"]].astype(np.float64)  # (T, 3, 2)
     whole = _nearest(corners, width, height, reach=1.0)
+    _pull_inwards(whole, corners * (width, height))
     quarters = _nearest(corners, 2 * width, 2 * height, reach=0.0)
     index = np.flatnonzero(whole.face >= 0)
     row, column = index // width, index % width
@@ -54,6 +56,18 @@ def texels_of(geometry: dict[str, Array], width: int, height: int) -> Texels:
     face = np.where(missing, face[rows, found][:, None], face)
     weights = np.where(missing[..., None], weights[rows, found][:, None], weights)
     return Texels(width, height, index, face, *_surface(geometry, face, weights))
+
+
+def _pull_inwards(best: _Nearest, corners: Array) -> None:
+    """Move points that were clamped to an edge towards the triangle's middle, by PULL texels at most.
+
+    On the edge itself a ray would start in the plane of the neighbouring wall, and might miss it.
+    """
+    clamped = np.flatnonzero((best.face >= 0) & (best.distance > 0))
+    triangle, weights = corners[best.face[clamped]], best.weights[clamped]
+    to_middle = triangle.mean(axis=1) - np.einsum("ncx,nc->nx", triangle, weights)
+    share = np.minimum(PULL / np.maximum(np.linalg.norm(to_middle, axis=1), 1e-12), 1.0)[:, None]
+    best.weights[clamped] = weights * (1 - share) + share / 3
 
 
 def _surface(geometry: dict[str, Array], face: Indices, weights: Array) -> tuple[Array, Array, Array]:

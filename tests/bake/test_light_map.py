@@ -1,0 +1,87 @@
+"""The light map against scenes whose answer is known by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.bake.small_scenes import TINY, constant_picture, furnace, plane, room_with_step
+
+from lambent.bake.bake import bake
+from lambent.materials.document import Material
+from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, SceneObject
+from lambent.store.store import Store
+
+
+def known(store: Store, side: str = "raw") -> np.ndarray:
+    """Irradiance (K, 3) of the sampled texels, before filling and denoising."""
+    raw = store.read(f"light_map/{side}")
+    count = raw[..., 3].sum(axis=0)
+    return raw[..., :3].sum(axis=0)[count > 0] / count[count > 0][:, None]
+
+
+def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
+    store = bake(furnace(), tmp_path / "s", quality=TINY)
+    irradiance = known(store)
+    # 2300 texels of 64 samples of relative deviation below 1.
+    assert irradiance.mean() == pytest.approx(np.pi, rel=4e-3)
+    finished = store.read("light_map/irradiance").astype(float)
+    assert finished.min() > 0.9 * np.pi and finished.max() < 1.1 * np.pi, "no gutter is black"
+    assert 0 < store.artefact("light_map/irradiance").meta["noise"] < 0.2
+
+
+def test_plane_under_a_constant_sky_receives_pi(tmp_path: Path) -> None:
+    environment = ImageEnvironment(constant_picture(tmp_path, 2.0))
+    store = bake(replace(plane(), environment=environment), tmp_path / "s", quality=TINY)
+    assert np.allclose(store.read("light_map/irradiance"), 2 * np.pi, rtol=0.02)
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.6, 0.1])
+def test_plane_under_the_sun_receives_the_cosine(tmp_path: Path, cosine: float) -> None:
+    sun = DirectionalLight((np.sqrt(1 - cosine**2), -cosine, 0.0), (3.0, 2.0, 1.0))
+    store = bake(replace(plane(), lights=(sun,)), tmp_path / "s", quality=TINY)
+    assert np.allclose(known(store), np.array([3, 2, 1]) * cosine, rtol=1e-5)
+
+
+def test_plane_under_a_lamp_receives_the_inverse_square(tmp_path: Path) -> None:
+    lamp = PointLight((0.0, 1.0, 0.0), (4.0, 4.0, 4.0))
+    store = bake(replace(plane(), lights=(lamp,)), tmp_path / "s", quality=TINY)
+    assert known(store).max() == pytest.approx(4.0, rel=2e-3)
+    assert known(store).min() == pytest.approx(4 / 3**1.5, rel=0.1)  # the corner: r = sqrt 3, cos = 1/sqrt 3
+
+
+def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) -> None:
+    sun = DirectionalLight((0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+    paper = replace(plane(), materials={"black": Material(kt_d=0.4)}, lights=(sun,))
+    store = bake(paper, tmp_path / "s", quality=TINY)
+    assert not known(store).any()
+    assert np.allclose(known(store, "raw_back"), 1.0, rtol=1e-5)
+
+
+def test_opaque_objects_have_no_far_side(tmp_path: Path) -> None:
+    assert "light_map/irradiance_back" not in bake(plane(), tmp_path / "s", quality=TINY)
+
+
+def test_no_light_is_a_black_map(tmp_path: Path) -> None:
+    assert not bake(plane(), tmp_path / "s", quality=TINY).read("light_map/irradiance").any()
+
+
+def test_texels_within_a_solid_are_not_sampled_and_do_not_darken_their_neighbours(tmp_path: Path) -> None:
+    store = bake(room_with_step(), tmp_path / "s", quality=replace(TINY, light_map_texels=96))
+    raw = store.read("light_map/raw")
+    sampled = raw[..., 3].sum(axis=0) > 0
+    black = raw[..., :3].sum(axis=(0, 3))[sampled] == 0
+    assert black.mean() < 0.035, "only the underside of the block, outside the room"
+    assert store.read("light_map/irradiance").min() > 0.1
+
+
+def test_emission_of_many_objects_keeps_its_place(tmp_path: Path) -> None:
+    floor = plane().objects[0]
+    lamp = SceneObject("lamp", replace(floor.mesh, positions=floor.mesh.positions + [0, 1e-2, 0]), "black", (7, 0, 0))
+    upside_down = replace(
+        lamp, mesh=replace(lamp.mesh, normals=-lamp.mesh.normals, faces=lamp.mesh.faces[:, ::-1].copy())
+    )
+    store = bake(replace(plane(), objects=(floor, upside_down)), tmp_path / "s", quality=TINY)
+    assert known(store)[:, 0].max() == pytest.approx(7 * np.pi, rel=0.05)
