@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from lambent.cli.console import Json, plain, show, table
+from lambent.cli.console import Json, show, table
 from lambent.core.errors import UserError
+from lambent.core.plain import plain
 
 ALBEDO_AT_DEG = (0, 30, 60)
 HEAD_BYTES = 16
