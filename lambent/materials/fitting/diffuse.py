@@ -10,16 +10,19 @@ Floats = NDArray[np.floating]
 BIN = 0.02  # bin width in ln f: finer than the 2 % noise of a good gonio-photometer
 SMOOTH_BINS = 3.0  # standard deviation of the smoothing, in bins, so that noise does not split the peak
 FLOOR = 1e-4 / np.pi  # f of a diffuse coefficient of 1e-4; what lies below counts as none
+FLOOR_SHARE = 0.2  # of the mode's density: as much as may be left below it (table noise, a gonio-photometer's dark rim)
 LOWEST_SHARE = 0.25  # the mode is sought among the lowest quarter of the values, see `diffuse_mode`
 
 
 def diffuse_mode(f: Floats, weight: Floats) -> float:
     """kd (dimensionless) of one channel: pi times the value that most of the measured directions share.
 
-    The histogram is over ln f, because values span five decades and noise is relative to them; tuples count by `weight`,
-    so that a table sampled densely around its peak gives the same mode as an even one. Lobes only add to the diffuse
-    term, so no more than `LOWEST_SHARE` of the weight may lie below the mode: the plateau of a wide lobe is not mistaken
-    for it.
+    The histogram is over ln f, because values span five decades and noise is relative to them; tuples count by
+    `weight`, so that a table sampled densely around its peak gives the same mode as an even one. Lobes only add to the
+    diffuse term, so no more than `LOWEST_SHARE` of the weight may lie below the mode: the plateau of a wide lobe is not
+    mistaken for it. Where more than that share scatters nothing, kd is 0; fewer zeros than that (a channel clipped at
+    the edge of the gamut, sensor noise) say nothing about the mode. The density has to fall off below the
+    mode (`_is_floor`), otherwise kd is 0: the values of a lobe without a diffuse term spread evenly over ln f.
 
     Parameters
     ----------
@@ -30,17 +33,27 @@ def diffuse_mode(f: Floats, weight: Floats) -> float:
     """
     if len(f) == 0 or weight.sum() <= 0:
         return 0.0
-    log_f = np.log(np.maximum(f, FLOOR))
-    bins = np.floor((log_f - np.log(FLOOR)) / BIN).astype(np.int64)
-    share = np.bincount(bins, weights=weight / weight.sum())
+    weight = weight / weight.sum()
+    lit = f > FLOOR
+    dark_share = 1 - float(weight[lit].sum())
+    if dark_share > LOWEST_SHARE:
+        return 0.0
+    log_f, weight = np.log(f[lit] / FLOOR), weight[lit]
+    bins = np.floor(log_f / BIN).astype(np.int64)
+    share: Floats = np.bincount(bins, weights=weight).astype(np.float64)
     reach = int(4 * SMOOTH_BINS)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTH_BINS) ** 2)
     density = np.convolve(share, kernel / kernel.sum())[reach : reach + len(share)]
-    below = np.concatenate([[0.0], np.cumsum(share)[:-1]])
-    peak_width = reach  # half of the peak itself lies below its centre and does not count
-    below = np.concatenate([np.zeros(peak_width), below])[: len(below)]
+    below = dark_share + np.concatenate([np.zeros(reach + 1), np.cumsum(share)])[: len(share)]  # not counting the peak
     mode = int(np.argmax(np.where(below <= LOWEST_SHARE, density, 0.0)))
-    if mode == 0:
+    if not _is_floor(share, mode, float(density[mode])):
         return 0.0
     near = np.abs(bins - mode) <= 2 * SMOOTH_BINS
-    return float(np.pi * np.exp(np.average(log_f[near], weights=weight[near])))
+    return float(np.pi * FLOOR * np.exp(np.average(log_f[near], weights=weight[near])))
+
+
+def _is_floor(share: Floats, mode: int, peak: float) -> bool:
+    """Whether next to nothing lies below the mode: the mean density one to two and a half units of ln f below it."""
+    near, far = int(1 / BIN), int(2.5 / BIN)
+    below = share[max(mode - far, 0) : max(mode - near, 0)].sum() / (far - near)
+    return bool(below < FLOOR_SHARE * peak)

@@ -83,8 +83,8 @@ def fit(
 ) -> FitResult:
     """Fit a diffuse term and `lobes` lobes per side (3.6).
 
-    kd (and kt_d on the far side of a table that transmits) are read off the histogram, never searched; the coefficient of
-    a lobe is solved for each candidate; mx, my, r0 and alpha are searched and shared by the channels.
+    kd (and kt_d on the far side of a table that transmits) are read off the histogram, never searched; the coefficient
+    of a lobe is solved for each candidate; mx, my, r0 and alpha are searched and shared by the channels.
 
     Parameters
     ----------

@@ -2,9 +2,9 @@
 
 n equidistant values per free parameter; the best is kept; every interval shrinks to 1/(n - 1) of its extent around it;
 repeat. Three things keep it from getting stuck and make it practical on real tables:
-- r0 and alpha are bimodal, so the first level keeps the best of each of the four (low, high) combinations of the two and
-  each is refined on its own;
-- a best value on the face of a shrunken box moves the box instead of shrinking it further, a few times;
+- r0 and alpha are bimodal, so the first level keeps the best of each of the four (low, high) combinations of the two,
+  and each is refined on its own;
+- a best value on the face of a shrunken box moves the box before it shrinks further;
 - the first levels look at a small, importance-sampled share of the tuples, later ones at more (`Problem.thinned`).
 """
 
@@ -30,21 +30,25 @@ MU, NU, R0, ALPHA = range(4)
 
 @dataclass(frozen=True)
 class Level:
-    """One round: `n` values per parameter, judged on about `tuples` tuples."""
+    """One round: `n` values per parameter, judged on about `values` measured values (tuples times channels), `starts`
+    candidates refined."""
 
     n: int
-    tuples: int
+    values: int
+    starts: int
 
 
 SCHEDULE = (
-    Level(9, 1500),
-    Level(5, 3000),
-    Level(5, 6000),
-    *(Level(3, 20000),) * 3,
-    *(Level(3, 60000),) * 2,
+    Level(9, 4500, 4),
+    Level(5, 4500, 4),
+    Level(5, 9000, 2),
+    Level(3, 20000, 2),
+    Level(3, 20000, 2),
+    Level(3, 40000, 1),
+    Level(3, 80000, 1),
+    Level(3, 80000, 1),
 )
-MOVES = 25  # of a box at one level
-STARTS_KEPT = 2  # of the four, after the second level
+MOVES = 12  # of a box at one level
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class Candidate:
 
 
 class Best:
-    """The best candidate of the deepest level reached so far; what a cancelled search still has."""
+    """The best candidate of the deepest level finished so far; what a cancelled search still has."""
 
     def __init__(self) -> None:
         self.candidate: Candidate | None = None
@@ -72,8 +76,8 @@ def search(
     problem: Problem, box: Box, progress: Progress, best: Best, seed: int, schedule: tuple[Level, ...] = SCHEDULE
 ) -> Candidate:
     """Best lobe in `box`; `best` follows the search, so that it survives a `Cancelled` from `progress`."""
-    levels = [problem.thinned(level.tuples, seed) for level in schedule]
-    rounds = 1 + 4 * 1 + STARTS_KEPT * (len(schedule) - 2)
+    channels = len(problem.measured)
+    rounds = 1 + sum(level.starts for level in schedule[1:])
     done = 0
 
     def step(what: str) -> None:
@@ -82,18 +86,22 @@ def search(
         progress(min(done, rounds), rounds, what)
 
     progress(0, rounds, "search")
-    first = list(_evaluate(levels[0], box, *_axes(box.lo, box.hi, box, schedule[0].n)))
+    coarse = problem.thinned(schedule[0].values // channels, seed)
+    first = list(_evaluate(coarse, box, *_axes(box.lo, box.hi, box, schedule[0].n)))
     best.candidate = min(first, key=_total)
     step("coarse grid")
-    starts = [(start, (box.hi - box.lo) / (schedule[0].n - 1)) for start in _corners(first, box)]
+    starts: list[tuple[Candidate, Floats]] = [
+        (start, (box.hi - box.lo) / (schedule[0].n - 1)) for start in _corners(first, box)
+    ]
     for depth, level in enumerate(schedule[1:], start=1):
-        refined = []
-        for start, extent in starts:
-            refined.append(_refine(levels[depth], box, start, extent, level.n))
+        refined: list[tuple[Candidate, Floats]] = []
+        thinned = problem.thinned(level.values // channels, seed)
+        for start, extent in starts[: level.starts]:
+            refined.append(_refine(thinned, box, start, extent, level.n))
             step(f"level {depth + 1} of {len(schedule)}")
         refined.sort(key=lambda pair: pair[0].total)
         best.candidate = refined[0][0]
-        starts = refined[:STARTS_KEPT]
+        starts = refined
     return starts[0][0]
 
 
@@ -121,7 +129,7 @@ def _refine(problem: Problem, box: Box, start: Candidate, extent: Floats, n: int
         found = min(_evaluate(problem, box, *_axes(lo, hi, box, n)), key=_total)
         at_face = ((found.coordinates <= lo) & (lo > box.lo)) | ((found.coordinates >= hi) & (hi < box.hi))
         current = found
-        if not at_face[:4].any():
+        if not at_face.any():
             break
     return current, extent / (n - 1)
 
@@ -139,7 +147,7 @@ def _axes(lo: Floats, hi: Floats, box: Box, n: int) -> tuple[list[tuple[float, f
 def _evaluate(
     problem: Problem, box: Box, pairs: list[tuple[float, float]], r0: Floats, alpha: Floats
 ) -> Iterator[Candidate]:
-    """The best candidates: for each pair of slopes and each combination of r0 and alpha, with its solved coefficient."""
+    """Every combination of the pairs of slopes with r0 and alpha, each with its solved coefficient."""
     combined = np.array(list(product(r0, alpha)))
     fresnel = problem.fresnel(np.exp(combined[:, 0])).astype(problem.base.dtype)
     rest = fresnel * np.exp(-combined[:, 1:].astype(problem.base.dtype) * problem.log_cosines)

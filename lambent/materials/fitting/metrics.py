@@ -1,7 +1,7 @@
 """Error metrics between a measured table and a model, by name.
 
-Every metric is E = (mean over channels of sum_t w_t |T(c_t f_measured) - T(c_t f_model)|^p)^(1/p) over the tuples t that
-were measured: a weight w_t per tuple (its solid angle over the sum of all, so only ratios matter), a cosine c_t, a
+Every metric is E = (mean over channels of sum_t w_t |T(c_t f_measured) - T(c_t f_model)|^p)^(1/p) over the tuples t
+that were measured: a weight w_t per tuple (its solid angle over the sum of all, so only ratios matter), a cosine c_t, a
 transform T and a power p. The search needs these four parts, not only the sum; that is why they are named here.
 """
 

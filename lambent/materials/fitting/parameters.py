@@ -1,7 +1,7 @@
 """Names, ranges and the user's restrictions of what is fitted.
 
-Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From the second lobe of a side on
-the lobe's parameters carry its number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
+Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From the second lobe of a side
+on the lobe's parameters carry its number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
 """
 
 from __future__ import annotations
@@ -41,11 +41,10 @@ def from_search(coordinates: Floats) -> Floats:
 
 
 def parameter(side: Side, base: str, index: int = 0) -> str:
-    """The user's name of a lobe's parameter; `base` is one of `SHAPE` or "k", `index` counts lobes of the side from 0."""
-    if base == "k":
-        name = "ks" if side == "reflection" else "kt"
-    else:
-        name = base if side == "reflection" else f"t_{base}"
+    """The user's name of a lobe's parameter; `base` is in `SHAPE` or "k", `index` counts lobes of the side from 0."""
+    reflects = side == "reflection"
+    coefficient = "ks" if reflects else "kt"
+    name = coefficient if base == "k" else base if reflects else f"t_{base}"
     return name if index == 0 else f"{name}_{index + 1}"
 
 

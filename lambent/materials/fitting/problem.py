@@ -79,9 +79,9 @@ class Problem:
     def thinned(self, count: int, seed: int) -> Problem:
         """About `count` tuples that estimate the metric without bias.
 
-        Systematic sampling along the storage order: half of the density follows the metric's weight, half follows weight
-        times the transformed measurement, so that narrow peaks are met; each tuple's weight is divided by its density.
-        The same seed gives the same tuples.
+        Systematic sampling along the storage order: half of the density follows the metric's weight, half follows
+        weight times the transformed measurement, so that narrow peaks are met; each tuple's weight is divided by its
+        density. The same seed gives the same tuples.
         """
         if count >= len(self):
             return self.take(np.arange(len(self)), self.w)

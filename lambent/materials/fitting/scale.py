@@ -1,7 +1,7 @@
 """The linear coefficient of a lobe (ks, kt) or of a diffuse term, solved for instead of searched.
 
-For a candidate shape the model is background + k basis: one unknown per channel. Under L1 a weighted median is the exact
-minimiser; under the squared metrics Gauss-Newton steps in log k start from the linear solution.
+For a candidate shape the model is background + k basis: one unknown per channel. Under L1 a weighted median is the
+exact minimiser; under the squared metrics Gauss-Newton steps in log k start from the linear solution.
 """
 
 from __future__ import annotations

@@ -1,0 +1,83 @@
+"""Tuples of a table gathered by incident direction, as the plots show them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import angles, direction
+from lambent.materials.measured.protocol import MeasuredSamples
+
+Floats = NDArray[np.floating]
+
+MOST_ANGLES = 12  # more distinct angles than this are gathered in bins
+BIN_CENTRES_DEG = np.array([2.5, 15.0, 30.0, 45.0, 60.0, 75.0])
+BIN_HALF_WIDTH_DEG = 2.5
+ROUND_DEG = 1.0
+LEAST_TUPLES = 16
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """The tuples of one incident direction.
+
+    Attributes
+    ----------
+    theta_deg, phi_deg : float
+        Of wi; phi is 0 throughout an isotropic table, whose tuples are turned there.
+    wi : (3,)
+    wo : (N, 3)
+    f : (N, C) in 1/sr
+    weight : (N,)
+    """
+
+    theta_deg: float
+    phi_deg: float
+    wi: Floats
+    wo: Floats
+    f: Floats
+    weight: Floats
+
+    def albedo(self, far: bool) -> Floats:
+        """(C,) integral of f |cos theta_o| over the near or the far side; gaps are taken at the mean of the rest."""
+        here = (self.wo[:, 2] < 0) == far
+        if not here.any():
+            return np.zeros(self.f.shape[1])
+        cosine = self.weight[here] * np.abs(self.wo[here, 2])
+        return np.asarray(np.pi * (cosine @ self.f[here]) / cosine.sum())
+
+
+def incidences(samples: MeasuredSamples) -> list[Incidence]:
+    """One entry per incident direction, by theta then phi; few tuples (below 16) make none.
+
+    A table without incident directions of its own (MERL, Cornell) is gathered in bins of theta_i.
+    """
+    theta, phi = angles(samples.wi)
+    phi_o = angles(samples.wo)[1]
+    if samples.info.isotropic:
+        phi_o, phi = phi_o - phi, np.zeros_like(phi)
+    theta_o = np.arctan2(np.hypot(samples.wo[:, 0], samples.wo[:, 1]), samples.wo[:, 2])
+    wo = direction(theta_o, phi_o)
+    phi = np.where(theta < np.radians(ROUND_DEG) / 2, 0.0, phi) if samples.info.isotropic else phi
+    theta_key, phi_key = _keys(np.degrees(theta)), _keys(np.degrees(phi) % 360)
+    gathered = []
+    for theta_deg in np.unique(theta_key[theta_key >= 0]):
+        for phi_deg in np.unique(phi_key[(theta_key == theta_deg) & (phi_key >= 0)]):
+            here = (theta_key == theta_deg) & (phi_key == phi_deg)
+            if here.sum() >= LEAST_TUPLES:
+                wi = direction(np.radians(theta_deg), np.radians(phi_deg))
+                gathered.append(
+                    Incidence(float(theta_deg), float(phi_deg), wi, wo[here], samples.f[here], samples.weight[here])
+                )
+    return gathered
+
+
+def _keys(angle_deg: Floats) -> Floats:
+    """The angle a tuple is filed under: rounded where there are few; where there are many, its bin's centre or -1."""
+    rounded = np.round(angle_deg / ROUND_DEG) * ROUND_DEG
+    if len(np.unique(rounded)) <= MOST_ANGLES:
+        return rounded
+    nearest = BIN_CENTRES_DEG[np.argmin(np.abs(angle_deg[:, None] - BIN_CENTRES_DEG), axis=1)]
+    return np.where(np.abs(angle_deg - nearest) <= BIN_HALF_WIDTH_DEG, nearest, -1.0)

@@ -1,0 +1,245 @@
+"""Pictures of a fit beside its measurement (thesis figures 3.11, 3.12, 3.14): polar plots, in-plane curves, albedo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.files import atomic_path
+from lambent.core.frames import angles, direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Material
+from lambent.materials.fitting.incidence import Incidence, incidences
+from lambent.materials.measured.protocol import MeasuredSamples
+
+Floats = NDArray[np.floating]
+
+DISK_PIXELS = 96
+WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
+NEAR_TUPLE = 1.3  # a pixel shows a tuple no further away than this times the distance to its fourth neighbour
+PLANE_DEG = 3.0  # tuples this close to the plane of incidence belong to its curve
+MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
+COLUMNS = 4
+
+
+def save_plots(samples: MeasuredSamples, material: Material, folder: Path, stem: str = "fit") -> list[Path]:
+    """Write STEM_polar.png, STEM_in_plane.png and STEM_albedo.png into `folder`.
+
+    Raises
+    ------
+    UserError
+        Where a file cannot be written.
+    """
+    gathered = incidences(samples)
+    figures = {
+        "polar": polar_matrix(gathered, material, samples.info.transmits),
+        "in_plane": in_plane(gathered, material),
+        "albedo": albedo(gathered, material),
+    }
+    paths = []
+    for name, figure in figures.items():
+        path = Path(folder) / f"{stem}_{name}.png"
+        with atomic_path(path) as beside:
+            figure.savefig(beside, dpi=110)
+        paths.append(path)
+    return paths
+
+
+def _figure(width: float, height: float) -> Any:
+    """A figure of its own Agg canvas: no global state, no window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _cube_root(f: Floats, wo: Floats) -> Floats:
+    """(..., 3) brightness: the cube root of the transfer probability."""
+    p = np.cbrt(np.maximum(f, 0) * np.abs(wo[..., 2:]))
+    return np.asarray(np.broadcast_to(p, (*p.shape[:-1], 3)))
+
+
+def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: bool) -> Any:
+    """Figure: disks of measured and model brightness, rows theta_i and columns phi_i.
+
+    With one phi_i alone (isotropic tables) theta_i runs along the columns and the measurement stands above the model,
+    otherwise left of it; the far side stands below the near one, seen in the same azimuths. The source is at the top of
+    every disk (theta_o from the centre to the rim); the bars are the brushing direction, the axis along which the
+    fitted lobe is narrower.
+    """
+    thetas = sorted({entry.theta_deg for entry in gathered})
+    phis = sorted({entry.phi_deg for entry in gathered})
+    sides = (False, True) if transmits else (False,)
+    upright = len(phis) == 1
+    rows = len(sides) if upright else len(thetas) * len(sides)
+    columns = len(thetas) if upright else len(phis)
+    drawn = {(e.theta_deg, e.phi_deg, far): _disks(e, material, far) for e in gathered for far in sides}
+    known = np.concatenate([disk[np.isfinite(disk)] for pair in drawn.values() for disk in pair])
+    white = max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12)
+    size = 1.5 if upright else 1.05
+    if upright:
+        figure = _figure(columns * size + 1.2, 2 * rows * size + 1.3)
+        halves = figure.subfigures(2, 1)
+    else:
+        figure = _figure(2 * columns * size + 1.6, rows * size + 1.2)
+        halves = figure.subfigures(1, 2)
+    for which, (half, title) in enumerate(zip(halves, ("measured", "model"), strict=True)):
+        half.suptitle(title, fontsize=11)
+        axes = half.subplots(rows, columns, squeeze=False)
+        for ax in axes.flat:
+            ax.set_axis_off()
+        labelled = set()
+        for (theta_deg, phi_deg, far), pair in drawn.items():
+            across, down = (theta_deg, phi_deg) if upright else (phi_deg, theta_deg)
+            row = int(far) if upright else thetas.index(theta_deg) * len(sides) + int(far)
+            column = (thetas if upright else phis).index(across)
+            ax = axes[row, column]
+            _show_disk(ax, pair[which] / white, theta_deg, phi_deg, _brushing(material))
+            across_name, down_name = ("theta", "phi") if upright else ("phi", "theta")
+            if column == 0:
+                side = ("transmitted" if far else "reflected") if transmits else ""
+                text = side if upright else f"$\\{down_name}_i$ {down:g}°" + (f"\n{side}" if side else "")
+                ax.text(-1.3, 0, text, ha="right", va="center", fontsize=8, rotation=90 if upright else 0)
+            if across not in labelled and (upright or theta_deg > 0):
+                ax.set_title(f"$\\{across_name}_i$ {across:g}°", fontsize=8)
+                labelled.add(across)
+    _legend(figure, "cube root of the transfer probability", _brushing(material) is not None)
+    return figure
+
+
+def _legend(figure: Any, title: str, brushed: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], ls="", marker="o", ms=4, mfc=SOURCE, mec="black", mew=0.4, label="source")]
+    if brushed:
+        handles.append(Line2D([], [], color="0.4", lw=2, label="brushing direction"))
+    handles.insert(0, Line2D([], [], ls="", label=title))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8, frameon=False)
+
+
+def _brushing(material: Material) -> float | None:
+    """phi in degrees of the axis along which the first lobe is narrower; None for isotropic materials."""
+    if not material.lobes or material.lobes[0].mx == material.lobes[0].my:
+        return None
+    return 0.0 if material.lobes[0].mx < material.lobes[0].my else 90.0
+
+
+def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Floats]:
+    """Measured and model brightness, each (pixels, pixels, 3), NaN where nothing is known; the source is at the top."""
+    from scipy.spatial import cKDTree
+
+    steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
+    x, y = np.meshgrid(steps, -steps)
+    radius = np.hypot(x, y)
+    theta = np.where(radius < 1, radius, 1) * np.pi / 2
+    phi = np.arctan2(y, x) + np.radians(entry.phi_deg - 90)
+    wo = direction(np.pi - theta if far else theta, phi)
+    model = _cube_root(MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo), wo)
+    model = np.where(radius[..., None] < 1, model, np.nan)
+    here = (entry.wo[:, 2] < 0) == far
+    if here.sum() < 8:
+        return np.full_like(model, np.nan), model
+    points, first = np.unique(np.round(entry.wo[here], 6), axis=0, return_index=True)  # at theta_i = 0 phi_i repeats
+    tree = cKDTree(points)
+    even = np.sqrt(2 * np.pi / len(points))  # distance to a neighbour if the tuples lay evenly
+    spacing = np.maximum(tree.query(points, k=5)[0][:, -1], even)
+    distance, nearest = tree.query(wo.reshape(-1, 3))
+    known = (distance <= NEAR_TUPLE * spacing[nearest]).reshape(radius.shape) & (radius < 1)
+    values = _cube_root(entry.f[here][first], points)[nearest].reshape(model.shape)
+    return np.where(known[..., None], values, np.nan), model
+
+
+def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
+    unknown = np.isnan(image)
+    rgba = np.concatenate([np.clip(np.where(unknown, 0, image), 0, 1), ~unknown[..., :1]], axis=-1)
+    ax.imshow(rgba, extent=(-1, 1, -1, 1), interpolation="nearest")
+    rim = np.linspace(0, 2 * np.pi, 128)
+    ax.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
+    if brushing_deg is not None:
+        turned = np.radians(brushing_deg - phi_deg + 90)
+        for end in (turned, turned + np.pi):
+            ax.plot(
+                [1.02 * np.cos(end), 1.18 * np.cos(end)], [1.02 * np.sin(end), 1.18 * np.sin(end)], color="0.4", lw=2
+            )
+    ax.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
+    ax.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22), aspect="equal")
+
+
+def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
+    """Figure: the plane of incidence, one panel per theta_i for phi_i nearest 0 and 90 degrees; mean over channels.
+
+    theta_o is negative on the source's side; transmitted values are drawn over the angle from the far normal.
+    """
+    phis = sorted({entry.phi_deg for entry in gathered})
+    shown = sorted({min(phis, key=lambda p: abs(p - target)) for target in (0.0, 90.0)})
+    entries = [entry for phi in shown for entry in gathered if entry.phi_deg == phi]
+    rows = -(-len(entries) // COLUMNS)
+    figure = _figure(3.2 * COLUMNS, 2.3 * rows + 0.8)
+    axes = figure.subplots(rows, COLUMNS, squeeze=False)
+    for ax in axes.flat[len(entries) :]:
+        ax.set_axis_off()
+    for ax, entry in zip(axes.flat, entries, strict=False):
+        for far in (False, True) if material.transmits else (False,):
+            _curve(ax, entry, material, far)
+        ax.axvline(-entry.theta_deg, color=SOURCE, lw=1, label="source")
+        ax.set_title(f"$\\theta_i$ {entry.theta_deg:g}°, $\\phi_i$ {entry.phi_deg:g}°", fontsize=9)
+        ax.set(xlim=(-90, 90), xticks=[-90, -45, 0, 45, 90])
+        ax.set_ylim(bottom=0)
+        ax.tick_params(labelsize=7)
+    figure.supxlabel("$\\theta_o$ in the plane of incidence, degrees", fontsize=9)
+    figure.supylabel("cube root of the transfer probability, sr$^{-1/3}$", fontsize=9)
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), fontsize=8, frameon=False)
+    return figure
+
+
+def _curve(ax: Any, entry: Incidence, material: Material, far: bool) -> None:
+    theta, phi = angles(entry.wo)
+    off = (np.degrees(phi) - entry.phi_deg) % 360
+    ahead = np.abs(off - 180) <= 90
+    aside = np.sin(theta) * np.abs(np.sin(np.radians(off)))
+    here = (np.degrees(np.arcsin(np.clip(aside, 0, 1))) <= PLANE_DEG) & ((entry.wo[:, 2] < 0) == far)
+    from_normal = np.degrees(np.pi - theta if far else theta) * np.where(ahead, 1, -1)
+    order = np.argsort(from_normal[here])
+    p = (entry.f[here] * np.abs(entry.wo[here, 2:])).mean(axis=1)
+    side = ", transmitted" if far else ""
+    mark, line = ("^", "--") if far else (".", "-")
+    ax.plot(from_normal[here][order], np.cbrt(p[order]), mark, color=MEASURED, ms=3, label=f"measured{side}")
+    x = np.linspace(-89.5, 89.5, 359)
+    wo_theta = np.radians(np.abs(x))
+    wo = direction(np.pi - wo_theta if far else wo_theta, np.radians(entry.phi_deg + np.where(x > 0, 180, 0)))
+    f = MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo)
+    ax.plot(x, np.cbrt((f * np.abs(wo[:, 2:])).mean(axis=1)), line, color=MODEL, lw=1.2, label=f"model{side}")
+
+
+def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
+    """Figure: reflectivity (and transmissivity) over theta_i, mean over channels and phi_i."""
+    figure = _figure(6.4, 4.2)
+    ax = figure.subplots()
+    thetas = sorted({entry.theta_deg for entry in gathered})
+    x = np.linspace(0, 85, 18)
+    for far in (False, True) if material.transmits else (False,):
+        word = "transmitted" if far else "reflected"
+        measured = [np.mean([e.albedo(far) for e in gathered if e.theta_deg == theta]) for theta in thetas]
+        mark, line = ("^", "--") if far else ("o", "-")
+        ax.plot(thetas, measured, mark, color=MEASURED, label=f"measured, {word}")
+        one_side = _one_side(material, far)
+        wo = direction(np.radians(x)[:, None], np.radians([0.0, 45.0, 90.0])[None])
+        ax.plot(x, MaterialBSDF(one_side).albedo(wo).mean(axis=(1, 2)), line, color=MODEL, label=f"model, {word}")
+    ax.axhline(1, color="0.6", lw=0.8)
+    ax.set(xlabel="$\\theta_i$, degrees", ylabel="albedo", xlim=(0, 90))
+    ax.set_ylim(bottom=0)
+    figure.legend(loc="outside upper center", ncols=2, fontsize=8, frameon=False)
+    return figure
+
+
+def _one_side(material: Material, far: bool) -> Material:
+    lobes = material.transmission_lobes if far else material.reflection_lobes
+    dark = {"kd" if far else "kt_d": (0.0, 0.0, 0.0)}
+    return material.model_copy(update={"lobes": lobes, **dark})
