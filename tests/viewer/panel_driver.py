@@ -25,22 +25,11 @@ class PanelDriver:
         self.io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
         self.io.display_size = size
         layout.set_style()
-        for name in RECORDED:
-            monkeypatch.setattr(imgui, name, self._recording(getattr(imgui, name)))
+        recording(monkeypatch.setattr, self.rects)
         self.frame(2)
 
     def close(self):
         imgui.destroy_context(self._context)
-
-    def _recording(self, control):
-        @functools.wraps(control)
-        def recorded(label, *args, **kwargs):
-            result = control(label, *args, **kwargs)
-            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-            self.rects[label] = (low.x, low.y, high.x, high.y)
-            return result
-
-        return recorded
 
     def frame(self, count=1):
         for _ in range(count):
@@ -51,9 +40,7 @@ class PanelDriver:
             imgui.render()
 
     def point(self, label, along=0.5):
-        x0, y0, x1, y1 = self.rects[label]
-        width = imgui_control_width(x0, x1, label)
-        return x0 + along * width, (y0 + y1) / 2
+        return point_of(self.rects[label], along)
 
     def move(self, x, y):
         self.io.add_mouse_pos_event(x, y)
@@ -82,10 +69,30 @@ class PanelDriver:
         self.frame()
 
 
-def imgui_control_width(x0, x1, label):
-    """An item's rectangle includes its label; the part one can drag does not."""
+def recording(setattr_of, rects):
+    """Make Dear ImGui's controls note (x0, y0, x1, y1, width of the label) in `rects`."""
+
+    def recorded(control):
+        @functools.wraps(control)
+        def call(label, *args, **kwargs):
+            result = control(label, *args, **kwargs)
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            rects[label] = (low.x, low.y, high.x, high.y, label_width(label))
+            return result
+
+        return call
+
+    for name in RECORDED:
+        setattr_of(imgui, name, recorded(getattr(imgui, name)))
+
+
+def point_of(rect, along):
+    """Where to aim: `along` the part of the control that can be dragged, or anywhere on a button."""
+    x0, y0, x1, y1, label = rect
+    return x0 + along * max(x1 - x0 - label, 8), (y0 + y1) / 2
+
+
+def label_width(label):
+    """An item's rectangle includes its label at the right; what one can drag does not."""
     shown = label.split("##")[0]
-    if not shown:
-        return x1 - x0
-    spacing = imgui.get_style().item_inner_spacing.x
-    return x1 - x0 - imgui.calc_text_size(shown).x - spacing
+    return imgui.calc_text_size(shown).x + imgui.get_style().item_inner_spacing.x if shown else 0.0

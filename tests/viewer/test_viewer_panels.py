@@ -130,3 +130,15 @@ def test_everything_fits_the_column(panels, state):
     assert len(panels.rects) > 20
     width = panels.io.display_size.x
     assert {label for label, rect in panels.rects.items() if rect[2] > width} == set()
+
+
+def test_a_message_does_not_end_a_drag(panels, state):
+    state.selected = "table"
+    panels.frame(2)
+    panels.move(*panels.point("mx", 0.4))
+    panels.button(True)
+    state.say("saved")
+    panels.frame(3)
+    panels.move(*panels.point("mx", 0.9))
+    panels.button(False)
+    assert state.edits.current("brass").lobes[0].mx > 0.5

@@ -5,20 +5,15 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.materials.document import Lobe, Material
+from lambent.materials.models.kurt import Kurt
+from lambent.materials.models.model import Parameter, Value
 from lambent.viewer.panels.widgets import explain, rgb, slider
 from lambent.viewer.state import ViewerState
 
 TITLE = "Material"
 LISTED = 7
-MEANING = {
-    "kd": "diffuse reflectance",
-    "kt_d": "diffuse transmittance",
-    "k": "scale of the lobe",
-    "r0": "reflectance at normal incidence (Fresnel)",
-    "mx": "slope roughness along the brushing direction t",
-    "my": "slope roughness across it, along b",
-    "alpha": "exponent of the cosine product: 0 darkens towards grazing angles, 1 brightens",
-}
+LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
+DIFFUSE = {"kd": "diffuse reflectance", "kt_d": "diffuse transmittance"}
 
 
 def draw(state: ViewerState) -> None:
@@ -50,11 +45,9 @@ def _objects(state: ViewerState) -> None:
 
 
 def _edited(state: ViewerState, material: Material) -> Material:
-    changes: dict[str, object] = {"kd": rgb("kd", material.kd, 1.0)}
-    explain(MEANING["kd"])
-    if any(material.kt_d):
-        changes["kt_d"] = rgb("kt_d", material.kt_d, 1.0)
-        explain(MEANING["kt_d"])
+    changes: dict[str, object] = {}
+    for name in ("kd", "kt_d") if any(material.kt_d) else ("kd",):
+        changes[name] = rgb(name, getattr(material, name), 1.0, DIFFUSE[name])
     if material.lobes:
         _, state.linked_roughness = imgui.checkbox("keep the ratio of mx and my", state.linked_roughness)
     changes["lobes"] = tuple(_lobe(state, index, lobe) for index, lobe in enumerate(material.lobes))
@@ -64,27 +57,31 @@ def _edited(state: ViewerState, material: Material) -> Material:
 def _lobe(state: ViewerState, index: int, lobe: Lobe) -> Lobe:
     imgui.push_id(index)
     imgui.separator_text(f"lobe {index + 1}: {lobe.side}, {lobe.distribution}")
-    k = rgb("k", lobe.k, max(1.0, *(1.5 * v for v in lobe.k)))
-    explain(MEANING["k"])
-    r0 = rgb("r0", lobe.r0, 1.0)
-    explain(MEANING["r0"])
-    mx, my = _roughness(lobe, state.linked_roughness)
-    alpha = slider("alpha", lobe.alpha, *RANGES["alpha"])
-    explain(MEANING["alpha"])
+    edited = lobe.model_copy(update={name: _parameter(parameter, lobe) for name, parameter in LOBE.items()})
     imgui.pop_id()
-    return lobe.model_copy(update={"k": k, "r0": r0, "mx": mx, "my": my, "alpha": alpha})
+    return _linked(lobe, edited) if state.linked_roughness else edited
 
 
-def _roughness(lobe: Lobe, linked: bool) -> tuple[float, float]:
-    low, high = RANGES["mx"]
-    mx = slider("mx", lobe.mx, low, high, log=True)
-    explain(MEANING["mx"])
-    my = slider("my", lobe.my, low, high, log=True)
-    explain(MEANING["my"])
-    if linked and (mx, my) != (lobe.mx, lobe.my):
-        scale = mx / lobe.mx if mx != lobe.mx else my / lobe.my
-        mx, my = (min(max(m * scale, low), high) for m in (lobe.mx, lobe.my))
-    return mx, my
+def _parameter(parameter: Parameter, lobe: Lobe) -> Value:
+    """Its control, with the range, scale and unit that the model gives it."""
+    value = getattr(lobe, parameter.name)
+    meaning = parameter.meaning if parameter.unit == "1" else f"{parameter.meaning} ({parameter.unit})"
+    if parameter.rgb:
+        return rgb(parameter.name, value, max(parameter.high, *value), meaning)
+    low, high = min(parameter.low, value), max(parameter.high, value)
+    value = slider(parameter.name, value, low, high, log=parameter.scale == "log")
+    explain(meaning)
+    return value
+
+
+def _linked(before: Lobe, after: Lobe) -> Lobe:
+    """Both roughnesses scaled as the one that was moved."""
+    if (before.mx, before.my) == (after.mx, after.my):
+        return after
+    scale = after.mx / before.mx if after.mx != before.mx else after.my / before.my
+    low, high = LOBE["mx"].low, LOBE["mx"].high
+    mx, my = (min(max(m * scale, low), high) for m in (before.mx, before.my))
+    return after.model_copy(update={"mx": mx, "my": my})
 
 
 def _history(state: ViewerState, name: str) -> None:
@@ -111,12 +108,3 @@ def _save(state: ViewerState, name: str) -> None:
     imgui.same_line()
     if imgui.button("save", (-1, 0)):
         state.save_material(name)
-
-
-def _range(field: str) -> tuple[float, float]:
-    """Least and greatest value the document allows."""
-    limits = {type(rule).__name__: rule for rule in Lobe.model_fields[field].metadata}
-    return limits["Ge"].ge, limits["Le"].le
-
-
-RANGES = {field: _range(field) for field in ("mx", "my", "alpha")}

@@ -8,6 +8,11 @@ from lambent.viewer.input import Rect
 from lambent.viewer.state import ViewerState
 
 MARGIN_PX = 12
+# Without focus: a window that takes it when it appears ends the drag of a slider.
+FLAGS = (
+    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.always_auto_resize
+    | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_saved_settings
+)  # fmt: skip
 
 
 def draw(state: ViewerState, picture: Rect) -> None:
@@ -21,12 +26,9 @@ def draw(state: ViewerState, picture: Rect) -> None:
     imgui.set_next_window_pos(corner, imgui.Cond_.always, (0, 1))
     imgui.set_next_window_size_constraints((0, 0), (max(1, picture.width - 2 * MARGIN_PX), picture.height))
     imgui.set_next_window_bg_alpha(0.6)
-    imgui.begin("messages", None, imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | _FLAGS)
+    imgui.begin("messages", None, FLAGS)
     imgui.push_text_wrap_pos(max(1, picture.width - 4 * MARGIN_PX))
     for line in lines:
         imgui.text_unformatted(line)
     imgui.pop_text_wrap_pos()
     imgui.end()
-
-
-_FLAGS = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_saved_settings

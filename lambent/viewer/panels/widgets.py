@@ -28,8 +28,8 @@ def slider(label: str, value: float, low: float, high: float, *, log: bool = Fal
     return min(max(moved, low), high) if changed else value
 
 
-def rgb(label: str, value: RGB, high: float) -> RGB:
-    """Three sliders of linear coefficients and a swatch that opens a colour picker.
+def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
+    """Three sliders of linear coefficients and a swatch that opens a colour picker; `meaning` explains the label.
 
     The picker works on the colour as the display shows it; a coefficient above 1 keeps its scale.
     """
@@ -50,6 +50,7 @@ def rgb(label: str, value: RGB, high: float) -> RGB:
         imgui.end_popup()
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     imgui.text_unformatted(label)
+    explain(meaning)
     imgui.pop_id()
     return value
 

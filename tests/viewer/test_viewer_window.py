@@ -1,0 +1,136 @@
+"""The whole window on a virtual screen, with a real mouse and real keys."""
+
+import math
+import os
+import subprocess
+import sys
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.images import read_image
+from lambent.realtime.device import choose_adapter
+from tests.viewer.small_store import FRONT, write_small_store
+from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def screen():
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    try:
+        choose_adapter()
+    except UserError as error:
+        pytest.skip(str(error))
+    screen = VirtualScreen()
+    yield screen
+    screen.close()
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return write_small_store(tmp_path_factory.mktemp("store") / "small")
+
+
+@pytest.fixture(scope="module")
+def window(screen, store, tmp_path_factory):
+    opened = WindowSession(screen, store, tmp_path_factory.mktemp("window"))
+    yield opened
+    opened.kill()
+
+
+@pytest.fixture
+def session(window):
+    """The one window, at the first camera, on foot, with nothing selected."""
+    window.move(60, 60)
+    window.tool("key", "1", "Escape", *(["o"] if window.state()["mode"] == "orbit" else []))
+    window.wait_for(
+        lambda s: s["camera"]["name"] == "front" and s["mode"] == "walk" and s["selected"] is None and not s["moving"]
+    )
+    return window
+
+
+def test_drag_looks_and_w_walks(session):
+    session.drag((60, 200), (140, 220))
+    turned = session.wait_for(lambda state: state["camera"]["target"] != list(FRONT.target))
+    assert turned["camera"]["position"] == list(FRONT.position)
+    session.hold("w", 0.6)
+    walked = session.wait_for(lambda state: math.dist(state["camera"]["position"], FRONT.position) > 0.2)
+    assert walked["camera"]["position"][1] == pytest.approx(1.6)
+
+
+def test_a_slider_changes_the_material_and_not_the_camera(session):
+    session.tool("key", "o")
+    session.click(135, 200)
+    before = session.wait_for(lambda state: state["selected"] == "ball")
+    assert before["mode"] == "orbit"
+    for header in ("Scene", "View"):
+        session.click(*session.point(header, 0.3))
+    session.drag(session.point("mx", 0.5), session.point("mx", 0.8))
+    session.wait_for(lambda state: lobe_of(state).get("mx", 0) > 0.2 and lobe_of(state)["my"] == lobe_of(state)["mx"])
+    session.drag(session.point("mx", 0.8), (100, 100))
+    session.wait_for(lambda state: lobe_of(state).get("mx", 1) < 0.1)
+    assert session.state()["camera"] == before["camera"]
+    assert session.state()["selected"] == "ball"
+    session.tool("key", "ctrl+z", "ctrl+z")
+    session.wait_for(lambda state: state["edited"] == {})
+    session.click(*session.point("##file", 0.8))
+    session.tool("type", "was")
+    session.wait_for(lambda state: "was" in state["file_names"].get("brass", ""))
+    assert session.state()["camera"] == before["camera"]
+    session.drag((100, 100), (160, 100))
+    session.wait_for(lambda state: state["camera"] != before["camera"])
+    for header in ("Scene", "View"):
+        session.click(*session.point(header, 0.3))
+
+
+def test_it_refines_then_sleeps_and_wakes(session):
+    done = session.wait_for(lambda state: state["accumulated"] >= 128)
+    assert done["integrator"] == "qmc"
+    session.settle()
+    frames = session.state()["frames"]
+    session.settle()
+    assert session.state()["frames"] <= frames + 2, "frames are drawn although nothing changes"
+    session.move(100, 100)
+    session.wait_for(lambda state: state["frames"] > frames)
+    assert session.state()["accumulated"] == done["accumulated"], "hovering must not start the picture anew"
+    session.tool("key", "2")
+    session.wait_for(lambda state: state["camera"]["name"] == "side" and state["accumulated"] < 128)
+
+
+def test_resize_and_picture(session):
+    session.tool("windowsize", session.id, 700, 500)
+    session.wait_for(lambda state: state["picture"] == [330, 500])
+    session.tool("key", "p")
+    session.wait_for(lambda state: any(m.startswith("saved") for m in state["messages"]))
+    exr, png = read_image(session.out / "small-room-001.exr"), read_image(session.out / "small-room-001.png")
+    assert exr.shape == png.shape == (500, 330, 3)
+    assert exr.mean() > 0.05 and png.std() > 0.02
+    assert png[400:].mean() > png[:100].mean(), "the floor is lit, the sky above the wall is dark: upside down?"
+
+
+def test_close(window):
+    """Last, because it closes the window of the tests before."""
+    assert window.close() == 0
+
+
+def lobe_of(state):
+    return state["edited"].get("brass", {"lobes": [{}]})["lobes"][0]
+
+
+def test_without_a_display(store):
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    code = f"from pathlib import Path; from lambent.viewer.app import run; run(Path({str(store)!r}))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert "UserError: no display; use `lambent render`" in done.stderr
+
+
+def test_an_unknown_mode_is_said(store):
+    from lambent.viewer.app import run
+
+    with pytest.raises(UserError, match="unknown mode"):
+        run(store, "fly")

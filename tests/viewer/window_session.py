@@ -1,0 +1,128 @@
+"""A window in a process of its own on a virtual screen, driven by xdotool."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from tests.viewer.panel_driver import point_of
+
+ROOT = Path(__file__).parents[2]
+PAUSE_S = 0.4  # between the steps of a drag; quicker ones are merged into one event
+PATIENCE_S = 40.0  # software adapters on a busy machine
+
+
+def missing_tools():
+    return [tool for tool in ("Xvfb", "xdotool") if shutil.which(tool) is None]
+
+
+class VirtualScreen:
+    def __init__(self):
+        read, write = os.pipe()
+        command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
+        self._process = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            self.name = f":{pipe.readline().strip()}"
+
+    def close(self):
+        self._process.terminate()
+        self._process.wait(10)
+
+
+class WindowSession:
+    """One run of `watched_window`. Positions are logical pixels of the window."""
+
+    def __init__(self, screen, store, out, size=(640, 480), mode="walk"):
+        self.out = out
+        self._environment = {**os.environ, "DISPLAY": screen.name}
+        self._environment.pop("WAYLAND_DISPLAY", None)
+        command = [sys.executable, "-m", "tests.viewer.watched_window", store, out, f"{size[0]}x{size[1]}", mode]
+        self._log = (out / "log.txt").open("w")
+        self.process = subprocess.Popen(
+            [str(part) for part in command], cwd=ROOT, env=self._environment, stderr=self._log, stdout=self._log
+        )
+        self.wait_for(lambda state: state["frames"] >= 3)
+        self.id = self.tool("search", "--onlyvisible", "--name", "^Lambent").split()[0]
+        self.tool("windowfocus", "--sync", self.id)
+
+    def log(self):
+        return (self.out / "log.txt").read_text()
+
+    def tool(self, *words):
+        done = subprocess.run(
+            ["xdotool", *map(str, words)],
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+        assert done.returncode == 0, f"xdotool {words}: {done.stderr} {self.log()}"
+        return done.stdout
+
+    def state(self):
+        path = self.out / "state.json"
+        return json.loads(path.read_text()) if path.exists() else {"frames": 0}
+
+    def wait_for(self, condition):
+        """The state as soon as it meets the condition."""
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            state = self.state()
+            if condition(state):
+                return state
+            assert self.process.poll() is None, f"the window closed: {self.log()}"
+            assert time.monotonic() < end, f"still {state}\n{self.log()}"
+            time.sleep(0.05)
+
+    def settle(self):
+        """Let the window answer what was sent."""
+        frames = self.state()["frames"]
+        time.sleep(PAUSE_S)
+        self.wait_for(lambda state: state["frames"] >= frames)
+
+    def move(self, x, y):
+        self.tool("mousemove", "--window", self.id, round(x), round(y))
+        time.sleep(PAUSE_S)
+
+    def drag(self, begin, end, button=1):
+        self.move(*begin)
+        self.tool("mousedown", button)
+        time.sleep(PAUSE_S)
+        for share in (0.4, 0.7, 1.0):
+            self.move(*(a + share * (b - a) for a, b in zip(begin, end, strict=True)))
+        self.tool("mouseup", button)
+        self.settle()
+
+    def click(self, x, y):
+        self.move(x, y)
+        self.tool("mousedown", 1)
+        time.sleep(PAUSE_S)
+        self.tool("mouseup", 1)
+        self.settle()
+
+    def hold(self, key, seconds):
+        self.tool("keydown", key)
+        time.sleep(seconds)
+        self.tool("keyup", key)
+        self.settle()
+
+    def point(self, label, along=0.5):
+        return point_of(self.state()["rects"][label], along)
+
+    def close(self):
+        """Close the window as its own button does; returns the exit code."""
+        subprocess.run(
+            [sys.executable, "-m", "tests.viewer.close_button", self.id], cwd=ROOT, env=self._environment, check=True
+        )
+        return self.process.wait(PATIENCE_S)
+
+    def kill(self):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait(10)
+        self._log.close()
