@@ -1,0 +1,21 @@
+"""docs/window.md says what the window does."""
+
+from pathlib import Path
+
+import pytest
+
+from lambent.viewer import cameras, pacing
+from lambent.viewer.input import SHORTCUTS
+
+TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s[0])
+def test_every_shortcut_is_documented(shortcut):
+    assert f"| {shortcut[0]} | {shortcut[1]} |" in TEXT
+
+
+def test_the_numbers_are_those_of_the_code():
+    assert f"{cameras.WALK_M_S} m/s" in TEXT
+    assert f"{cameras.EYE_HEIGHT_M} m above" in TEXT
+    assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
