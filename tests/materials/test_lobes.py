@@ -34,6 +34,7 @@ def pairs(count=2000, seed=0):
     return [direction(np.arccos(2 * z - 1), 2 * np.pi * phi) for z, phi in u]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0], ids=["normal", "oblique", "grazing"])
 @pytest.mark.parametrize("name", LOBES)
 def test_sampler_follows_its_density(name, theta_deg, tmp_path):

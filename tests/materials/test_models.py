@@ -46,6 +46,7 @@ def cases():
         for prop in PROPERTIES:
             why = kind.known_deficiencies.get(prop)
             marks = [pytest.mark.xfail(strict=True, raises=AssertionError, reason=why)] if why else []
+            marks += [pytest.mark.slow] if prop == "sampled" else []
             yield pytest.param(kind, prop, id=f"{name}-{prop}", marks=marks)
 
 
