@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.files import inside
 from lambent.scenes.builtin.box import box
 from lambent.scenes.builtin.room import room
+from lambent.scenes.loaders.defaults import with_defaults
+from lambent.scenes.loaders.gltf import read_gltf
 from lambent.scenes.loaders.parts import Parts
-from lambent.scenes.loaders.toml import load_toml
+from lambent.scenes.loaders.toml import inside_scene, load_toml
 from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
 BUILTIN: dict[str, Callable[[], list[SceneObject]]] = {"room": room, "box": box}
-READERS: dict[str, Callable[[Path], Parts]] = {}
+READERS: dict[str, Callable[[Path], Parts]] = {".glb": read_gltf, ".gltf": read_gltf}
 
 
 def load_scene(path_or_builtin: str | Path) -> Scene:
@@ -25,13 +28,19 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb or .gltf; a bare glTF file gets daylight and,
+        where it has none, a camera.
 
     Raises
     ------
     UserError
         Where there is no such scene, or its file cannot be used.
     """
+    scene = _load(path_or_builtin)
+    return replace(scene, warnings=(*scene.warnings, *size_warnings(scene)))
+
+
+def _load(path_or_builtin: str | Path) -> Scene:
     text = str(path_or_builtin)
     if text.startswith(BUILTIN_PREFIX):
         name = text.removeprefix(BUILTIN_PREFIX)
@@ -40,18 +49,23 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     path = Path(path_or_builtin)
     if path.suffix.lower() == ".toml":
         return load_toml(path, read_geometry)
-    raise UserError("not a scene", file=path, got=path.suffix or "no extension", expected=".toml")
+    return with_defaults(path.stem, _reader(path)(path))
 
 
-def read_geometry(name: str, folder: Path) -> Parts:
-    """Objects, and what comes with them, of a geometry file in `folder` or of a built-in scene."""
+def read_geometry(name: str, scene_file: Path) -> Parts:
+    """Objects, and what comes with them, of a built-in scene or of a file that `scene_file` names."""
     if name.startswith(BUILTIN_PREFIX):
         return Parts(tuple(_builtin(name.removeprefix(BUILTIN_PREFIX))()))
-    path = inside(folder, name)
+    path = inside_scene(scene_file, "geometry", name)
+    return _reader(path)(path)
+
+
+def _reader(path: Path) -> Callable[[Path], Parts]:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise UserError("unknown geometry format", file=path, got=path.suffix, expected=" or ".join(READERS))
-    return reader(path)
+        expected = ", ".join([*READERS, ".toml"])
+        raise UserError("unknown kind of scene", file=path, got=path.suffix or "no extension", expected=expected)
+    return reader
 
 
 def _builtin(name: str) -> Callable[[], list[SceneObject]]:

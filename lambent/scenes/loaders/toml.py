@@ -42,7 +42,7 @@ from lambent.scenes.scene import (
 )
 
 LIMIT_BYTES = 4 << 20
-ReadGeometry = Callable[[str, Path], Parts]  # name as written, folder of the scene
+ReadGeometry = Callable[[str, Path], Parts]  # name as written, the scene.toml that names it
 
 
 def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
@@ -54,8 +54,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         Where the file is not TOML, says something unknown or impossible, or names what is not there.
     """
     document = _parse(path)
-    folder = path.parent
-    parts = [_geometry(entry, folder, read_geometry) for entry in document.geometry]
+    parts = [_geometry(entry, path, read_geometry) for entry in document.geometry]
     objects = _gather(parts)
     materials = {name: m for p in parts for name, m in p.materials.items()}
     named, sources = _materials(document, path)
@@ -95,7 +94,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
 def _parse(path: Path) -> SceneDocument:
     try:
         data = tomllib.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"not a TOML document ({error})", file=path) from error
     try:
         return SceneDocument.model_validate(data)
@@ -113,10 +112,10 @@ def _one_line(error: ValidationError, path: Path) -> UserError:
     return UserError(first["msg"].removeprefix("Value error, "), file=path, field=where, got=first["input"])
 
 
-def _geometry(entry: str | GeometrySection, folder: Path, read_geometry: ReadGeometry) -> Parts:
+def _geometry(entry: str | GeometrySection, path: Path, read_geometry: ReadGeometry) -> Parts:
     if isinstance(entry, str):
-        return read_geometry(entry, folder)
-    parts = read_geometry(entry.file, folder)
+        return read_geometry(entry, path)
+    parts = read_geometry(entry.file, path)
     matrix = np.diag([entry.scale] * 3 + [1.0])
     size = entry.scale
 

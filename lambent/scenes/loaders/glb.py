@@ -1,0 +1,178 @@
+"""glTF on disk: the container, its buffers and accessors. Every length is checked before a byte is touched."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import unquote
+
+import numpy as np
+from pydantic import ValidationError
+
+from lambent.core.errors import UserError
+from lambent.core.files import inside, read_bytes
+from lambent.core.frames import Floats
+from lambent.scenes.loaders.gltf_schema import GltfDocument
+
+LIMIT_BYTES = 4 << 30
+MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+READ_EXTENSIONS = {
+    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
+    "KHR_materials_anisotropy", "KHR_materials_transmission", "KHR_mesh_quantization", "KHR_texture_transform",
+}  # fmt: skip
+COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Gltf:
+    """A document with its buffers in memory; `sources` are the files it was read from."""
+
+    path: Path
+    document: GltfDocument
+    buffers: tuple[bytes, ...]
+    sources: tuple[Path, ...]
+
+    def pick(self, items: Sequence[T], index: int, field: str) -> T:
+        """`items[index]`, or a `UserError` that names the field."""
+        if index >= len(items):
+            raise UserError(
+                "index out of range", file=self.path, field=field, got=index, expected=f"below {len(items)}"
+            )
+        return items[index]
+
+    def view(self, index: int) -> tuple[bytes, int, int, int | None]:
+        """Buffer, first byte, length and stride of a buffer view."""
+        view = self.pick(self.document.bufferViews, index, "bufferViews")
+        buffer = self.pick(self.buffers, view.buffer, f"bufferViews.{index}.buffer")
+        if view.byteOffset + view.byteLength > len(buffer):
+            end = view.byteOffset + view.byteLength
+            raise UserError(
+                "buffer view ends after its buffer", file=self.path, field=f"bufferViews.{index}", got=f"{end} bytes",
+                expected=f"at most {len(buffer)}",
+            )  # fmt: skip
+        return buffer, view.byteOffset, view.byteLength, view.byteStride
+
+    def accessor(self, index: int) -> np.ndarray[Any, Any]:
+        """Array (count, width) of an accessor, as stored; a copy."""
+        field = f"accessors.{index}"
+        a = self.pick(self.document.accessors, index, "accessors")
+        if a.sparse is not None or a.bufferView is None:
+            raise UserError("sparse accessors are not read", file=self.path, field=field, hint="export without them")
+        dtype, width = np.dtype(COMPONENTS[a.componentType]), WIDTHS[a.type]
+        buffer, start, length, stride = self.view(a.bufferView)
+        step = stride or dtype.itemsize * width
+        need = a.byteOffset + step * (a.count - 1) + dtype.itemsize * width if a.count else 0
+        if need > length:
+            raise UserError(
+                "accessor ends after its buffer view", file=self.path, field=field, got=f"{need} bytes",
+                expected=f"at most {length}",
+            )  # fmt: skip
+        if a.count == 0:
+            return np.zeros((0, width), dtype)
+        strides = (step, dtype.itemsize)
+        return np.ndarray((a.count, width), dtype, buffer, start + a.byteOffset, strides).copy()
+
+    def floats(self, index: int, width: int, field: str) -> Floats:
+        """Accessor as float64 (count, width); normalised integers become [0, 1] or [-1, 1]."""
+        array = self.accessor(index)
+        if array.shape[1] != width:
+            got = f"{array.shape[1]} components"
+            raise UserError("wrong accessor type", file=self.path, field=field, got=got, expected=width)
+        values = array.astype(float)
+        if self.document.accessors[index].normalized and array.dtype.kind in "iu":
+            values = np.maximum(values / np.iinfo(array.dtype).max, -1.0)
+        return values
+
+
+def read(path: Path) -> Gltf:
+    """A .glb or .gltf file with all its buffers.
+
+    Raises
+    ------
+    UserError
+        Where the file is truncated, not glTF 2.0, needs an extension that is not read, or names a file elsewhere.
+    """
+    data = read_bytes(path, LIMIT_BYTES)
+    text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
+    try:
+        raw = json.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"its JSON cannot be read ({error})", file=path) from error
+    if not isinstance(raw, dict):
+        raise UserError("not a glTF document", file=path, got=type(raw).__name__, expected="an object")
+    try:
+        document = GltfDocument.model_validate(raw)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise UserError(first["msg"], file=path, field=field, got=first["input"]) from error
+    if not document.asset.version.startswith("2."):
+        raise UserError(
+            "unknown glTF version", file=path, field="asset.version", got=document.asset.version, expected=2
+        )
+    unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
+    if unread:
+        hint = "export without compression" if any("compression" in name for name in unread) else None
+        raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=hint)
+    buffers, sources = [], [path]
+    for i, buffer in enumerate(document.buffers):
+        content, source = _buffer(buffer.uri, binary if i == 0 else None, path, f"buffers.{i}")
+        if len(content) < buffer.byteLength:
+            got, expected = f"{len(content)} bytes", f"{buffer.byteLength}"
+            raise UserError("buffer is truncated", file=path, field=f"buffers.{i}", got=got, expected=expected)
+        buffers.append(content)
+        sources += [source] if source else []
+    return Gltf(path, document, tuple(buffers), tuple(sources))
+
+
+def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
+    """JSON and binary chunk of a GLB container."""
+    if len(data) < 20 or struct.unpack_from("<I", data)[0] != MAGIC:
+        raise UserError("not a GLB file", file=path, got=repr(data[:4]), expected="it to begin with glTF")
+    _, version, total = struct.unpack_from("<III", data)
+    if version != 2:
+        raise UserError("unknown GLB version", file=path, got=version, expected=2)
+    if total > len(data):
+        raise UserError("file is truncated", file=path, got=f"{len(data)} bytes", expected=f"{total} by its header")
+    chunks: dict[int, bytes] = {}
+    offset = 12
+    while offset + 8 <= total:
+        length, kind = struct.unpack_from("<II", data, offset)
+        if offset + 8 + length > total:
+            left = f"{total - offset - 8} left"
+            raise UserError("a chunk ends after the file", file=path, got=f"{length} bytes", expected=f"at most {left}")
+        chunks.setdefault(kind, data[offset + 8 : offset + 8 + length])
+        offset += 8 + length
+    if JSON_CHUNK not in chunks:
+        raise UserError("no JSON chunk", file=path)
+    return chunks[JSON_CHUNK], chunks.get(BIN_CHUNK)
+
+
+def _buffer(uri: str | None, binary: bytes | None, path: Path, field: str) -> tuple[bytes, Path | None]:
+    """Bytes of a buffer or image, and the file they are from where it is another one."""
+    if uri is None:
+        if binary is None:
+            raise UserError("has neither a uri nor a binary chunk", file=path, field=field)
+        return binary, None
+    return resource(uri, path, field)
+
+
+def resource(uri: str, path: Path, field: str) -> tuple[bytes, Path | None]:
+    """Bytes behind a uri: data within it, or a file beside `path` or below."""
+    if uri.startswith("data:"):
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True), None
+        except binascii.Error as error:
+            raise UserError(f"its base64 data is damaged ({error})", file=path, field=field) from error
+    if "://" in uri:
+        raise UserError("is on the network", file=path, field=field, got=uri, hint="put the file beside the scene")
+    source = inside(path.parent, unquote(uri))
+    return read_bytes(source, LIMIT_BYTES), source

@@ -1,0 +1,251 @@
+"""glTF 2.0: nodes, meshes, lights and cameras, brought into world space."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, normalize
+from lambent.scenes.geometry import transformed
+from lambent.scenes.loaders import glb
+from lambent.scenes.loaders.glb import Gltf
+from lambent.scenes.loaders.gltf_material import Textures, material_of
+from lambent.scenes.loaders.gltf_schema import MaterialDocument, Node, Primitive
+from lambent.scenes.loaders.parts import Parts, unique_name
+from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.scene import (
+    Camera,
+    DirectionalLight,
+    Light,
+    Mesh,
+    PointLight,
+    SceneObject,
+    Triple,
+)
+
+TRIANGLES_MAX = 20_000_000
+LUMENS_PER_WATT = 683.0  # glTF lights are photometric; 683 lm/W is what exporters from radiometric units assume
+
+
+@dataclass
+class _Reading:
+    """What has been read so far of one file."""
+
+    gltf: Gltf
+    materials: list[tuple[str, Triple]]
+    objects: list[SceneObject] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    cameras: list[Camera] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+    camera_names: set[str] = field(default_factory=set)
+    meshes: dict[tuple[int, int], Mesh | None] = field(default_factory=dict)
+    triangles: int = 0
+
+
+def read_gltf(path: Path) -> Parts:
+    """Parts of a .glb or .gltf file.
+
+    Names are the nodes' (made unique, which is said in the warnings); a mesh of several materials becomes an object
+    per material. Textures are averaged, which is said as well.
+
+    Raises
+    ------
+    UserError
+        Where the file is damaged or holds nothing to see.
+    """
+    gltf = glb.read(path)
+    textures = Textures(gltf)
+    taken: set[str] = set()
+    materials, looks = {}, []
+    for i, document in enumerate([*gltf.document.materials, MaterialDocument()]):
+        last = i == len(gltf.document.materials)
+        name = unique_name(document.name or ("default" if last else f"material_{i}"), taken)
+        materials[name], glow = material_of(document, name, textures)
+        looks.append((name, glow))
+    reading = _Reading(gltf, looks)
+    _walk(reading)
+    used = {o.material for o in reading.objects}
+    if not reading.objects:
+        raise UserError("holds no triangles", file=path, hint="; ".join(reading.warnings) or None)
+    reading.warnings += [f"material {n}: textures are averaged to one colour" for n in sorted(textures.averaged & used)]
+    for i, document in enumerate(gltf.document.materials):
+        name = looks[i][0]
+        if name in used and document.normalTexture is not None:
+            reading.warnings.append(f"material {name}: its normal map is not read")
+        if name in used and document.alphaMode != "OPAQUE":
+            reading.warnings.append(f"material {name}: alpha {document.alphaMode} is not read, it is opaque")
+    return Parts(
+        tuple(reading.objects),
+        {n: m for n, m in materials.items() if n in used},
+        tuple(reading.lights),
+        tuple(reading.cameras),
+        gltf.sources,
+        tuple(reading.warnings),
+    )
+
+
+def _walk(reading: _Reading) -> None:
+    """Visit every node of the scene once, parents first."""
+    gltf = reading.gltf
+    document = gltf.document
+    if document.scenes:
+        roots = gltf.pick(document.scenes, document.scene, "scene").nodes
+    else:
+        roots = sorted(set(range(len(document.nodes))) - {c for n in document.nodes for c in n.children})
+    stack = [(index, np.eye(4)) for index in reversed(roots)]
+    seen: set[int] = set()
+    while stack:
+        index, parent = stack.pop()
+        if index in seen:
+            raise UserError("node is reached twice", file=gltf.path, field=f"nodes.{index}", expected="a tree")
+        seen.add(index)
+        node = gltf.pick(document.nodes, index, "nodes")
+        world = parent @ _local(node)
+        if not np.isfinite(world).all():
+            raise UserError("transform is not finite", file=gltf.path, field=f"nodes.{index}")
+        _visit(reading, node, index, world)
+        stack += [(child, world) for child in reversed(node.children)]
+
+
+def _local(node: Node) -> Floats:
+    if node.matrix is not None:
+        return np.asarray(node.matrix, float).reshape(4, 4).T
+    x, y, z, w = normalize(np.asarray(node.rotation, float)) if any(node.rotation) else (0.0, 0.0, 0.0, 1.0)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ] @ np.diag(node.scale)
+    matrix[:3, 3] = node.translation
+    return matrix
+
+
+def _visit(reading: _Reading, node: Node, index: int, world: Floats) -> None:
+    if node.mesh is not None:
+        _add_mesh(reading, node, world)
+    if node.camera is not None:
+        _add_camera(reading, node, world)
+    if node.extensions.KHR_lights_punctual is not None:
+        _add_light(reading, node.extensions.KHR_lights_punctual.light, world)
+
+
+def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
+    gltf = reading.gltf
+    assert node.mesh is not None
+    mesh = gltf.pick(gltf.document.meshes, node.mesh, "meshes")
+    wanted = node.name or mesh.name or f"mesh_{node.mesh}"
+    if abs(np.linalg.det(world[:3, :3])) < 1e-18:
+        reading.warnings.append(f"{wanted}: left out, its node's scale is zero")
+        return
+    for k, primitive in enumerate(mesh.primitives):
+        key = (node.mesh, k)
+        if key not in reading.meshes:
+            reading.meshes[key], said = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted)
+            reading.warnings += said
+        local = reading.meshes[key]
+        if local is None:
+            continue
+        reading.triangles += len(local.faces)
+        if reading.triangles > TRIANGLES_MAX:
+            got, expected = f"{reading.triangles} triangles", f"at most {TRIANGLES_MAX}"
+            raise UserError("scene is too large", file=gltf.path, got=got, expected=expected)
+        material, glow = reading.materials[-1 if primitive.material is None else _index(gltf, primitive.material)]
+        single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
+        name = unique_name(single, reading.names)
+        if name != single:
+            reading.warnings.append(f"{single}: the name is used twice, one is now {name}")
+        reading.objects.append(SceneObject(name, transformed(local, world), material, glow))
+
+
+def _index(gltf: Gltf, material: int) -> int:
+    gltf.pick(gltf.document.materials, material, "material")
+    return material
+
+
+def _primitive(gltf: Gltf, primitive: Primitive, name: str) -> tuple[Mesh | None, list[str]]:
+    attributes = primitive.attributes
+    if "POSITION" not in attributes:
+        return None, [f"{name}: left out, it has no positions"]
+    if primitive.mode not in (4, 5, 6):
+        return None, [f"{name}: left out, it is points or lines"]
+    positions = gltf.floats(attributes["POSITION"], 3, f"{name} POSITION")
+    if primitive.indices is None:
+        order = np.arange(len(positions))
+    else:
+        order = gltf.accessor(primitive.indices)[:, 0].astype(np.int64)
+    said = []
+    faces = _faces(order, primitive.mode)
+    if primitive.mode == 4 and len(order) % 3:
+        said.append(f"{name}: {len(order) % 3} indices left over")
+
+    def optional(attribute: str, width: int) -> Floats | None:
+        if attribute not in attributes:
+            return None
+        array = gltf.floats(attributes[attribute], width, f"{name} {attribute}")
+        if len(array) != len(positions):
+            field = f"{name} {attribute}"
+            raise UserError("wrong length", file=gltf.path, field=field, got=len(array), expected=len(positions))
+        return array
+
+    uv = optional("TEXCOORD_0", 2)
+    if uv is not None:
+        uv = uv * (1, -1) + (0, 1)  # glTF counts v from the top
+    tangents = optional("TANGENT", 4)
+    normals = optional("NORMAL", 3)
+    mesh, repaired = mesh_of(
+        positions, faces, normals, uv, None if tangents is None else tangents[:, :3], name=name, file=gltf.path
+    )
+    return mesh, said + repaired
+
+
+def _faces(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """Triangles (T, 3) of a list, strip or fan of indices."""
+    if mode == 4:
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
+    if len(order) < 3:
+        return np.zeros((0, 3), np.int64)
+    if mode == 6:
+        return np.stack([np.full(len(order) - 2, order[0]), order[1:-1], order[2:]], axis=-1)
+    faces = np.stack([order[:-2], order[1:-1], order[2:]], axis=-1)
+    faces[1::2] = faces[1::2][:, [1, 0, 2]]
+    return faces
+
+
+def _add_camera(reading: _Reading, node: Node, world: Floats) -> None:
+    gltf = reading.gltf
+    assert node.camera is not None
+    camera = gltf.pick(gltf.document.cameras, node.camera, "cameras")
+    wanted = node.name or camera.name or f"camera_{node.camera}"
+    if camera.perspective is None:
+        reading.warnings.append(f"{wanted}: left out, a camera without perspective")
+        return
+    name = unique_name(wanted, reading.camera_names)
+    position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
+    fov_y_deg = math.degrees(camera.perspective.yfov)
+    reading.cameras.append(Camera(name, _triple(position), _triple(position + forward), _triple(up), fov_y_deg))
+
+
+def _add_light(reading: _Reading, index: int, world: Floats) -> None:
+    gltf = reading.gltf
+    light = gltf.pick(gltf.document.extensions.KHR_lights_punctual.lights, index, "lights")
+    power = _triple(np.asarray(light.color) * light.intensity / LUMENS_PER_WATT)
+    direction = _triple(-normalize(world[:3, 2]))
+    if light.type == "directional":
+        reading.lights.append(DirectionalLight(direction, power))
+    elif light.type == "point":
+        reading.lights.append(PointLight(_triple(world[:3, 3]), power))
+    else:
+        inner, outer = math.degrees(light.spot.innerConeAngle), math.degrees(light.spot.outerConeAngle)
+        reading.lights.append(PointLight(_triple(world[:3, 3]), power, direction, min(inner, outer), outer))
+
+
+def _triple(values: Floats) -> Triple:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

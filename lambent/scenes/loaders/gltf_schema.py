@@ -1,0 +1,193 @@
+"""The part of glTF 2.0 that Lambent reads; everything else in a file is let pass."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Index = Annotated[int, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Three = tuple[Finite, Finite, Finite]
+Four = tuple[Finite, Finite, Finite, Finite]
+Colour = tuple[NotNegative, NotNegative, NotNegative]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class Asset(_Part):
+    version: str
+
+
+class Buffer(_Part):
+    byteLength: Index
+    uri: str | None = None
+
+
+class BufferView(_Part):
+    buffer: Index
+    byteLength: Index
+    byteOffset: Index = 0
+    byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
+
+
+class Accessor(_Part):
+    componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]
+    count: Index
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    bufferView: Index | None = None
+    byteOffset: Index = 0
+    normalized: bool = False
+    sparse: Any = None
+
+
+class Primitive(_Part):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Index = 4
+
+
+class MeshDocument(_Part):
+    primitives: list[Primitive]
+    name: str | None = None
+
+
+class LightReference(_Part):
+    light: Index
+
+
+class NodeExtensions(_Part):
+    KHR_lights_punctual: LightReference | None = None
+
+
+class Node(_Part):
+    name: str | None = None
+    children: list[Index] = []
+    mesh: Index | None = None
+    camera: Index | None = None
+    matrix: Annotated[list[Finite], Field(min_length=16, max_length=16)] | None = None
+    translation: Three = (0, 0, 0)
+    rotation: Four = (0, 0, 0, 1)
+    scale: Three = (1, 1, 1)
+    extensions: NodeExtensions = NodeExtensions()
+
+
+class Texture(_Part):
+    source: Index | None = None
+
+
+class Image(_Part):
+    uri: str | None = None
+    bufferView: Index | None = None
+
+
+class TextureReference(_Part):
+    index: Index
+
+
+class MetallicRoughness(_Part):
+    baseColorFactor: tuple[Share, Share, Share, Share] = (1, 1, 1, 1)
+    metallicFactor: Share = 1
+    roughnessFactor: Share = 1
+    baseColorTexture: TextureReference | None = None
+    metallicRoughnessTexture: TextureReference | None = None
+
+
+class EmissiveStrength(_Part):
+    emissiveStrength: NotNegative = 1
+
+
+class Ior(_Part):
+    ior: NotNegative = 1.5
+
+
+class Specular(_Part):
+    specularFactor: Share = 1
+    specularColorFactor: Colour = (1, 1, 1)
+
+
+class Anisotropy(_Part):
+    anisotropyStrength: Share = 0
+    anisotropyRotation: Finite = 0
+
+
+class Transmission(_Part):
+    transmissionFactor: Share = 0
+
+
+class MaterialExtensions(_Part):
+    KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
+    KHR_materials_ior: Ior = Ior()
+    KHR_materials_specular: Specular = Specular()
+    KHR_materials_anisotropy: Anisotropy = Anisotropy()
+    KHR_materials_transmission: Transmission = Transmission()
+
+
+class MaterialDocument(_Part):
+    name: str | None = None
+    pbrMetallicRoughness: MetallicRoughness = MetallicRoughness()
+    emissiveFactor: Colour = (0, 0, 0)
+    emissiveTexture: TextureReference | None = None
+    normalTexture: TextureReference | None = None
+    alphaMode: str = "OPAQUE"
+    extensions: MaterialExtensions = MaterialExtensions()
+
+
+class Perspective(_Part):
+    yfov: Annotated[float, Field(gt=0, lt=3.1)]
+
+
+class CameraDocument(_Part):
+    type: str
+    name: str | None = None
+    perspective: Perspective | None = None
+
+
+class SceneNodes(_Part):
+    nodes: list[Index] = []
+    name: str | None = None
+
+
+class Spot(_Part):
+    innerConeAngle: NotNegative = 0
+    outerConeAngle: Annotated[float, Field(gt=0, le=1.5708)] = 0.7854
+
+
+class LightDocument(_Part):
+    type: Literal["directional", "point", "spot"]
+    name: str | None = None
+    color: Colour = (1, 1, 1)
+    intensity: NotNegative = 1
+    spot: Spot = Spot()
+
+
+class LightList(_Part):
+    lights: list[LightDocument] = []
+
+
+class RootExtensions(_Part):
+    KHR_lights_punctual: LightList = LightList()
+
+
+class GltfDocument(_Part):
+    """A whole glTF document."""
+
+    asset: Asset
+    scene: Index = 0
+    scenes: list[SceneNodes] = []
+    nodes: list[Node] = []
+    meshes: list[MeshDocument] = []
+    accessors: list[Accessor] = []
+    bufferViews: list[BufferView] = []
+    buffers: list[Buffer] = []
+    materials: list[MaterialDocument] = []
+    textures: list[Texture] = []
+    images: list[Image] = []
+    cameras: list[CameraDocument] = []
+    extensionsRequired: list[str] = []
+    extensions: RootExtensions = RootExtensions()

@@ -1,0 +1,75 @@
+"""What is odd about a scene, in words: nothing here stops a bake."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import Floats
+from lambent.scenes.geometry import areas
+from lambent.scenes.scene import Mesh, Scene
+
+LARGE, SMALL = 500.0, 0.05  # metres
+
+
+def validate(scene: Scene) -> list[str]:
+    """Warnings about a scene: unit, faults of its meshes, what nothing lights or sees."""
+    said = size_warnings(scene)
+    for o in scene.objects:
+        said += [f"{o.name}: {what}" for what in mesh_faults(o.mesh)]
+        if o.material not in scene.materials:
+            said.append(f"{o.name}: its material {o.material} is not described")
+    if scene.environment is None and not scene.lights and not any(any(o.emission) for o in scene.objects):
+        said.append("nothing gives light")
+    if not scene.cameras:
+        said.append("no camera")
+    return said
+
+
+def size_warnings(scene: Scene) -> list[str]:
+    """A warning where the scene's extent suggests another unit than the metre."""
+    low, high = scene.bounds
+    extent = float((high - low).max())
+    if SMALL <= extent <= LARGE:
+        return []
+    return [f"the scene is {extent:.3g} m large: is its unit the metre? (scene.toml can scale a geometry file)"]
+
+
+def mesh_faults(mesh: Mesh) -> list[str]:
+    """Faults of one mesh: not finite, without area, not unit, turned against its normals, non-manifold, without uv."""
+    arrays = (mesh.positions, mesh.normals, mesh.tangents, mesh.uv)
+    if not all(np.isfinite(a).all() for a in arrays):
+        return ["holds values that are not finite"]
+    said = []
+    area = areas(mesh.positions, mesh.faces)
+    if not (area > 0).all():
+        said.append(f"{int((area <= 0).sum())} triangles have no area")
+    n, t = mesh.normals.astype(float), mesh.tangents.astype(float)
+    if np.abs(np.linalg.norm(n, axis=-1) - 1).max() > 1e-3:
+        said.append("normals are not unit")
+    if np.abs(np.linalg.norm(t, axis=-1) - 1).max() > 1e-3 or np.abs(np.sum(n * t, axis=-1)).max() > 1e-3:
+        said.append("tangents are not unit or not at right angles to the normals")
+    flipped = float(area[_facing(mesh) < 0].sum() / max(area.sum(), 1e-30))
+    if flipped > 0.01:
+        said.append(f"{flipped:.0%} of its area is turned against its normals")
+    shared = int((_edge_uses(mesh) > 2).sum())
+    if shared:
+        said.append(f"non-manifold: {shared} edges belong to more than two triangles")
+    if np.ptp(mesh.uv, axis=0).max() == 0:
+        said.append("has no uv")
+    return said
+
+
+def _facing(mesh: Mesh) -> Floats:
+    """Per triangle, positive where its winding agrees with its normals."""
+    a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))
+    facing: Floats = np.sum(np.cross(b - a, c - a) * mesh.normals[mesh.faces].sum(axis=1), axis=-1)
+    return facing
+
+
+def _edge_uses(mesh: Mesh) -> NDArray[np.integer]:
+    """Triangles at each edge, vertices of one place taken as one."""
+    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
+    corners = place.reshape(-1)[mesh.faces]
+    edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=-1)
+    return np.unique(edges, axis=0, return_counts=True)[1]
