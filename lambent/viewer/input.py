@@ -121,7 +121,7 @@ class Input:
         if was_click:
             x, y = event["x"] - self.picture.x, event["y"] - self.picture.y
             found = self.geometry.pick(*ray_through(state.camera, x, y, self.picture.width, self.picture.height))
-            state.selected = found.name if found else None
+            state.select(found.name if found else None)
 
     def _key(self, state: ViewerState, key: str, modifiers: tuple[str, ...]) -> None:
         letter = key.lower() if len(key) == 1 else key
@@ -141,6 +141,6 @@ class Input:
         elif letter == "h":
             state.panels_shown = not state.panels_shown
         elif letter == "Escape":
-            state.selected = None
+            state.select(None)
         elif letter in "123456789" and int(letter) <= len(state.scene.cameras):
             state.jump(state.scene.cameras[int(letter) - 1])

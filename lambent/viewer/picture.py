@@ -32,6 +32,7 @@ CHOICES = Choices(
 # At rest: frames of the progressive series, and samples per pixel and lobe in each. Software takes one sample at a
 # time, so that a frame is short and the window answers in between.
 REST_FRAMES = 128
+LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
 SOFTWARE_N = 1
 
 
@@ -49,7 +50,8 @@ class Picture:
 
     def update(self, state: ViewerState, rect: Rect, pixel_ratio: float) -> None:
         """Draw the next frame where one is due."""
-        wanted = frame_state(state, round(rect.width * pixel_ratio), round(rect.height * pixel_ratio))
+        width, height = (min(round(size * pixel_ratio), LARGEST_PX) for size in (rect.width, rect.height))
+        wanted = frame_state(state, width, height)
         now_s = state.clock()
         plan = self._pacer.plan(wanted, now_s, refine=state.refine, adaptive=state.adaptive_resolution)
         if plan is None:

@@ -132,6 +132,7 @@ class ViewerState:
     n: int | None = None  # samples per lobe; None: chosen per material from its roughness
     flying: bool = False
     selected: str | None = None  # object name
+    reveal_selected: bool = False  # the list of objects has yet to scroll to it
     linked_roughness: bool = True  # mx and my keep their ratio
     file_names: dict[str, str] = field(default_factory=dict)  # material -> where it is saved
     path: PathPlay | None = None
@@ -193,6 +194,9 @@ class ViewerState:
         """Take a camera the user moved; that ends a path being shown."""
         if camera != self.camera:
             self.jump(camera)
+
+    def select(self, name: str | None) -> None:
+        self.selected, self.reveal_selected = name, name is not None
 
     @property
     def selected_object(self) -> ObjectRecord | None:

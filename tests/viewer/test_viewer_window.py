@@ -120,12 +120,20 @@ def lobe_of(state):
     return state["edited"].get("brass", {"lobes": [{}]})["lobes"][0]
 
 
+def run_in_a_process(store, arguments, environment):
+    code = f"from pathlib import Path; from lambent.viewer.app import run; run(Path({str(store)!r}), {arguments})"
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_a_given_number_of_frames(screen, store):
+    done = run_in_a_process(store, "size=(320, 240), frames=4", {**os.environ, "DISPLAY": screen.name})
+    assert done.returncode == 0, done.stderr
+
+
 def test_without_a_display(store):
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    code = f"from pathlib import Path; from lambent.viewer.app import run; run(Path({str(store)!r}))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
-    )
+    done = run_in_a_process(store, "'walk'", environment)
     assert "UserError: no display; use `lambent render`" in done.stderr
 
 

@@ -23,7 +23,7 @@ def draw(state: ViewerState) -> None:
         imgui.text_wrapped("Click an object in the picture or in the list.")
         return
     material = state.edits.current(name)
-    imgui.separator_text(name)
+    imgui.separator_text(f"{state.selected}: {name}")
     edited = _edited(state, material)
     if edited != material:
         state.edits.change(name, edited)
@@ -39,6 +39,9 @@ def _objects(state: ViewerState) -> None:
     for index, item in enumerate(objects):
         if imgui.selectable(f"{item.name}##{index}", item.name == state.selected)[0]:
             state.selected = item.name
+        if item.name == state.selected and state.reveal_selected:
+            imgui.set_scroll_here_y()
+            state.reveal_selected = False
         imgui.same_line(0.5 * imgui.get_content_region_avail().x)
         imgui.text_disabled(item.material)
     imgui.end_child()
