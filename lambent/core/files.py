@@ -60,6 +60,8 @@ def read_bytes(path: Path, limit_bytes: int) -> bytes:
 def inside(folder: Path, name: str) -> Path:
     """`folder / name` as a real path, or a `UserError` where the name would leave the folder."""
     folder = Path(folder).resolve()
+    if "\0" in name:
+        raise UserError("is not a file name", file=folder, got=name)
     path = (folder / name).resolve()
     if not path.is_relative_to(folder):
         raise UserError("path leaves its folder", file=folder, got=name, expected="a path below it")
