@@ -23,6 +23,7 @@ WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
 NEAR_TUPLE = 1.3  # a pixel shows a tuple no further away than this times the distance to its fourth neighbour
 PLANE_DEG = 3.0  # tuples this close to the plane of incidence belong to its curve
 MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
+THETA_STEP_DEG = 0.75
 COLUMNS = 4
 
 
@@ -109,7 +110,7 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
             if across not in labelled and (upright or theta_deg > 0):
                 ax.set_title(f"$\\{across_name}_i$ {across:g}°", fontsize=8)
                 labelled.add(across)
-    _legend(figure, "cube root of the transfer probability", _brushing(material) is not None)
+    _legend(figure, "cube root of the transfer probability (white: not measured)", _brushing(material) is not None)
     return figure
 
 
@@ -200,22 +201,32 @@ def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
 
 
 def _curve(ax: Any, entry: Incidence, material: Material, far: bool) -> None:
-    theta, phi = angles(entry.wo)
-    off = (np.degrees(phi) - entry.phi_deg) % 360
-    ahead = np.abs(off - 180) <= 90
-    aside = np.sin(theta) * np.abs(np.sin(np.radians(off)))
-    here = (np.degrees(np.arcsin(np.clip(aside, 0, 1))) <= PLANE_DEG) & ((entry.wo[:, 2] < 0) == far)
-    from_normal = np.degrees(np.pi - theta if far else theta) * np.where(ahead, 1, -1)
-    order = np.argsort(from_normal[here])
-    p = (entry.f[here] * np.abs(entry.wo[here, 2:])).mean(axis=1)
+    from_normal, p = _in_plane_tuples(entry, far)
     side = ", transmitted" if far else ""
     mark, line = ("^", "--") if far else (".", "-")
-    ax.plot(from_normal[here][order], np.cbrt(p[order]), mark, color=MEASURED, ms=3, label=f"measured{side}")
+    ax.plot(from_normal, np.cbrt(p), mark, color=MEASURED, ms=3, label=f"measured{side}")
     x = np.linspace(-89.5, 89.5, 359)
     wo_theta = np.radians(np.abs(x))
     wo = direction(np.pi - wo_theta if far else wo_theta, np.radians(entry.phi_deg + np.where(x > 0, 180, 0)))
     f = MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo)
     ax.plot(x, np.cbrt((f * np.abs(wo[:, 2:])).mean(axis=1)), line, color=MODEL, lw=1.2, label=f"model{side}")
+
+
+def _in_plane_tuples(entry: Incidence, far: bool) -> tuple[Floats, Floats]:
+    """Signed theta_o in degrees from the side's normal, and mean p, of the tuples nearest the plane of incidence.
+
+    Per `THETA_STEP_DEG` the nearest tuple alone, and none that is further than `PLANE_DEG` from the plane.
+    """
+    theta, phi = angles(entry.wo)
+    off = np.degrees(phi) - entry.phi_deg
+    aside_deg = np.degrees(np.arcsin(np.clip(np.sin(theta) * np.abs(np.sin(np.radians(off))), 0, 1)))
+    ahead = np.cos(np.radians(off)) <= 0
+    signed = np.degrees(np.pi - theta if far else theta) * np.where(ahead, 1, -1)
+    usable = np.flatnonzero((aside_deg <= PLANE_DEG) & ((entry.wo[:, 2] < 0) == far))
+    nearest_first = usable[np.argsort(aside_deg[usable], kind="stable")]
+    _, first = np.unique(np.round(signed[nearest_first] / THETA_STEP_DEG), return_index=True)
+    chosen = nearest_first[first]
+    return signed[chosen], (entry.f[chosen] * np.abs(entry.wo[chosen, 2:])).mean(axis=1)
 
 
 def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
