@@ -104,7 +104,8 @@ def check_path_tracer() -> Check:
 
     probe = probe_engine()
     if probe.engine is None:
-        return Check("path tracer", False, f"{'; '.join(probe.failures)}; {MEND}", essential=True)
+        reasons = list(probe.failures) if _manager() else [*probe.failures, MEND]
+        return Check("path tracer", False, "; ".join(reasons), essential=True)
     version = f" {probe.engine.llvm_version}" if probe.engine.llvm_version else ""
     found = f"{probe.engine.variant}{version}, {probe.engine.threads} threads"
     return Check("path tracer", True, found, essential=True)
