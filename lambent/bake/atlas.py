@@ -18,7 +18,7 @@ from lambent.scenes.scene import Mesh, Scene, SceneObject
 from lambent.store.contract import ObjectRecord, needs_probe
 
 Array = NDArray[np.floating]
-PIECE_FACES = 4000  # more per piece is slower, fewer cost seams
+PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
 PADDING_TEXELS = 2  # between charts, so that a bilinear look-up stays within the texels of its own chart
 
 

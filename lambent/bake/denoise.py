@@ -7,51 +7,60 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
-SHIFTS = [(r, c) for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)]
-RINGS = 16  # texels grown by nearest neighbours; what is farther from any chart is never looked up
-
+RINGS = 16  # texels grown into gutters; what is farther from any chart is never looked up
 RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
 
 
-def fill(values: Array, known: Mask, labels: NDArray[np.integer] | None = None) -> Array:
+def fill(values: Array, known: Mask, labels: NDArray[np.integer]) -> Array:
     """Grow known texels into unknown ones: (H, W, C) with no black left.
 
     Parameters
     ----------
     known : (H, W) bool
         Texels whose value counts.
-    labels : (H, W) int, optional
+    labels : (H, W) int
         Chart of each texel, -1 in gutters. An unknown texel within a chart takes values from its own chart first,
         so that a wall behind a cupboard is not filled with what lies next to it in the map.
     """
-    filled, known = np.where(known[..., None], values, 0.0), known.copy()
-    if labels is not None:
-        while _grow(filled, known, labels):
-            pass
+    if not known.any():
+        return np.zeros_like(values)
+    h, w, channels = values.shape
+    grown = _Grown(np.pad(np.where(known[..., None], values, 0.0), ((1, 1), (1, 1), (0, 0))), np.pad(known, 1))
+    chart = np.pad(labels, 1, constant_values=-1).reshape(-1)
+    while grown.ring(chart):
+        pass
     for _ in range(RINGS):
-        if not _grow(filled, known, None):
-            break
-    if known.any() and not known.all():
-        filled[~known] = filled[known].mean(axis=0)
+        grown.ring(None)
+    filled = grown.values.reshape(h + 2, w + 2, channels)[1:-1, 1:-1]
+    left = ~grown.known.reshape(h + 2, w + 2)[1:-1, 1:-1]
+    filled[left] = values[known].mean(axis=0)
     return filled
 
 
-def _grow(filled: Array, known: Mask, labels: NDArray[np.integer] | None) -> bool:
-    """One ring: unknown texels take the mean of their known neighbours (of their own chart, where labels are given)."""
-    h, w = known.shape
-    total, count = np.zeros_like(filled), np.zeros(known.shape)
-    for row, column in SHIFTS:
-        to = slice(max(0, row), h + min(0, row)), slice(max(0, column), w + min(0, column))
-        at = slice(max(0, -row), h + min(0, -row)), slice(max(0, -column), w + min(0, -column))
-        take = known[at] & ~known[to]
-        if labels is not None:
-            take &= (labels[at] == labels[to]) & (labels[to] >= 0)
-        total[to] += np.where(take[..., None], filled[at], 0)
-        count[to] += take
-    new = count > 0
-    filled[new] = total[new] / count[new][:, None]
-    known |= new
-    return bool(new.any())
+class _Grown:
+    """A map with a border of one, as flat arrays, that grows ring by ring from its known texels."""
+
+    def __init__(self, values: Array, known: Mask) -> None:
+        height, width = known.shape
+        self.values, self.known = values.reshape(height * width, -1), known.reshape(-1).copy()
+        self.steps = np.array([r * width + c for r in (-1, 0, 1) for c in (-1, 0, 1) if (r, c) != (0, 0)])
+        self.inner = np.zeros((height, width), bool)
+        self.inner[1:-1, 1:-1] = True
+        self.inner = self.inner.reshape(-1)
+
+    def ring(self, chart: NDArray[np.integer] | None) -> bool:
+        """Unknown texels next to known ones (of their own chart, where charts are given) take the mean of those."""
+        target = np.flatnonzero(self.inner & ~self.known & (True if chart is None else chart >= 0))
+        near = target[:, None] + self.steps
+        counts = self.known[near]
+        if chart is not None:
+            counts &= chart[near] == chart[target][:, None]
+        new = counts.any(axis=1)
+        near, counts, target = near[new], counts[new], target[new]
+        total = (self.values[near] * counts[..., None]).sum(axis=1)
+        self.values[target] = total / counts.sum(axis=1)[:, None]
+        self.known[target] = True
+        return bool(len(target))
 
 
 def denoise(irradiance: Array) -> Array:

@@ -1,7 +1,7 @@
 """Path tracing: radiance along rays and irradiance at points, one vectorised loop for every bake.
 
 Multiple importance sampling between emitter sampling and BSDF sampling (Veach 1997, balance heuristic), Russian
-roulette from the fifth bounce on. The path starts at a vertex the caller has sampled, of whose density it tells.
+roulette from the second bounce on. The path starts at a vertex the caller has sampled, of whose density it tells.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-ROULETTE_DEPTH = 5
+ROULETTE_DEPTH = 2
 Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
 
 

@@ -25,7 +25,7 @@ EYE_HEIGHT = 1.6  # metres
 FLAT_SHARE = 0.9  # of an object's area with normals along one axis
 CLEARANCE = 0.02  # metres beyond the surface of the solid that a centre is moved out of
 MOVES = 4
-ENCLOSING_SHARE = 0.5  # of the directions that see the object's own outer sides
+ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides
 
 
 def probe_centre(builder: SceneBuilder, name: str, without: Any) -> Array:
@@ -80,7 +80,12 @@ def _distances(scene: Any, origin: Array, directions: Array) -> Array:
 
 
 def encloses(builder: SceneBuilder, name: str, centre: Array, whole: Any) -> bool:
-    """Whether the probe at `centre` is surrounded by the object itself, as by a room of one mesh: then it stays in."""
+    """Whether the object surrounds its probe and most of the scene, as a room of one mesh does: then it stays in."""
+    low, high = builder.scene.object(name).mesh.bounds
+    others = [np.mean(o.mesh.bounds, axis=0) for o in builder.scene.objects if o.name != name]
+    within = [bool(((middle > low) & (middle < high)).all()) for middle in others]
+    if not others or np.mean(within) < ENCLOSING_SHARE:
+        return False
     w = normalize(face_directions(8).reshape(-1, 3))
     ray = mi.Ray3f(mi.Point3f(*map(float, centre)), mi.Vector3f(np.ascontiguousarray(w.T, dtype=np.float32)))
     si = whole.ray_intersect(ray, mi.RayFlags.Minimal, True)

@@ -28,7 +28,7 @@ class Quality:
 QUALITIES = {
     quality.name: quality
     for quality in (
-        Quality("preview", 512, (64, 128), 0.10, 8, 256, 128, 16),
+        Quality("preview", 448, (64, 128), 0.30, 8, 256, 128, 16),
         Quality("normal", 1024, (128, 1024), 0.04, 12, 512, 256, 64),
         Quality("final", 2048, (256, 8192), 0.015, 24, 1024, 256, 512),
     )

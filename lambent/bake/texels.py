@@ -113,10 +113,16 @@ def _closer(best: _Nearest, corners: Array, faces: Indices, low: Indices, counts
     face = np.repeat(faces, pairs)
     number = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
     x, y = low[face, 0] + number % counts[face, 0], low[face, 1] + number // counts[face, 0]
-    weights, offset = _closest_point(corners[face], np.stack([x, y], axis=-1).astype(float))
-    near = np.abs(offset).max(axis=-1) <= reach + 1e-9
-    cell, face, weights = (y * width + x)[near], face[near], weights[near]
-    distance = (offset[near] ** 2).sum(axis=-1)
+    cells = np.stack([x, y], axis=-1).astype(float)
+    weights, within = _barycentric(corners[face], cells)
+    distance = np.zeros(len(face))
+    near = within
+    if reach > 0:
+        outside = np.flatnonzero(~within)
+        weights[outside], offset = _closest_on_edges(corners[face[outside]], cells[outside])
+        distance[outside] = (offset**2).sum(axis=-1)
+        near[outside] = np.abs(offset).max(axis=-1) <= reach
+    cell, face, weights, distance = (y * width + x)[near], face[near], weights[near], distance[near]
     order = np.lexsort((face, distance, cell))
     cell, first = np.unique(cell[order], return_index=True)
     chosen = order[first]
@@ -125,29 +131,31 @@ def _closer(best: _Nearest, corners: Array, faces: Indices, low: Indices, counts
     best.face[cell], best.weights[cell], best.distance[cell] = face[chosen], weights[chosen], distance[chosen]
 
 
-def _closest_point(triangles: Array, points: Array) -> tuple[Array, Array]:
-    """Barycentric weights (n, 3) of the point of each triangle (n, 3, 2) nearest to points (n, 2), and the offset."""
+def _barycentric(triangles: Array, points: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Barycentric weights (n, 3) of points (n, 2) in triangles (n, 3, 2), and whether they lie within."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     area = _cross(b - a, c - a)
     solid = np.abs(area) > 1e-12
-    safe = np.where(solid, area, 1.0)
-    inner = np.stack([_cross(c - b, points - b), _cross(a - c, points - c), _cross(b - a, points - a)], -1)
-    inner /= safe[:, None]
-    within = (inner >= 0).all(axis=1) & solid
-    best = np.where(within, 0.0, np.inf)
-    weights = inner
+    weights = np.stack([_cross(c - b, points - b), _cross(a - c, points - c), _cross(b - a, points - a)], -1)
+    weights /= np.where(solid, area, 1.0)[:, None]
+    return weights, (weights >= 0).all(axis=1) & solid
+
+
+def _closest_on_edges(triangles: Array, points: Array) -> tuple[Array, Array]:
+    """Barycentric weights (n, 3) of the points on the triangles' edges nearest to points (n, 2), and the offsets."""
+    best = np.full(len(points), np.inf)
+    weights, offset = np.zeros((len(points), 3)), np.zeros((len(points), 2))
     for i, j in ((0, 1), (1, 2), (2, 0)):
         start, edge = triangles[:, i], triangles[:, j] - triangles[:, i]
         length = (edge**2).sum(axis=1)
         t = np.divide(((points - start) * edge).sum(axis=1), length, out=np.zeros(len(points)), where=length > 0)
         t = t.clip(0, 1)
-        distance = ((points - start - t[:, None] * edge) ** 2).sum(axis=1)
-        closer = distance < best
-        on_edge = np.zeros_like(weights)
-        on_edge[:, i], on_edge[:, j] = 1 - t, t
-        weights = np.where(closer[:, None], on_edge, weights)
-        best = np.where(closer, distance, best)
-    return weights, points - np.einsum("ncx,nc->nx", triangles, weights)
+        away = points - start - t[:, None] * edge
+        closer = (away**2).sum(axis=1) < best
+        best[closer] = (away[closer] ** 2).sum(axis=1)
+        offset[closer], weights[closer] = away[closer], 0
+        weights[closer, i], weights[closer, j] = 1 - t[closer], t[closer]
+    return weights, offset
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.bake.small_scenes import TINY, constant_picture, furnace, plane, room_with_step
 
 from lambent.bake.bake import bake
+from lambent.bake.texels import texels_of
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, SceneObject
 from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, constant_picture, furnace, plane, room_with_step
 
 
 def known(store: Store, side: str = "raw") -> np.ndarray:
@@ -74,12 +75,19 @@ def test_texels_within_a_solid_are_not_sampled_and_do_not_darken_their_neighbour
     sampled = raw[..., 3].sum(axis=0) > 0
     black = raw[..., :3].sum(axis=(0, 3))[sampled] == 0
     assert black.mean() < 0.035, "only the underside of the block, outside the room"
-    assert store.read("light_map/irradiance").min() > 0.1
+    finished = store.read("light_map/irradiance").reshape(-1, 3)
+    geometry = {name: store.read(f"geometry/{name}") for name in ("positions", "normals", "uv2", "faces")}
+    texels = texels_of(geometry, sampled.shape[1], sampled.shape[0])
+    floor = (texels.face[:, 0] < store.documents["scene"]["objects"][0]["face_count"]) & (texels.flat[:, 0, 1] > 0.9)
+    assert not sampled.reshape(-1)[texels.index[floor]].all(), "the floor under the block is within it"
+    assert finished[texels.index[floor]].min() > 0.1, "and is filled from around it"
 
 
 def test_emission_of_many_objects_keeps_its_place(tmp_path: Path) -> None:
     floor = plane().objects[0]
-    lamp = SceneObject("lamp", replace(floor.mesh, positions=floor.mesh.positions + [0, 1e-2, 0]), "black", (7, 0, 0))
+    lamp = SceneObject(
+        "lamp", replace(floor.mesh, positions=floor.mesh.positions + np.float32([0, 1e-2, 0])), "black", (7, 0, 0)
+    )
     upside_down = replace(
         lamp, mesh=replace(lamp.mesh, normals=-lamp.mesh.normals, faces=lamp.mesh.faces[:, ::-1].copy())
     )
