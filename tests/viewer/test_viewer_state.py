@@ -115,3 +115,19 @@ def test_a_file_name_is_offered_for_any_material(state):
     assert state.file_name("brass") == "brass.json"
     assert state.file_name("../a/b:c") == "_a_b_c.json"
     assert state.file_name("...") == "material.json"
+
+
+def test_a_path_plays_to_its_end_and_again(state, scene):
+    tour = scene.paths[0]
+    state.toggle(tour)
+    state.play(1.0)
+    assert state.playing and state.camera.position not in (tour.keys[0].position, tour.keys[1].position)
+    state.toggle(tour)
+    before = state.camera
+    state.play(1.0)
+    assert state.camera == before
+    state.toggle(tour)
+    state.play(99.0)
+    assert not state.playing and state.camera.position == pytest.approx(tour.keys[1].position)
+    state.toggle(tour)
+    assert state.playing and state.path.time_s == 0
