@@ -1,0 +1,76 @@
+"""Devices and their limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import wgpu
+from conftest import wall_scene
+
+from lambent.bench.specular_scene import CAMERA
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.resources import device_needs
+from lambent.realtime.shader_source import assemble
+
+GLOSS = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1), Lobe(mx=0.2, my=0.2, side="transmission")))
+
+
+def test_all_of_a_frame_fits_the_default_limits(device) -> None:
+    """A device of WebGPU's default limits and no features draws everything."""
+    bare = choose_adapter().request_device_sync(required_limits=dict(WEBGPU_LIMITS))
+    assert bare.limits["max-bind-groups"] in (4, device.limits["max-bind-groups"])
+    assert not bare.features
+    renderer = Renderer(bare, wall_scene(GLOSS, np.ones((6, 16, 16, 3))))
+    for name in ("rings", "split-sum", "lobe-4.25"):
+        assert renderer.display_image(FrameState(CAMERA, 16, 16, integrator=name)).min() > 10
+    assert renderer.converged(FrameState(CAMERA, 16, 16), 16).min() > 0.01
+    assert renderer.statistics["gpu_ms"] == {}
+
+
+def test_adapter_info(device) -> None:
+    info = adapter_info(device)
+    assert info.name
+    assert info.type in ("DiscreteGPU", "IntegratedGPU", "VirtualGPU", "Unknown", "CPU")
+    assert info.is_software == (info.type == "CPU")
+
+
+def test_a_real_gpu_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Adapter:
+        def __init__(self, type: str, backend: str = "Vulkan") -> None:
+            self.info = {"adapter_type": type, "backend_type": backend}
+
+    found: list[Any] = [Adapter("CPU"), Adapter("DiscreteGPU", "OpenGL"), Adapter("IntegratedGPU")]
+    monkeypatch.setattr(wgpu.gpu, "enumerate_adapters_sync", lambda: found)
+    assert choose_adapter().info["adapter_type"] == "IntegratedGPU"
+    found[:] = []
+    with pytest.raises(UserError, match="apt-get install mesa-vulkan-drivers libvulkan1"):
+        choose_adapter()
+
+
+def test_limits_beyond_the_adapter_are_refused(device) -> None:
+    with pytest.raises(UserError, match="max-buffer-size"):
+        open_device({"max-buffer-size": 1 << 62})
+
+
+def test_a_large_scene_asks_for_what_it_needs(device) -> None:
+    scene = wall_scene(GLOSS, np.ones((6, 2, 2, 3)))
+    assert device_needs(scene) == {}
+    large = type(scene)(**{**vars(scene), "positions": np.broadcast_to(np.float32(0), (7_000_000, 3))})
+    assert device_needs(large) == {"max-buffer-size": 7_000_000 * 44}
+
+
+def test_includes_come_once_and_in_order(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lambent.realtime.shader_source.FOLDERS", (tmp_path,))
+    (tmp_path / "a.wgsl").write_text("const A = 1;\n")
+    (tmp_path / "b.wgsl").write_text('#include "a.wgsl"\nconst B = A;\n')
+    (tmp_path / "c.wgsl").write_text('#include "b.wgsl"\n#include "a.wgsl"\nconst C = B;\n')
+    assert [line for line in assemble("c.wgsl", "a.wgsl").splitlines() if line] == [
+        "const A = 1;", "const B = A;", "const C = B;",
+    ]  # fmt: skip
+    with pytest.raises(FileNotFoundError, match="shader d"):
+        assemble("d.wgsl")

@@ -1,0 +1,226 @@
+"""Pictures: the right way round, the right side, the right colour."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import cube_of, pixel_rays, smooth_light, wall_scene
+
+from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
+from lambent.core.colour import filmic, srgb_encode
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.scenes.geometry import patch, sphere
+from lambent.store.contract import CameraRecord
+
+FORWARD = CameraRecord(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)
+PAPER = Material(name="m", kd=0.5)
+
+
+def with_light_map(scene: BakedScene, front: np.ndarray, back: np.ndarray | None = None) -> BakedScene:
+    """The scene with light maps; uv2 runs with x and y over the unit square about the origin."""
+    uv2 = scene.positions[:, :2] + 0.5
+    return replace(scene, irradiance=front, irradiance_back=back, uv2=np.asarray(uv2, np.float32))
+
+
+def square(material: Material = PAPER) -> BakedScene:
+    mesh = patch((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+    return baked_scene({"square": mesh}, material, np.zeros((6, 2, 2, 3)))
+
+
+def test_plus_x_is_right_and_plus_y_is_up(device) -> None:
+    meshes = {"right": patch((0.2, 0.1, 0), (0.3, 0, 0), (0, 0.3, 0))}
+    scene = baked_scene(meshes, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(np.pi, np.pi, np.pi))
+    image = Renderer(device, scene).image(FrameState(FORWARD, 64, 64))[..., 0]
+    rows, columns = np.nonzero(image > 0.25)
+    assert len(rows) > 10
+    assert columns.min() > 32
+    assert rows.max() < 32
+
+
+def test_field_of_view_is_vertical_and_whole(device) -> None:
+    """A square of half size tan(fov/2) times the distance fills the height, and half of a picture twice as wide."""
+    half = 2 * np.tan(np.radians(30))
+    mesh = patch((-half, -half, 0), (2 * half, 0, 0), (0, 2 * half, 0))
+    scene = baked_scene({"m": mesh}, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(1, 1, 1))
+    lit = Renderer(device, scene).image(FrameState(FORWARD, 64, 32))[..., 0] > 0
+    np.testing.assert_array_equal(np.flatnonzero(lit.any(axis=0)), np.arange(16, 48))
+    assert lit.any(axis=1).all()
+
+
+def test_sky_shows_the_cube_map_unmirrored(device) -> None:
+    """Also the test that the GPU reads faces as core.cubemap writes them: cameras look along all axes."""
+    scene = replace(square(), environment=cube_of(smooth_light))
+    renderer = Renderer(device, scene)
+    for target in np.concatenate([np.eye(3), -np.eye(3)]):
+        position = np.array([5.0, 5.0, 5.0])
+        camera = CameraRecord(name="c", position=tuple(position), target=tuple(position + target), fov_y_deg=70)
+        image = renderer.image(FrameState(camera, 24, 18))
+        np.testing.assert_allclose(image, smooth_light(pixel_rays(camera, 24, 18)), rtol=0.02)
+
+
+def test_reflections_meet_at_the_edges_of_cube_faces(device) -> None:
+    """Rough reflections of smooth light are smooth: no seam where MIP levels of neighbouring faces meet."""
+    gloss = Material(name="m", lobes=(Lobe(mx=0.25, my=0.25, r0=1.0),))
+    scene = baked_scene({"sphere": sphere(0.62)}, gloss, cube_of(smooth_light, 32))
+    state = FrameState(CAMERA, 160, 120, n=40, antialias=False, show="specular")
+    renderer = Renderer(device, scene)
+    error = renderer.image(state) - renderer.converged(replace(state, n=16), 1024)
+    height, width = np.indices(error.shape[:2])
+    inside = np.hypot(height - 59.5, width - 79.5) < 24
+    for axis in (0, 1):
+        steps = np.abs(np.diff(error, axis=axis, append=0))[inside]
+        assert steps.max() < 0.02, steps.max()
+
+
+def test_light_map_rows_follow_the_contract(device) -> None:
+    """Texel (row, column) has its centre at uv2 = ((column + 1/2)/W, (row + 1/2)/H): v up means row up."""
+    light = np.zeros((4, 4, 3), np.float32)
+    light[3, 3] = np.pi * 2
+    image = Renderer(device, with_light_map(square(), light)).image(FrameState(FORWARD, 64, 64))[..., 0]
+    row, column = np.unravel_index(image.argmax(), image.shape)
+    assert image.max() == pytest.approx(1, rel=0.01)
+    assert row < 32 < column
+
+
+def test_a_sheet_shows_on_each_side_what_falls_on_and_through_it(device) -> None:
+    sheet = Material(name="m", kd=(0.5, 0, 0), kt_d=(0, 0.25, 0))
+    front, back = np.full((1, 1, 3), np.pi, np.float32), np.full((1, 1, 3), 3 * np.pi, np.float32)
+    renderer = Renderer(device, with_light_map(square(sheet), front, back))
+    behind = CameraRecord(name="behind", position=(0, 0, -2), target=(0, 0, 0))
+    for camera, expected in ((FORWARD, (0.5, 0.75, 0)), (behind, (1.5, 0.25, 0))):
+        np.testing.assert_allclose(renderer.image(FrameState(camera, 9, 9))[4, 4], expected, rtol=1e-3, atol=1e-3)
+
+
+def test_emission_goes_one_way(device) -> None:
+    scene = square(Material(name="m"))
+    lamp = scene.record.objects[0].model_copy(update={"emission": (7.0, 5.0, 3.0)})
+    scene = replace(scene, record=scene.record.model_copy(update={"objects": (lamp,)}))
+    renderer = Renderer(device, scene)
+    behind = CameraRecord(name="behind", position=(0, 0, -2), target=(0, 0, 0))
+    np.testing.assert_allclose(renderer.image(FrameState(FORWARD, 9, 9))[4, 4], (7, 5, 3), rtol=1e-3)
+    assert renderer.image(FrameState(behind, 9, 9))[4, 4].max() == 0
+
+
+def test_back_of_a_reflector_reflects_its_own_side(device) -> None:
+    mirror = Material(name="m", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
+    renderer = Renderer(device, wall_scene(mirror, cube_of(smooth_light)))
+    for z in (2.0, -2.0):
+        camera = CameraRecord(name="c", position=(0.3, 0.2, z), target=(0.1, 0.0, 0.0), fov_y_deg=40)
+        image = renderer.image(FrameState(camera, 16, 12, n=1, lookup="plain", antialias=False))
+        expected = smooth_light(pixel_rays(camera, 16, 12) * [1, 1, -1])
+        np.testing.assert_allclose(image, expected, rtol=0.02)
+
+
+def test_show_splits_the_light(device) -> None:
+    both = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.2, my=0.2),))
+    scene = baked_scene(sphere_and_torus(), both, studio(32), irradiance=(1, 1, 1))
+    renderer = Renderer(device, replace(scene, environment=None))
+    full, diffuse, specular = (
+        renderer.image(FrameState(CAMERA, 48, 36, show=show, antialias=False))
+        for show in ("full", "diffuse", "specular")
+    )
+    np.testing.assert_allclose(full, diffuse + specular, rtol=1e-4, atol=1e-6)
+    assert diffuse.max() == pytest.approx(0.5 / np.pi, rel=1e-3)
+    assert specular.max() > 0.01
+
+
+@pytest.mark.parametrize("view_transform", ["linear", "filmic"])
+def test_display_image_is_exposed_and_encoded(device, view_transform: str) -> None:
+    scene = replace(square(), environment=cube_of(smooth_light))
+    renderer = Renderer(device, scene)
+    away = CameraRecord(name="away", position=(0, 0, 2), target=(1, 1, 3), fov_y_deg=70)
+    state = FrameState(away, 24, 16, exposure_ev=-0.7, view_transform=view_transform)
+    linear = renderer.image(state)
+    exposed = filmic(linear, -0.7) if view_transform == "filmic" else linear * 2**-0.7
+    np.testing.assert_allclose(renderer.display_image(state), srgb_encode(exposed) * 255, atol=0.51)
+
+
+def test_neutral_keeps_colours_and_tames_highlights(device) -> None:
+    """Khronos PBR Neutral: below .8 - .04 a colour loses only its .04 offset; above, it stays below 1."""
+    scene = replace(square(), environment=np.broadcast_to(np.array([0.5, 0.3, 0.2]), (6, 2, 2, 3)))
+    renderer = Renderer(device, scene)
+    away = CameraRecord(name="away", position=(0, 0, 2), target=(0, 0, 3))
+    state = FrameState(away, 4, 4, view_transform="neutral")
+    expected = srgb_encode(np.array([0.46, 0.26, 0.16])) * 255
+    np.testing.assert_allclose(renderer.display_image(state)[0, 0], expected, atol=0.6)
+    bright = renderer.display_image(replace(state, exposure_ev=6))[0, 0]
+    assert 240 < bright.max() <= 255
+    assert bright[2] > 200
+
+
+def test_progressive_frames_average(device) -> None:
+    """The mean of a series is the mean of its frames, whatever was drawn before."""
+    gloss = Material(name="m", lobes=(Lobe(mx=0.3, my=0.3, r0=1.0),))
+    renderer = Renderer(device, baked_scene({"sphere": sphere(0.62)}, gloss, studio(32)))
+    state = FrameState(CAMERA, 48, 36, integrator="qmc", n=4)
+    renderer.image(replace(state, accumulate=0, camera=FORWARD))
+    converged = renderer.converged(replace(state, antialias=False), 4 * 64)
+    frames = renderer.converged(replace(state, antialias=False, n=64), 4 * 64)
+    np.testing.assert_allclose(converged, frames, rtol=2e-4, atol=1e-5)  # the same samples in other frames
+
+
+def test_jitter_antialiases(device) -> None:
+    mesh = patch((-0.4, -0.3, 0), (0.8, 0.2, 0), (-0.2, 0.6, 0))
+    scene = baked_scene({"m": mesh}, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(np.pi, np.pi, np.pi))
+    renderer = Renderer(device, scene)
+    state = FrameState(FORWARD, 48, 36)
+    smooth = renderer.converged(replace(state, n=1), 256)[..., 0]
+    hard = renderer.image(replace(state, antialias=False))[..., 0]
+    msaa = renderer.image(state)[..., 0]
+    assert set(np.unique(hard.round(2))) == {0.0, 0.5}
+    assert np.abs(msaa - smooth).mean() < 0.5 * np.abs(hard - smooth).mean()
+    assert np.mean((smooth > 0.01) & (smooth < 0.49)) > 0.02
+
+
+def test_a_material_edit_shows_and_is_undone(device) -> None:
+    renderer = Renderer(device, with_light_map(square(), np.full((1, 1, 3), np.pi, np.float32)))
+    state = FrameState(FORWARD, 8, 8)
+    before = renderer.image(state)
+    edited = renderer.image(replace(state, materials={"m": PAPER.model_copy(update={"kd": (0.9, 0.1, 0.1)})}))
+    np.testing.assert_allclose(edited[4, 4], (0.9, 0.1, 0.1), rtol=1e-3)
+    np.testing.assert_array_equal(renderer.image(state), before)
+
+
+def test_no_pixel_is_lost_at_silhouettes(device) -> None:
+    """Interpolated normals turn away from the viewer at edges; there must be light all the same."""
+    gloss = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=0.5, alpha=0.5),))
+    renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, np.ones((6, 4, 4, 3), np.float32)))
+    for name in ("rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum"):
+        image = renderer.image(FrameState(CAMERA, 160, 120, integrator=name, n=7, antialias=False))
+        assert np.isfinite(image).all()
+        assert image.min() > 0.05, name
+
+
+def test_statistics(device) -> None:
+    renderer = Renderer(device, square())
+    renderer.display_image(FrameState(FORWARD, 16, 16))
+    statistics = renderer.statistics
+    assert statistics["draw_calls"] == 3
+    assert statistics["triangles"] == 2
+    if "timestamp-query" in device.features:
+        assert set(statistics["gpu_ms"]) == {"depth", "shade", "tonemap"}
+        assert all(0 <= ms < 1e4 for ms in statistics["gpu_ms"].values())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"integrator": "ring"},
+        {"n": 0},
+        {"n": 65},
+        {"view_transform": "film"},
+        {"show": "all"},
+        {"width": 0},
+        {"lookup": "plane"},
+    ],
+)
+def test_impossible_frames_are_refused(device, change: dict[str, object]) -> None:
+    gloss = Material(name="m", lobes=(Lobe(mx=0.1, my=0.1),))
+    renderer = Renderer(device, square(gloss))
+    with pytest.raises(UserError):
+        renderer.image(replace(FrameState(FORWARD, 8, 8), **change))

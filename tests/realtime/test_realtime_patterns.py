@@ -1,0 +1,100 @@
+"""Where samples lie: masses, symmetry, no jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.materials.document import Lobe, Material
+from lambent.realtime import patterns
+
+NS = (3, 5, 7, 9, 11, 13, 15, 17, 19, 40)
+
+
+@pytest.mark.parametrize("n", range(1, patterns.N_MAX + 1))
+def test_ring_counts_add_up(n: int) -> None:
+    counts = patterns.ring_counts(n)
+    assert sum(counts) == n
+    assert min(counts) >= 1
+
+
+@pytest.mark.parametrize("ggx", [False, True])
+@pytest.mark.parametrize("n", NS)
+def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, ggx: bool) -> None:
+    slopes, _ = patterns.ring_pattern(n, ggx)
+    r = np.linalg.norm(slopes, axis=-1)
+    inside = r**2 / (1 + r**2) if ggx else 1 - np.exp(-(r**2))
+    before = 0
+    for count in patterns.RINGS[n]:
+        expected = 0.0 if count == 1 and before == 0 else (before + count / 2) / n
+        np.testing.assert_allclose(inside[before : before + count], expected, atol=1e-12)
+        before += count
+
+
+@pytest.mark.parametrize("n", NS)
+def test_rings_are_balanced(n: int) -> None:
+    slopes, _ = patterns.ring_pattern(n)
+    np.testing.assert_allclose(slopes.mean(axis=0), 0, atol=1e-12)
+    covariance = slopes.T @ slopes / n  # a Beckmann slope has variance m^2/2 per axis
+    if n != 9:  # the inner ring of two is not round
+        assert covariance[0, 0] == pytest.approx(covariance[1, 1])
+    assert np.trace(covariance) == pytest.approx(1.0, abs=1.4 / np.sqrt(n) - 0.1)
+
+
+def test_line_is_the_quantile_of_the_marginal() -> None:
+    from scipy.special import erf
+
+    for n in NS:
+        x = patterns.line_pattern(n)[0][:, 0]
+        np.testing.assert_allclose((1 + erf(x)) / 2, (np.arange(n) + 0.5) / n, atol=1e-9)
+    rng = np.random.default_rng(0)
+    u1, u2 = rng.random((2, 200_000))
+    marginal = patterns.radius(u1, True) * np.cos(2 * np.pi * u2)
+    quantiles = np.quantile(marginal, (np.arange(7) + 0.5) / 7)
+    np.testing.assert_allclose(patterns.line_pattern(7, True)[0][:, 0], quantiles, atol=0.03)
+
+
+@pytest.mark.parametrize("table", [patterns.rings_table, patterns.lobe_table])
+@pytest.mark.parametrize("n", [5, 7, 19])
+def test_no_jump_while_the_roughness_slides(table, n: int) -> None:
+    ratios = np.geomspace(0.1, 10, 4001)
+    tables = np.array([table(Lobe(mx=0.1, my=float(0.1 * ratio)), n) for ratio in ratios])
+    scale = 0.1 * np.maximum(1, ratios)[1:, None, None]
+    steps = np.abs(np.diff(tables[:, :, :2], axis=0)) / scale
+    # Samples keep their place in the order along the long axis, which changes hands at ratio 1, where all are rings.
+    sets = [{tuple(np.round(row, 6)) for row in t[:, :2]} for t in tables[[1999, 2000, 2001]]]
+    assert all(len(s) == n for s in sets)
+    turned_on = np.abs(np.log(ratios[1:])) > np.log(patterns.LINE_BETWEEN[0]) + 0.01
+    assert steps[turned_on].max() < 0.01
+
+
+@pytest.mark.parametrize("mx, my, long_axis", [(0.1, 0.01, 0), (0.01, 0.1, 1)])
+@pytest.mark.parametrize("table", [patterns.rings_table, patterns.lobe_table])
+def test_long_lobes_are_sampled_along_their_length(table, mx: float, my: float, long_axis: int) -> None:
+    rows = table(Lobe(mx=mx, my=my), 9)
+    assert np.abs(rows[:, 1 - long_axis]).max() < 1e-7
+    np.testing.assert_allclose(np.sort(rows[:, long_axis]), -np.sort(rows[:, long_axis])[::-1], atol=1e-6)
+    assert np.abs(rows[:, long_axis]).max() > 0.1
+
+
+def test_the_thesis_ring_is_two_fifths_of_the_way_to_the_border() -> None:
+    lobe = Lobe(mx=0.2, my=0.2)
+    rows = patterns.lobe_table(lobe, 7)
+    limit = np.arctan(0.2 * np.sqrt(-np.log(0.01)))  # 4.10
+    angles = np.arctan(np.linalg.norm(rows[:, :2], axis=-1))
+    np.testing.assert_allclose(angles, [0, *[0.4 * limit] * 6], rtol=1e-5)
+    np.testing.assert_allclose(rows[1:, 3], np.exp(-((np.tan(0.4 * limit) / 0.2) ** 2)), rtol=1e-5)
+
+
+def test_fis_filters_share_out_the_sphere_of_slopes() -> None:
+    """c = 4 pi mx my/(n w): the solid angle of a sample is 1/(n pdf)."""
+    lobe = Lobe(mx=0.3, my=0.1)
+    rows = patterns.fis_table(lobe, 16)
+    np.testing.assert_allclose(4.0 ** rows[:, 2] * rows[:, 3], 4 * np.pi * 0.03 / 16, rtol=1e-5)
+
+
+def test_more_samples_for_wider_lobes() -> None:
+    counts = [patterns.automatic_n(Material(lobes=(Lobe(mx=m, my=m),))) for m in (0.002, 0.01, 0.05, 0.15, 0.3, 0.6)]
+    assert counts == sorted(counts)
+    assert counts[0] == 1
+    assert counts[-1] == 19
