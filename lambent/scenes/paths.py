@@ -8,10 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from lambent.core.frames import Floats, normalize
-from lambent.scenes.geometry.curves import catmull_rom
+from lambent.scenes.geometry.curves import catmull_rom, centripetal_knots
 from lambent.scenes.scene import Camera, Triple
 
-STEPS = 64  # chords per segment that measure the curve's length
+STEPS = 256  # chords per segment that measure the curve's length
 
 
 class CameraLike(Protocol):
@@ -39,39 +39,39 @@ class PathLike(Protocol):
 def sample_path(path: PathLike, t: float) -> Camera:
     """Camera at share t in [0, 1] of a path's time.
 
-    Positions lie on a Catmull-Rom curve through the keys and move at constant speed over the whole path; target, up
-    and field of view follow the same parameter. Values of t beyond the ends give the ends.
+    Positions lie on a centripetal Catmull-Rom curve through the keys and move at constant speed over the whole path;
+    target, up and field of view follow the same parameter. Values of t beyond the ends give the ends.
     """
     keys = path.keys
     positions, targets, ups = (
         np.array([getattr(k, what) for k in keys], float) for what in ("position", "target", "up")
     )  # fmt: skip
     fov = np.array([[k.fov_y_deg] for k in keys], float)
-    u = np.array([_parameter(positions, float(np.clip(t, 0, 1)))])
-    up = normalize(catmull_rom(ups, u)[0][0])
-    position, target = catmull_rom(positions, u)[0][0], catmull_rom(targets, u)[0][0]
-    fov_y_deg = float(np.clip(catmull_rom(fov, u)[0][0, 0], fov.min(), fov.max()))
-    return Camera(path.name, _triple(position), _triple(target), _triple(up), fov_y_deg)
+    knots = centripetal_knots(positions)
+    u = np.array([_parameter(positions, knots, float(np.clip(t, 0, 1)))])
+    position, target, up, angle = (catmull_rom(p, u, knots=knots)[0][0] for p in (positions, targets, ups, fov))
+    fov_y_deg = float(np.clip(angle[0], fov.min(), fov.max()))
+    return Camera(path.name, _triple(position), _triple(target), _triple(normalize(up)), fov_y_deg)
 
 
 def path_length(path: PathLike) -> float:
     """Length of the way in metres."""
-    return float(_lengths(np.array([k.position for k in path.keys], float))[-1])
+    positions = np.array([k.position for k in path.keys], float)
+    return float(_lengths(positions, centripetal_knots(positions))[1][-1])
 
 
-def _lengths(points: Floats) -> Floats:
-    """Length from the start at STEPS parameters per segment."""
-    u = np.linspace(0, len(points) - 1, (len(points) - 1) * STEPS + 1)
-    chords = np.linalg.norm(np.diff(catmull_rom(points, u)[0], axis=0), axis=-1)
-    return np.concatenate([[0.0], np.cumsum(chords)])
+def _lengths(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
+    """Parameters, STEPS per segment, and the length of the curve up to each."""
+    u = np.interp(np.linspace(0, len(knots) - 1, (len(knots) - 1) * STEPS + 1), np.arange(len(knots)), knots)
+    chords = np.linalg.norm(np.diff(catmull_rom(points, u, knots=knots)[0], axis=0), axis=-1)
+    return u, np.concatenate([[0.0], np.cumsum(chords)])
 
 
-def _parameter(points: Floats, share: float) -> float:
-    """Curve parameter at a share of the length; of a path that stands still, the share itself."""
-    lengths = _lengths(points)
-    u = np.linspace(0, len(points) - 1, len(lengths))
+def _parameter(points: Floats, knots: Floats, share: float) -> float:
+    """Curve parameter at a share of the length; of a path that stands still, that share of the parameters."""
+    u, lengths = _lengths(points, knots)
     if lengths[-1] == 0:
-        return share * (len(points) - 1)
+        return float(share * knots[-1])
     return float(np.interp(share * lengths[-1], lengths, u))
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from lambent.scenes.builtin.parts import block, thing
 from lambent.scenes.geometry import box as box_mesh
 from lambent.scenes.geometry import patch, placed, sphere, turn
 from lambent.scenes.scene import SceneObject
 
 
-def box() -> list[SceneObject]:
+@cache
+def box() -> tuple[SceneObject, ...]:
     """Half a metre each way about (0, 0.5, 0); red left, green right, all else white."""
-    return [
+    return (
         thing("floor", "white", patch((-0.5, 0, 0.5), (1, 0, 0), (0, 0, -1))),
         thing("ceiling", "white", patch((-0.5, 1, -0.5), (1, 0, 0), (0, 0, 1))),
         thing("back", "white", patch((-0.5, 0, -0.5), (1, 0, 0), (0, 1, 0))),
@@ -19,4 +22,4 @@ def box() -> list[SceneObject]:
         thing("lamp", "black", block((-0.15, 0.97, -0.15), (0.15, 1.01, 0.15))),
         thing("sphere", "metal", placed(sphere(0.18, 24, 12), (0.2, 0.18, 0.15))),
         thing("block", "white", placed(box_mesh((0.26, 0.5, 0.26)), (-0.2, 0.249, -0.15), turn("y", 20))),
-    ]
+    )

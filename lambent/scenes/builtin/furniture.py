@@ -39,7 +39,7 @@ def chair(name: str) -> list[SceneObject]:
     rods += [tube([(s * 0.185, 0.425, 0.18), (s * 0.187, 0.425, -0.19)], 0.011, 10) for s in (-1, 1)]
     rods += [tube([(-0.187, 0.425, z), (0.187, 0.425, z)], 0.011, 10) for z in (0.175, -0.185)]
     seat = placed(cushion((0.45, 0.055, 0.44), 5.0, 5), (0, 0.458, 0.005))
-    back = placed(cushion((0.42, 0.25, 0.04), 5.0, 5), (0, 0.72, -0.215), turn("x", -14))
+    back = placed(cushion((0.42, 0.25, 0.04), 5.0, 5), (0, 0.72, -0.198), turn("x", -14))
     return [thing(f"{name}_frame", "black_steel", *rods), thing(f"{name}_upholstery", "cloth_chair", seat, back)]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from lambent.scenes.builtin import furniture, props
 from lambent.scenes.builtin.garden import garden
 from lambent.scenes.builtin.parts import at
@@ -13,7 +15,8 @@ TABLE = (1.2, 0.0, 1.05)
 SIDEBOARD = (-X, 0.0, -0.55)
 
 
-def room() -> list[SceneObject]:
+@cache
+def room() -> tuple[SceneObject, ...]:
     """Every object of the room, in world space."""
     table_x, _, table_z = TABLE
     on_table, on_sideboard = furniture.TABLE_HIGH, furniture.SIDEBOARD_HIGH
@@ -44,4 +47,4 @@ def room() -> list[SceneObject]:
     on_shelf = furniture.SHELF_HIGH - 0.0005
     objects += at([props.vase("vase_red", "ceramic_red", 1.15, 40, 2)], (-1.13, on_shelf, Z - 0.17))
     objects += at(props.shelf_lamp(), (-1.62, on_shelf, Z - 0.17))
-    return objects
+    return tuple(objects)

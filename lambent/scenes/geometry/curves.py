@@ -7,22 +7,43 @@ import numpy as np
 from lambent.core.frames import Floats
 
 
-def catmull_rom(points: Floats, t: Floats, closed: bool = False) -> tuple[Floats, Floats]:
+def catmull_rom(points: Floats, t: Floats, closed: bool = False, knots: Floats | None = None) -> tuple[Floats, Floats]:
     """Position and derivative (N, D) at parameters t (N,) of the Catmull-Rom curve through `points` (K, D).
 
-    Point k is passed at t = k (Catmull & Rom 1974, uniform knots). An open curve's end points are mirrored, so that
-    it ends straight; a closed one comes back to its first point at t = K.
+    Point k is passed at t = knots[k], k where no knots are given (Catmull & Rom 1974). An open curve ends straight; a
+    closed one comes back to its first point one step of 1 after the last.
     """
-    count = len(points) if closed else len(points) - 1
+    if knots is None:
+        knots = np.arange(len(points), dtype=float)
     if closed:
-        padded = np.concatenate([points[-1:], points, points[:2]])
+        points = np.concatenate([points, points[:1]])
+        knots = np.append(knots, knots[-1] + 1)
+    step = np.diff(knots)[:, None]
+    slope = np.diff(points, axis=0) / step
+    if closed:
+        before, after = np.concatenate([slope[-1:], slope]), np.concatenate([slope, slope[:1]])
+        d0, d1 = np.concatenate([step[-1:], step]), np.concatenate([step, step[:1]])
     else:
-        padded = np.concatenate([2 * points[:1] - points[1:2], points, 2 * points[-1:] - points[-2:-1]])
-    k = np.clip(np.floor(t).astype(int), 0, count - 1)
-    s = (t - k)[:, None]
-    p0, p1, p2, p3 = (padded[k + i] for i in range(4))
-    a, b, c = 2 * p0 - 5 * p1 + 4 * p2 - p3, 3 * p1 - p0 - 3 * p2 + p3, p2 - p0
-    return p1 + 0.5 * s * (c + s * (a + s * b)), 0.5 * (c + s * (2 * a + s * 3 * b))
+        before, after = np.concatenate([slope[:1], slope]), np.concatenate([slope, slope[-1:]])
+        d0, d1 = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
+    tangents = (before * d1 + after * d0) / (d0 + d1)
+    k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(step) - 1)
+    d = step[k]
+    s = (t[:, None] - knots[k][:, None]) / d
+    p0, p1, m0, m1 = points[k], points[k + 1], d * tangents[k], d * tangents[k + 1]
+    a, b = 2 * (p0 - p1) + m0 + m1, 3 * (p1 - p0) - 2 * m0 - m1
+    return p0 + s * (m0 + s * (b + s * a)), (m0 + s * (2 * b + 3 * s * a)) / d
+
+
+def centripetal_knots(points: Floats) -> Floats:
+    """Knots (K,) that keep a curve through unevenly spaced points free of loops (Yuksel et al. 2011).
+
+    Steps grow with the square root of the distance; a quarter of their mean is the least, so that points in one place
+    are passed in a finite time.
+    """
+    root = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=-1))
+    mean = float(root.mean()) or 1.0
+    return np.concatenate([[0.0], np.cumsum(np.maximum(root, mean / 4))])
 
 
 def smooth_curve(points: Floats, steps: int, closed: bool = False) -> tuple[Floats, Floats]:

@@ -18,7 +18,7 @@ from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
-BUILTIN: dict[str, Callable[[], list[SceneObject]]] = {"room": room, "box": box}
+BUILTIN: dict[str, Callable[[], tuple[SceneObject, ...]]] = {"room": room, "box": box}
 READERS: dict[str, Callable[[Path], Parts]] = {".glb": read_gltf, ".gltf": read_gltf}
 
 
@@ -55,7 +55,7 @@ def _load(path_or_builtin: str | Path) -> Scene:
 def read_geometry(name: str, scene_file: Path) -> Parts:
     """Objects, and what comes with them, of a built-in scene or of a file that `scene_file` names."""
     if name.startswith(BUILTIN_PREFIX):
-        return Parts(tuple(_builtin(name.removeprefix(BUILTIN_PREFIX))()))
+        return Parts(_builtin(name.removeprefix(BUILTIN_PREFIX))())
     path = inside_scene(scene_file, "geometry", name)
     return _reader(path)(path)
 
@@ -68,7 +68,7 @@ def _reader(path: Path) -> Callable[[Path], Parts]:
     return reader
 
 
-def _builtin(name: str) -> Callable[[], list[SceneObject]]:
+def _builtin(name: str) -> Callable[[], tuple[SceneObject, ...]]:
     if name not in BUILTIN:
         known = ", ".join(BUILTIN_PREFIX + n for n in BUILTIN)
         raise UserError("unknown built-in scene", got=name, expected=known, hint=did_you_mean(name, BUILTIN))

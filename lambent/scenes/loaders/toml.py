@@ -54,6 +54,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         Where the file is not TOML, says something unknown or impossible, or names what is not there.
     """
     document = _parse(path)
+    environment = _environment(document, path)
     parts = [_geometry(entry, path, read_geometry) for entry in document.geometry]
     objects = _gather(parts)
     materials = {name: m for p in parts for name, m in p.materials.items()}
@@ -66,7 +67,6 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
             raise UserError(
                 "unknown material", file=path, field=f"objects.{o.name}.material", got=o.material, hint=hint
             )
-    environment = _environment(document, path)
     if isinstance(environment, ImageEnvironment):
         sources = (*sources, environment.file)
     cameras = tuple(_camera(c.name, c) for c in document.cameras) or tuple(c for p in parts for c in p.cameras)

@@ -1,0 +1,300 @@
+"""glTF: what is read comes out true; what is broken is one line or a stated repair."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lambent.core.errors import UserError
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.scenes import load_scene, validate
+from lambent.scenes.geometry import signed_volume
+from lambent.scenes.scene import DirectionalLight, PointLight, Scene
+
+TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
+
+
+def document(**more: Any) -> dict[str, Any]:
+    """One triangle of one node; a test changes what it is about."""
+    positions, normals = TRIANGLE.tobytes(), np.tile(np.float32([0, 0, 1]), (3, 1)).tobytes()
+    uv, index = np.float32([(0, 1), (1, 1), (0, 0)]).tobytes(), np.uint16([0, 1, 2]).tobytes()
+    data = positions + normals + uv + index
+    views = [(0, 36), (36, 36), (72, 24), (96, 6)]
+    kinds = [(5126, 3, "VEC3"), (5126, 3, "VEC3"), (5126, 3, "VEC2"), (5123, 3, "SCALAR")]
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "thing"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3}]}],
+        "accessors": [
+            {"bufferView": i, "componentType": c, "count": n, "type": t} for i, (c, n, t) in enumerate(kinds)
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": o, "byteLength": n} for o, n in views],
+        "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
+    } | more
+
+
+def loaded(folder: Path, content: dict[str, Any]) -> Scene:
+    path = folder / "thing.gltf"
+    path.write_text(json.dumps(content))
+    return load_scene(path)
+
+
+def glb(content: dict[str, Any], binary: bytes) -> bytes:
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(body)) + body
+
+
+def test_a_bare_file_gets_daylight_and_a_camera_that_sees_it(tmp_path: Path) -> None:
+    scene = loaded(tmp_path, document())
+    assert scene.environment is not None and scene.warnings == () and validate(scene) == []
+    mesh = scene.object("thing").mesh
+    assert np.array_equal(mesh.positions, TRIANGLE) and np.allclose(mesh.tangents, (1, 0, 0))
+    assert np.allclose(mesh.uv, [(0, 0), (1, 0), (0, 1)])  # v up
+    camera = scene.cameras[0]
+    view = np.subtract(camera.target, camera.position)
+    for corner in TRIANGLE:
+        way = corner - camera.position
+        cosine = way @ view / np.linalg.norm(way) / np.linalg.norm(view)
+        assert np.degrees(np.arccos(cosine)) < camera.fov_y_deg / 2
+
+
+def test_a_sphere_of_another_writer(tmp_path: Path) -> None:
+    """Written by trimesh, with transforms on its nodes, one of them mirroring."""
+    made = trimesh.Scene()
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
+    made.add_geometry(ball, node_name="right", transform=trimesh.transformations.translation_matrix((2, 0, 0)))
+    made.add_geometry(ball, node_name="mirrored", transform=np.diag([-1.0, 2.0, 1.0, 1.0]))
+    made.export(tmp_path / "two.glb")
+    scene = load_scene(tmp_path / "two.glb")
+    right, mirrored = scene.object("right").mesh, scene.object("mirrored").mesh
+    assert right.bounds[0][0] == pytest.approx(1.5, abs=1e-3) and right.bounds[1][0] == pytest.approx(2.5, abs=1e-3)
+    assert signed_volume(mirrored) == pytest.approx(2 * float(ball.volume), rel=1e-4)
+    assert len(right.faces) == len(ball.faces)
+    assert validate(scene) == []
+
+
+def test_materials(tmp_path: Path) -> None:
+    content = document(
+        nodes=[{"mesh": i, "name": str(i)} for i in range(5)],
+        scenes=[{"nodes": [0, 1, 2, 3, 4]}],
+        materials=[
+            {"name": "gold", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.8, 0.3, 1], "roughnessFactor": 0.5}},
+            {"name": "plastic", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.2, 0.1, 1], "metallicFactor": 0}},
+            {
+                "name": "lamp",
+                "emissiveFactor": [1, 0.5, 0.25],
+                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}},
+            },
+            {
+                "name": "glass",
+                "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.3},
+                "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.75}},
+            },
+            {
+                "name": "brushed",
+                "pbrMetallicRoughness": {"roughnessFactor": 0.2},
+                "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5}},
+            },
+        ],
+    )
+    primitive = content["meshes"][0]["primitives"][0]
+    content["meshes"] = [{"primitives": [primitive | {"material": i}]} for i in range(5)]
+    scene = loaded(tmp_path, content)
+    gold, plastic, glass, brushed = (scene.materials[n] for n in ("gold", "plastic", "glass", "brushed"))
+    assert gold.kd == (0, 0, 0) and gold.lobes[0].r0 == pytest.approx((1, 0.8, 0.3))
+    assert gold.lobes[0].mx == gold.lobes[0].my == pytest.approx(0.25) and gold.lobes[0].distribution == "ggx"
+    assert plastic.kd == pytest.approx((0.48, 0.192, 0.096)) and plastic.lobes[0].r0 == pytest.approx((0.04,) * 3)
+    assert scene.object("2").emission == (8, 4, 2)
+    assert glass.transmission_lobes[0].k == pytest.approx((0.75,) * 3) and glass.kd[0] == pytest.approx(0.24)
+    assert brushed.lobes[0].my == pytest.approx(0.04) and brushed.lobes[0].mx == pytest.approx(0.04 + 0.96 * 0.25)
+    theta = np.radians([0, 30, 60, 75])
+    wo = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
+    for material in scene.materials.values():
+        assert MaterialBSDF(material).albedo(wo).max() < 1.03, material.name
+
+
+def test_lights_and_cameras(tmp_path: Path) -> None:
+    half = np.sqrt(0.5)  # a quarter turn about x: -z becomes... -y is looked at with -90 degrees
+    down = [-half, 0, 0, half]
+    lights = [
+        {"type": "directional", "intensity": 683, "color": [1, 0.5, 0.25]},
+        {"type": "spot", "intensity": 1366, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}},
+    ]
+    content = document(
+        nodes=[
+            {"mesh": 0, "name": "thing"},
+            {"rotation": down, "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"rotation": down, "translation": [0, 3, 0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+            {"camera": 0, "translation": [0, 1, 5], "name": "view"},
+        ],
+        scenes=[{"nodes": [0, 1, 2, 3]}],
+        cameras=[{"type": "perspective", "perspective": {"yfov": np.radians(40), "znear": 0.1}}],
+        extensions={"KHR_lights_punctual": {"lights": lights}},
+    )
+    scene = loaded(tmp_path, content)
+    sun, spot = scene.lights
+    assert isinstance(sun, DirectionalLight) and isinstance(spot, PointLight) and spot.direction is not None
+    assert sun.direction == pytest.approx((0, -1, 0)) and sun.irradiance == pytest.approx((1, 0.5, 0.25))
+    assert spot.intensity == pytest.approx((2, 2, 2)) and spot.position == (0, 3, 0)
+    assert spot.direction == pytest.approx((0, -1, 0)) and spot.outer_deg == pytest.approx(np.degrees(0.5))
+    assert [c.name for c in scene.cameras] == ["view"]
+    assert scene.cameras[0].position == (0, 1, 5) and scene.cameras[0].target == pytest.approx((0, 1, 4))
+    assert scene.cameras[0].fov_y_deg == pytest.approx(40)
+
+
+def test_textures_are_averaged_and_that_is_said(tmp_path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(np.uint8([[[255, 0, 0]], [[0, 0, 0]]])).save(tmp_path / "half.png")
+    look = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    content = document(
+        materials=[{"name": "cloth", "pbrMetallicRoughness": look}], textures=[{"source": 0}],
+        images=[{"uri": "half.png"}],
+    )  # fmt: skip
+    content["meshes"][0]["primitives"][0]["material"] = 0
+    scene = loaded(tmp_path, content)
+    assert scene.materials["cloth"].kd == pytest.approx((0.48, 0, 0))
+    assert scene.warnings == ("material cloth: textures are averaged to one colour",)
+    content["images"][0]["uri"] = "../half.png"
+    with pytest.raises(UserError, match="leaves its folder"):
+        loaded(tmp_path, content)
+
+
+def test_what_is_missing_is_made_and_said(tmp_path: Path) -> None:
+    content = document(nodes=[{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "a"}], scenes=[{"nodes": [0, 1]}])
+    content["meshes"][0]["primitives"][0]["attributes"] = {"POSITION": 0}
+    scene = loaded(tmp_path, content)
+    said = " ".join(scene.warnings)
+    assert "flat" in said and "box-mapped" in said and "used twice" in said
+    assert [o.name for o in scene.objects] == ["a", "a_2"]
+    assert np.allclose(scene.object("a").mesh.normals, (0, 0, 1)) and validate(scene) == []
+
+
+def _with_positions(points: Any, faces: Any) -> dict[str, Any]:
+    points, faces = np.asarray(points, np.float32), np.asarray(faces, np.uint16)
+    data = points.tobytes() + faces.tobytes()
+    return document(
+        meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        accessors=[
+            {"bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": faces.size, "type": "SCALAR"},
+        ],
+        bufferViews=[
+            {"buffer": 0, "byteLength": points.nbytes},
+            {"buffer": 0, "byteOffset": points.nbytes, "byteLength": faces.nbytes},
+        ],
+        buffers=[{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
+    )
+
+
+def test_broken_triangles_go_and_that_is_said(tmp_path: Path) -> None:
+    points = [*TRIANGLE.tolist(), (np.nan, 0, 0), (2, 0, 0)]
+    scene = loaded(tmp_path, _with_positions(points, [(0, 1, 2), (0, 1, 3), (0, 1, 4)]))
+    said = " ".join(scene.warnings)
+    assert "1 triangles dropped: a corner is not finite" in said and "1 triangles dropped: no area" in said
+    assert len(scene.object("thing").mesh.faces) == 1 and validate(scene) == []
+
+
+@pytest.mark.parametrize("size", [600.0, 0.01])
+def test_another_unit_is_noticed(tmp_path: Path, size: float) -> None:
+    scene = loaded(tmp_path, _with_positions(TRIANGLE * size, [(0, 1, 2)]))
+    assert any("is its unit the metre?" in w for w in scene.warnings)
+
+
+def _set(*path: Any) -> Callable[[dict[str, Any]], None]:
+    """A change: all but the last of `path` lead to a place, the last is put there."""
+
+    def change(content: dict[str, Any]) -> None:
+        place: Any = content
+        for step in path[:-2]:
+            place = place[step]
+        place[path[-2]] = path[-1]
+
+    return change
+
+
+BROKEN = {
+    "index out of range": (_set("accessors", 0, "count", 2), "face index out of range|wrong length"),
+    "huge count": (_set("accessors", 0, "count", 10**12), "accessor ends after its buffer view"),
+    "huge buffer": (_set("buffers", 0, "byteLength", 10**13), "buffer is truncated"),
+    "view past its buffer": (_set("bufferViews", 0, "byteLength", 10**6), "buffer view ends after its buffer"),
+    "negative offset": (_set("bufferViews", 0, "byteOffset", -4), "greater than or equal to 0"),
+    "no such mesh": (_set("nodes", 0, "mesh", 7), "index out of range"),
+    "no such accessor": (_set("meshes", 0, "primitives", 0, "indices", 99), "index out of range"),
+    "no such material": (_set("meshes", 0, "primitives", 0, "material", 3), "index out of range"),
+    "cycle": (_set("nodes", 0, "children", [0]), "reached twice"),
+    "wrong type": (_set("meshes", "none"), "list"),
+    "wrong accessor type": (_set("accessors", 0, "type", "VEC2"), "wrong accessor type"),
+    "old version": (_set("asset", "version", "1.0"), "unknown glTF version"),
+    "compressed": (_set("extensionsRequired", ["KHR_draco_mesh_compression"]), "export without compression"),
+    "network": (_set("buffers", 0, "uri", "https://example.org/a.bin"), "is on the network"),
+    "path escape": (_set("buffers", 0, "uri", "../a.bin"), "leaves its folder"),
+    "null in a name": (_set("buffers", 0, "uri", "a%00.bin"), "is not a file name"),
+    "broken base64": (_set("buffers", 0, "uri", "data:;base64,%%%"), "base64"),
+    "nothing in it": (_set("nodes", 0, {"name": "empty"}), "holds no triangles"),
+    "infinite transform": (_set("nodes", 0, "translation", [0, 0, float("inf")]), "finite"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_files_are_one_line(tmp_path: Path, name: str) -> None:
+    change, said = BROKEN[name]
+    content = document()
+    change(content)
+    with pytest.raises(UserError, match=said) as caught:
+        loaded(tmp_path, content)
+    assert "\n" not in str(caught.value) and str(tmp_path) in str(caught.value)
+
+
+def test_a_scene_that_multiplies_itself_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lambent.scenes.loaders.gltf.TRIANGLES_MAX", 100)
+    nodes = [{"mesh": 0} for _ in range(101)]
+    with pytest.raises(UserError, match="scene is too large"):
+        loaded(tmp_path, document(nodes=nodes, scenes=[{"nodes": list(range(101))}]))
+
+
+def _good_glb() -> bytes:
+    content = document()
+    data = base64.b64decode(content["buffers"][0]["uri"].partition(",")[2])
+    content["buffers"] = [{"byteLength": len(data)}]
+    return glb(content, data + b"\0" * (-len(data) % 4))
+
+
+def test_every_truncation_of_a_glb_is_one_line(tmp_path: Path) -> None:
+    whole, path = _good_glb(), tmp_path / "cut.glb"
+    path.write_bytes(whole)
+    assert len(load_scene(path).objects) == 1
+    for length in range(0, len(whole) - 4, 7):
+        path.write_bytes(whole[:length])
+        with pytest.raises(UserError):
+            load_scene(path)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
+def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
+    data = bytearray(_good_glb())
+    for place, value in damage:
+        data[place % len(data)] = value
+    path = tmp_path / "damaged.glb"
+    path.write_bytes(bytes(data))
+    try:
+        scene = load_scene(path)
+    except UserError as error:
+        assert "\n" not in str(error)
+    else:
+        assert all(np.isfinite(o.mesh.positions).all() for o in scene.objects)

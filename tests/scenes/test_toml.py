@@ -1,0 +1,167 @@
+"""scene.toml: what it may say, and that what it may not is one clear line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.scenes import load_scene
+from lambent.scenes.loaders.schema import SceneDocument, known_keys
+from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight
+
+HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
+MATERIALS = """
+[materials]
+white = { kd = 0.7 }
+red = { kd = [0.6, 0.05, 0.05] }
+green = { kd = [0.1, 0.45, 0.1] }
+black = { kd = 0.0 }
+metal = { lobes = [{ mx = 0.15, my = 0.15, r0 = 0.9 }] }
+"""
+
+
+def written(folder: Path, text: str, head: str = HEAD) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(head + text, encoding="utf-8")
+    return path
+
+
+def test_everything_a_scene_may_say(tmp_path: Path) -> None:
+    Material(name="gold", lobes=[{"mx": 0.1, "my": 0.2}]).save(tmp_path / "gold.json")
+    (tmp_path / "sky.hdr").write_bytes(b"not opened here")
+    path = written(
+        tmp_path,
+        """exposure_ev = 1.5
+[environment]
+kind = "image"
+file = "sky.hdr"
+rotation_deg = 30.0
+"""
+        + MATERIALS
+        + """
+[materials.gold]
+file = "gold.json"
+[objects."*"]
+light_map_scale = 2.0
+[objects.sphere]
+material = "gold"
+probe_centre = [0.0, 0.5, 0.0]
+probe_planes = [[0.0, 2.0, 0.0, 0.0]]
+[objects.lamp]
+emission = [1.0, 2.0, 3.0]
+[[lights]]
+kind = "spot"
+position = [0.0, 0.9, 0.0]
+intensity = [1.0, 1.0, 1.0]
+direction = [0.0, -2.0, 0.0]
+outer_deg = 30.0
+[[lights]]
+kind = "directional"
+direction = [0.0, -1.0, 0.0]
+irradiance = [1.0, 1.0, 1.0]
+[[cameras]]
+name = "front"
+position = [0.0, 0.5, 2.0]
+target = [0.0, 0.5, 0.0]
+[[paths]]
+name = "pass"
+keys = [
+    { position = [0.0, 0.5, 2.0], target = [0.0, 0.5, 0.0] },
+    { position = [1.0, 0.5, 2.0], target = [0.0, 0.5, 0.0] },
+]
+""",
+    )
+    scene = load_scene(path)
+    assert scene.exposure_ev == 1.5 and scene.environment == ImageEnvironment(tmp_path / "sky.hdr", 1.0, 30.0)
+    assert scene.object("sphere").material == "gold" and scene.materials["gold"].lobes[0].my == 0.2
+    assert {o.light_map_scale for o in scene.objects} == {2.0}
+    assert scene.object("lamp").emission == (1.0, 2.0, 3.0)
+    assert scene.lights == (
+        PointLight((0, 0.9, 0), (1, 1, 1), (0, -1, 0), 0, 30),
+        DirectionalLight((0, -1, 0), (1, 1, 1)),
+    )
+    assert scene.probe_centres == {"sphere": (0, 0.5, 0)} and np.array_equal(
+        scene.probe_planes["sphere"], [[0, 1, 0, 0]]
+    )
+    assert [c.name for c in scene.cameras] == ["front"] and scene.paths[0].keys[1].position == (1, 0.5, 2)
+    assert set(scene.sources) == {path, tmp_path / "gold.json", tmp_path / "sky.hdr"}
+
+
+def test_geometry_can_be_scaled(tmp_path: Path) -> None:
+    head = HEAD.replace('"builtin:box"', '{ file = "builtin:box", scale = 0.01 }')
+    scene = load_scene(written(tmp_path, MATERIALS, head))
+    assert scene.bounds[1][1] == pytest.approx(0.0101, abs=1e-6)
+    assert "is its unit the metre?" in scene.warnings[0]
+
+
+def test_the_same_geometry_twice_gets_names_of_its_own(tmp_path: Path) -> None:
+    head = HEAD.replace('"builtin:box"', '["builtin:box", "builtin:box"]')
+    names = [o.name for o in load_scene(written(tmp_path, MATERIALS, head)).objects]
+    assert len(set(names)) == 16 and "sphere_2" in names
+
+
+WRONG = {
+    "exposure = 1.0": (r"exposure: unknown key; did you mean 'exposure_ev'\?"),
+    "[environment]\nkind = 'sunsky'\nsun_directon = [0,1,0]": r"sun_direct",
+    "[environment]\nkind = 'sunsky'\nsun_direction = [0.0,-1.0,0.0]": r"below the horizon",
+    "[environment]\nkind = 'sunsky'\nsun_direction = [0.0,1.0,0.0]\nturbidity = 99.0": r"turbidity.*10",
+    "[environment]\nkind = 'image'\nfile = '../sky.hdr'": r"environment.file.*leaves its folder",
+    "[environment]\nkind = 'image'\nfile = 'none.hdr'": r"file not found",
+    "[materials.white]\nfile = '/etc/passwd'": r"materials.white.file.*leaves its folder",
+    "[materials.white]\nfile = 'a.json'\nkd = 0.5": r"says more than its file; found kd",
+    "[materials.white]\nkdd = 0.5": r"materials.white: kdd: unknown key; did you mean 'kd'\?",
+    "[materials.white]\nkd = -1.0": r"materials.white: kd.*greater than or equal to 0",
+    "[objects.sphre]\nmaterial = 'white'": r"objects.sphre: fits no object; did you mean 'sphere'\?",
+    MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
+    "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
+    "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
+    "[[paths]]\nname='a'\nkeys=[]": r"paths.0.keys.*at least 2",
+    "[[lights]]\nkind='laser'": r"lights.0.*laser",
+    "name = ": r"not a TOML document",
+    "name = '\\x00'\nx = [" + "[" * 5000: r"not a TOML document|unknown key",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_what_is_wrong_is_one_line_that_names_file_and_field(tmp_path: Path, text: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        load_scene(path)
+    said = str(caught.value)
+    assert re.search(WRONG[text], said), said
+    assert "\n" not in said and said.startswith(str(path)), said
+
+
+@pytest.mark.parametrize("geometry", ["../room.glb", "/etc/passwd", "a/../../b.glb"])
+def test_geometry_does_not_leave_the_folder(tmp_path: Path, geometry: str) -> None:
+    with pytest.raises(UserError, match=r"leaves its folder.*put the file into the scene's folder or below"):
+        load_scene(written(tmp_path, "", HEAD.replace("builtin:box", geometry)))
+
+
+def test_missing_and_unknown(tmp_path: Path) -> None:
+    for name, said in (("builtin:rom", "did you mean 'room'"), (str(tmp_path / "none.toml"), "cannot be read"),
+                       (str(tmp_path / "a.blend"), "unknown kind of scene")):  # fmt: skip
+        with pytest.raises(UserError, match=said):
+            load_scene(name)
+    with pytest.raises(UserError, match="geometry: is missing"):
+        load_scene(written(tmp_path, "", 'format = "lambent-scene"\nversion = 1\n'))
+
+
+def test_the_rooms_own_toml_can_be_copied(tmp_path: Path) -> None:
+    import lambent.scenes.builtin as builtin
+
+    copy = tmp_path / "mine.toml"
+    copy.write_bytes((Path(builtin.__file__).parent / "room.toml").read_bytes())
+    mine, theirs = load_scene(copy), load_scene("builtin:room")
+    assert mine.sources == (copy,) and mine.cameras == theirs.cameras and mine.materials == theirs.materials
+
+
+def test_known_keys_are_all_keys() -> None:
+    assert {"turbidity", "probe_planes", "fov_y_deg", "intensity", "scale"} | set(
+        SceneDocument.model_fields
+    ) <= known_keys()
