@@ -39,7 +39,7 @@ from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 Floats = NDArray[np.floating]
 Method = Literal["grid", "gradient"]
-METHODS = ("grid", "gradient")
+METHODS: tuple[Method, ...] = ("grid", "gradient")
 MAX_LOBES = 4
 
 
@@ -107,12 +107,14 @@ def fit(
     Raises
     ------
     UserError
-        Unknown method, metric or parameter; impossible value; number of lobes out of range.
+        Unknown method, metric or parameter; impossible value; number of lobes out of range; a parameter of transmission
+        for a table without any.
     """
     began = time.perf_counter()
     fix, ranges = fix or {}, ranges or {}
     chosen = _check(lobes, method, metric, fix, ranges)
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
+    _check_sides(samples, fix, ranges)
     channels = samples.f.shape[1]
     kd, kt_d = (_diffuse(samples, side, fix) for side in ("reflection", "transmission"))
     background = np.where(samples.transmitted[:, None], kt_d / np.pi, kd / np.pi)
@@ -170,6 +172,13 @@ def _check(lobes: int, method: str, metric: str, fix: Fixed, ranges: Ranges) -> 
         raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}")
     check(fix, ranges, lobes)
     return metric_named(metric)
+
+
+def _check_sides(samples: MeasuredSamples, fix: Fixed, ranges: Ranges) -> None:
+    """Raise `UserError` where a restriction is about transmission and the table has none."""
+    far = [name for name in [*fix, *ranges] if name.startswith("t_") or name.startswith("kt")]
+    if far and not samples.transmitted.any():
+        raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
 
 
 def _sides(samples: MeasuredSamples) -> Sequence[Side]:

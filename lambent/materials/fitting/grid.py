@@ -46,7 +46,6 @@ SCHEDULE = (
     Level(3, 20000, 2),
     Level(3, 40000, 1),
     Level(3, 80000, 1),
-    Level(3, 80000, 1),
 )
 MOVES = 12  # of a box at one level
 

@@ -23,6 +23,7 @@ WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
 NEAR_TUPLE = 1.3  # a pixel shows a tuple no further away than this times the distance to its fourth neighbour
 PLANE_DEG = 3.0  # tuples this close to the plane of incidence belong to its curve
 MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
+UNKNOWN = (0.66, 0.78, 0.93)  # shade of directions that were not measured
 THETA_STEP_DEG = 0.75
 COLUMNS = 4
 
@@ -110,7 +111,7 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
             if across not in labelled and (upright or theta_deg > 0):
                 ax.set_title(f"$\\{across_name}_i$ {across:g}°", fontsize=8)
                 labelled.add(across)
-    _legend(figure, "cube root of the transfer probability (white: not measured)", _brushing(material) is not None)
+    _legend(figure, "cube root of the transfer probability (blue: not measured)", _brushing(material) is not None)
     return figure
 
 
@@ -157,8 +158,10 @@ def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Flo
 
 
 def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
-    unknown = np.isnan(image)
-    rgba = np.concatenate([np.clip(np.where(unknown, 0, image), 0, 1), ~unknown[..., :1]], axis=-1)
+    x = np.linspace(-1, 1, DISK_PIXELS)
+    inside = np.hypot(x, x[:, None]) < 1
+    shown = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))
+    rgba = np.concatenate([shown, inside[..., None].astype(float)], axis=-1)
     ax.imshow(rgba, extent=(-1, 1, -1, 1), interpolation="nearest")
     rim = np.linspace(0, 2 * np.pi, 128)
     ax.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)

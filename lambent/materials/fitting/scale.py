@@ -30,13 +30,15 @@ class Channel:
 
 
 def weighted_median(values: Floats, weights: Floats) -> Floats:
-    """Exact minimiser m (...) of sum_t weights_t |values_t - m| over the last axis; 0 where all weights are 0.
+    """Exact minimiser m (...) of sum_t weights_t |values_t - m| over the last axis; 0 where no weight is above 0.
 
     Parameters
     ----------
     values, weights : (..., N)
         Weights are >= 0. Of an interval of minimisers the lower end is returned.
     """
+    if values.shape[-1] == 0:
+        return np.zeros(values.shape[:-1], dtype=values.dtype)
     order = np.argsort(values, axis=-1)
     cumulated = np.cumsum(np.take_along_axis(weights, order, -1), axis=-1, dtype=np.float64)
     total = cumulated[..., -1:]

@@ -46,10 +46,17 @@ def _fit_one(problem: Problem, box: Box, index: int, progress: Progress, seed: i
     target = problem.against(rest, problem.background)
     best = Best()
     try:
-        search(target, box, progress, best, seed)
+        search(target, box, _of_lobe(progress, index), best, seed)
     finally:
         if best.candidate is not None:
             found[index : index + 1] = [with_exact_scale(target, best.candidate, box)]
+
+
+def _of_lobe(progress: Progress, index: int) -> Progress:
+    def report(done: float, total: float, what: str) -> None:
+        progress(done, total, f"lobe {index + 1}, {what}")
+
+    return report
 
 
 def lobes_sum(problem: Problem, lobes: Sequence[Candidate]) -> Floats:

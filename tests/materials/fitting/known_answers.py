@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from lambent.bench.fit import ALANOD, FOIL
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, Setup, synthesise
 
-ALANOD = Material(name="alanod", kd=0.003, lobes=(Lobe(k=0.9, mx=0.11, my=0.072, r0=0.89, alpha=0.43),))
-FOIL_REFLECTION = Lobe(k=0.78, mx=0.124, my=0.136, r0=0.029, alpha=0.5)
-FOIL_TRANSMISSION = Lobe(side="transmission", k=0.67, mx=0.25, my=0.17, r0=0.75, alpha=0.6)
-FOIL = Material(name="foil", kd=0.76, lobes=(FOIL_REFLECTION, FOIL_TRANSMISSION))
+__all__ = ["ALANOD", "ANISOTROPIC", "FEW", "FOIL", "ISOTROPIC", "PAINT", "grey"]
 PAINT = Material(name="paint", kd=0.2, lobes=(Lobe(k=0.7, mx=0.15, my=0.15, r0=0.06, alpha=0.3),))
 FEW = replace(ISOTROPIC, step_deg=6.0, fine_deg=3.0)
 

@@ -137,8 +137,24 @@ def test_two_lobes_are_told_apart():
     assert sorted(lobe.mx for lobe in both.material.lobes) == pytest.approx([0.04, 0.15], rel=0.1)
 
 
+@pytest.mark.parametrize("metric", ["l1", "cuberoot"])
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("value", [0.0, 0.3])
+def test_degenerate_tables_give_a_finite_material(paint, metric, count, value):
+    few = replace(
+        paint,
+        wi=paint.wi[:count],
+        wo=paint.wo[:count],
+        weight=paint.weight[:count] + 1e-3,
+        f=np.full((count, 1), value),
+    )
+    result = fit(few, metric=metric)
+    assert all(np.isfinite(list(result.errors.values())))
+    assert result.errors[metric] < 1e-3
+
+
 def test_impossible_requests(paint):
-    for options in ({"method": "gird"}, {"metric": "l3"}, {"lobes": 0}, {"fix": {"mxx": 1.0}}):
+    for options in ({"method": "gird"}, {"metric": "l3"}, {"lobes": 0}, {"fix": {"mxx": 1.0}}, {"fix": {"t_mx": 0.1}}):
         with pytest.raises(UserError):
             fit(paint, **options)
 

@@ -27,6 +27,7 @@ def test_weighted_median_by_hand():
     assert weighted_median(np.array([3.0, 1.0, 2.0]), np.array([1.0, 1.0, 1.0])) == 2
     assert weighted_median(np.array([3.0, 1.0, 2.0]), np.array([5.0, 1.0, 1.0])) == 3
     assert weighted_median(np.array([3.0, 1.0]), np.zeros(2)) == 0
+    assert weighted_median(np.zeros((2, 0)), np.zeros((2, 0))).tolist() == [0, 0]
 
 
 def noisy(k: float) -> tuple[Channel, np.ndarray]:

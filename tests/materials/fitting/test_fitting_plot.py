@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lambent.core.frames import direction
+from lambent.materials.document import Material
+from lambent.materials.fitting.incidence import incidences
+from lambent.materials.fitting.plot import save_plots
+from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
+
+
+def test_incidences_follow_the_grid():
+    gathered = incidences(grey(PAINT, FEW))
+    assert [entry.theta_deg for entry in gathered] == [0, 5, 19, 33, 47, 61, 75]
+    assert {entry.phi_deg for entry in gathered} == {0}
+
+
+def test_tables_without_incident_directions_are_gathered_in_bins():
+    samples = grey(PAINT, FEW)
+    theta, turn = np.radians(np.linspace(1, 80, len(samples))), np.linspace(0, 6, len(samples))
+    scattered = replace(samples, wi=direction(theta, turn))
+    gathered = incidences(scattered)
+    assert [entry.theta_deg for entry in gathered] == [2.5, 15, 30, 45, 60, 75]
+
+
+def test_albedo_of_an_incidence_ignores_gaps():
+    for entry in incidences(grey(Material(kd=0.5), FEW)):
+        assert entry.albedo(far=False)[0] == pytest.approx(0.5, rel=0.01)
+        assert entry.albedo(far=True)[0] == 0
+
+
+@pytest.mark.parametrize("material", [PAINT, FOIL], ids=lambda material: material.name)
+def test_plots_are_written(tmp_path, material):
+    paths = save_plots(grey(material, FEW), material, tmp_path, "table")
+    assert [path.name for path in paths] == ["table_polar.png", "table_in_plane.png", "table_albedo.png"]
+    for path in paths:
+        picture = np.asarray(Image.open(path).convert("L"))
+        assert picture.min() < 60
+        assert picture.max() == 255
