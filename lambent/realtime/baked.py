@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from lambent.store.store import Store
 Array = NDArray[np.floating]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Probe:
     """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4)."""
 
@@ -26,7 +27,7 @@ class Probe:
     planes: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BakedScene:
     """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name."""
 
@@ -43,15 +44,18 @@ class BakedScene:
     missing: tuple[str, ...] = ()
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
-        """The object's own probe, else the nearest one, else the environment from the object's centre, else None."""
+        """The object's own probe, else the nearest one, else the environment, else None."""
         if obj.name in self.probes:
             return self.probes[obj.name]
-        centre = np.mean(obj.bounds, axis=0)
         if self.probes:
+            centre = np.mean(obj.bounds, axis=0)
             return min(self.probes.values(), key=lambda probe: float(np.linalg.norm(probe.centre - centre)))
-        if self.environment is not None:
-            return Probe((float(centre[0]), float(centre[1]), float(centre[2])), self.environment)
-        return None
+        return self.far_light
+
+    @cached_property
+    def far_light(self) -> Probe | None:
+        """The environment as a probe: infinitely far, so its centre does not matter."""
+        return None if self.environment is None else Probe((0.0, 0.0, 0.0), self.environment)
 
 
 def read_baked(store: Store) -> BakedScene:

@@ -218,12 +218,11 @@ class SceneResources:
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
         self._environment = cube_texture(device, [environment])
         self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
-        lights: dict[int, Light] = {}
+        lights: dict[Probe | None, Light] = {}
         self.objects = []
         for record in scene.record.objects:
             probe = scene.probe_of(record)
-            key = id(probe) if probe in scene.probes.values() else id(record)
-            if key not in lights:
-                lights[key] = Light(device, probe, self.sampler)
-            self.objects.append(ObjectResources(device, layouts, record, lights[key]))
+            if probe not in lights:
+                lights[probe] = Light(device, probe, self.sampler)
+            self.objects.append(ObjectResources(device, layouts, record, lights[probe]))
         self.materials = {name: MaterialBuffers(device, layouts) for name in scene.record.materials}
