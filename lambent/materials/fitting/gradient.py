@@ -16,7 +16,7 @@ from lambent.materials.fitting.several import lobes_sum, remaining
 Floats = NDArray[np.floating]
 
 TUPLES = 8000
-ROUNDING = 1e-3  # share of the median residual below which L1 is treated as quadratic
+ROUNDING = 0.1  # share of the mean residual below which L1 is treated as quadratic
 K_SPAN = 7.0  # ln k may move this far
 
 
@@ -29,6 +29,8 @@ def polish(problem: Problem, boxes: Sequence[Box], lobes: Sequence[Candidate], s
 
     few = problem.thinned(TUPLES, seed)
     start, lo, hi = _pack(boxes, lobes)
+    if len(start) == 0:
+        return list(lobes)
     target = few.metric.transform(few.c * few.measured)
     root = few.w if few.metric.power == 1 else np.sqrt(few.w)
 
@@ -36,12 +38,17 @@ def polish(problem: Problem, boxes: Sequence[Box], lobes: Sequence[Candidate], s
         model = few.background + lobes_sum(few, _unpack(boxes, lobes, x))
         return np.asarray((root * (few.metric.transform(few.c * model) - target)).ravel(), dtype=np.float64)
 
-    options = {}
-    if few.metric.power == 1:
-        options = {"loss": "soft_l1", "f_scale": max(ROUNDING * float(np.median(np.abs(residual(start)))), 1e-12)}
-    if len(start) == 0:
-        return list(lobes)
-    solved = least_squares(residual, start, bounds=(lo, hi), x_scale="jac", max_nfev=200, diff_step=1e-4, **options)
+    typical = max(float(np.mean(np.abs(residual(start)))), 1e-30)  # the solver's tolerances expect residuals about 1
+    solved = least_squares(
+        lambda x: residual(x) / typical,
+        start,
+        bounds=(lo, hi),
+        x_scale="jac",
+        max_nfev=200,
+        diff_step=1e-4,
+        loss="soft_l1" if few.metric.power == 1 else "linear",
+        f_scale=ROUNDING,
+    )
     polished = _unpack(boxes, lobes, solved.x)
     return polished if remaining(problem, polished) < remaining(problem, lobes) else list(lobes)
 
