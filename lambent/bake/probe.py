@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
+from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
 from lambent.store.contract import FAR
 
 Array = NDArray[np.floating]
+Indices = NDArray[np.integer]
 HALF_MAX = 65504.0
-PATHS_AT_ONCE = 1 << 21
+PATHS_AT_ONCE = 1 << 20
+NOISE, EXTRA = 0.1, 8  # texels above this relative standard error get this many times more paths
 MIRROR_DEPTH = 6  # glossy surfaces in a row
 
 
@@ -64,23 +67,44 @@ class Probe:
 
 
 def bake_probe(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int, seed: int) -> Probe:
-    """Trace a probe. `scene` is without the object and, as its builder was told, without diffuse terms."""
-    texels = 6 * n * n
-    per_pass = max(1, min(samples, PATHS_AT_ONCE // texels))
-    passes = -(-samples // per_pass)
+    """Trace a probe. `scene` is without the object and, as its builder was told, without diffuse terms.
+
+    Every texel gets `samples` paths; those that are still noisy, mostly glossy surfaces seen in the probe, get
+    EXTRA times as many on top.
+    """
     rng = np.random.default_rng(seed)
-    total = np.zeros((texels, 3))
-    for _ in range(passes):
-        total += _pass(scene, cache, centre, n, per_pass, int(rng.integers(1 << 32)))
-    radiance = np.minimum(total / (passes * per_pass), HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
+    texels = np.arange(6 * n * n)
+    total, squares = _sums(scene, cache, centre, n, texels, samples, rng)
+    count = np.full(len(texels), float(samples))
+    mean = luminance(total / samples)
+    deviation = np.sqrt(np.maximum(luminance(squares / samples) - mean**2, 0) / samples)
+    noisy = np.flatnonzero(deviation > NOISE * np.maximum(mean, np.median(mean)))
+    more = _sums(scene, cache, centre, n, noisy, EXTRA * samples, rng)
+    total[noisy] += more[0]
+    count[noisy] += EXTRA * samples
+    radiance = np.minimum(total / count[:, None], HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
     return Probe(radiance, *_geometry(scene, centre, n))
 
 
-def _pass(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int, seed: int) -> Array:
+def _sums(
+    scene: Any, cache: LightMapCache, centre: Array, n: int, texels: Indices, samples: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Sums (k, 3) of radiance and of its squares over `samples` paths through each of the texels."""
+    total, squares = np.zeros((2, len(texels), 3))
+    at_once = max(1, PATHS_AT_ONCE // samples)
+    for start in range(0, len(texels), at_once):
+        mine = slice(start, start + at_once)
+        total[mine], squares[mine] = _pass(scene, cache, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
+    return total, squares
+
+
+def _pass(
+    scene: Any, cache: LightMapCache, centre: Array, n: int, texels: Indices, samples: int, seed: int
+) -> tuple[Array, Array]:
     sampler = mi.load_dict({"type": "independent"})
-    width = 6 * n * n * samples
+    width = len(texels) * samples
     sampler.seed(seed, width)
-    texel = dr.arange(mi.UInt32, width) // samples
+    texel = dr.gather(mi.UInt32, mi.UInt32(texels.astype(np.uint32)), dr.arange(mi.UInt32, width) // samples)
     column, row, face = texel % n, texel // n % n, texel // (n * n)
     jitter = sampler.next_2d()
     s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
@@ -89,6 +113,10 @@ def _pass(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int,
     value = paths.radiance(scene, sampler, paths.camera_start(ray), MIRROR_DEPTH, cache)
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     dr.eval(value)
+    return _block_sums(value, samples), _block_sums(value * value, samples)
+
+
+def _block_sums(value: Any, samples: int) -> Array:
     return np.stack([np.array(dr.block_sum(channel, samples)) for channel in (value.x, value.y, value.z)], axis=-1)
 
 

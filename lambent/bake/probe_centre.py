@@ -63,7 +63,7 @@ def _above(mesh: Mesh, centre: Array, axis: Array, middle: Array, without: Any) 
 
 
 def _moved_out(centre: Array, solids: SolidTest, without: Any) -> Array:
-    directions = normalize(face_directions(4).reshape(-1, 3))
+    directions = normalize(face_directions(5).reshape(-1, 3))
     for _ in range(MOVES):
         up = np.array([[0.0, 1.0, 0.0]])
         both = solids.embedded(np.stack([centre, centre]), np.concatenate([up, -up]))

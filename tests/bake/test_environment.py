@@ -1,0 +1,60 @@
+"""The environment's cube map against the path tracer's environment, and by orientation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.environment import environment_cube
+from lambent.core.cubemap import face_directions, sample, texel_solid_angles
+from lambent.core.frames import normalize
+from lambent.core.images import write_image
+from lambent.scenes.scene import ImageEnvironment, SunSky
+from tests.bake.small_scenes import TINY, plane
+
+SUN = normalize(np.array([0.5, 0.6, 0.3]))
+
+
+def irradiance(cube: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    n = cube.shape[1]
+    cosine = np.maximum(normalize(face_directions(n)) @ normal, 0)
+    return (cube.astype(float) * (cosine * texel_solid_angles(n))[..., None]).sum(axis=(0, 1, 2))
+
+
+def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path) -> None:
+    sky = SunSky(tuple(SUN))
+    store = bake(replace(plane(), environment=sky), tmp_path / "s", quality=replace(TINY, light_map_samples=(128, 128)))
+    raw = store.read("light_map/raw")
+    traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum()
+    assert irradiance(environment_cube(sky, 128), np.array([0, 1.0, 0])) == pytest.approx(traced, rel=0.02)
+
+
+def test_the_sun_stands_where_it_is_said_to() -> None:
+    cube = environment_cube(SunSky(tuple(SUN)), 64)
+    brightest = np.unravel_index(cube[..., 1].argmax(), cube.shape[:3])
+    assert normalize(face_directions(64))[brightest] @ SUN > np.cos(np.radians(2))
+    assert np.isfinite(cube).all() and cube[3].max() == 0, "no light from below"
+
+
+@pytest.mark.parametrize("rotation_deg", [0.0, 90.0, -30.0])
+def test_picture_looks_along_minus_z_in_its_middle_with_plus_x_to_the_right(
+    tmp_path: Path, rotation_deg: float
+) -> None:
+    picture = np.zeros((64, 128, 3), np.float32)
+    picture[:8, :, 2] = 1  # top
+    picture[28:36, 60:68, 0] = 1  # middle
+    picture[28:36, 92:100, 1] = 1  # a quarter to the right
+    write_image(tmp_path / "p.exr", picture)
+    cube = environment_cube(ImageEnvironment(tmp_path / "p.exr", 2.0, rotation_deg), 32).astype(float)
+    angle = np.radians(rotation_deg)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    for direction, colour in (((0, 0, -1), (2, 0, 0)), ((1, 0, 0), (0, 2, 0)), ((0, 1, 0), (0, 0, 2))):
+        assert sample(cube, turn @ np.array(direction, float)) == pytest.approx(colour, abs=0.05)
+
+
+def test_no_environment_is_black() -> None:
+    assert not environment_cube(None, 8).any()

@@ -1,0 +1,147 @@
+"""Probes: orientation, what they see, where they stand, and their bounding planes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.planes import bounding_planes
+from lambent.bake.probe_centre import flat_axis, probe_centre
+from lambent.bake.reference import render_reference
+from lambent.core.cubemap import face_directions, sample
+from lambent.core.frames import normalize
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import Camera, Scene, SceneObject
+from lambent.store.contract import FAR
+from tests.bake.small_scenes import COLOURS, MIRROR, TINY, coloured_room, room_with_step
+
+VIEWS = [
+    (np.array(forward), up)
+    for forward, up in (
+        ((1, 0, 0), (0, 1, 0)),
+        ((-1, 0, 0), (0, 1, 0)),
+        ((0, 1, 0), (0, 0, -1)),
+        ((0, -1, 0), (0, 0, -1)),
+        ((0, 0, 1), (0, 1, 0)),
+        ((0, 0, -1), (0, 1, 0)),
+    )
+]
+
+
+def test_every_face_sees_its_wall(tmp_path: Path) -> None:
+    store = bake(coloured_room(), tmp_path / "s", quality=TINY)
+    radiance = store.read("probe/ball/radiance").astype(float)
+    for face, colour in enumerate(COLOURS):
+        assert np.allclose(radiance[face], colour, atol=1e-3), f"face {face}"
+    unit = normalize(face_directions(16))
+    assert np.allclose(store.read("probe/ball/distance"), 2 / np.abs(unit).max(axis=-1), rtol=1e-4)
+    assert np.allclose(store.artefact("probe/ball/radiance").meta["centre"], 0, atol=1e-6)
+
+
+def test_planes_are_those_of_the_room_in_world_space(tmp_path: Path) -> None:
+    scene = coloured_room()
+    moved = tuple(replace(o, mesh=placed(o.mesh, (10, 0, 0))) for o in scene.objects)
+    store = bake(replace(scene, objects=moved), tmp_path / "s", quality=TINY)
+    planes = store.read("probe/ball/planes")
+    assert planes.shape == (6, 4)
+    for axis, sign in ((a, s) for a in range(3) for s in (1, -1)):
+        expected = [*(np.eye(3)[axis] * sign), 2 - sign * (10 if axis == 0 else 0)]
+        assert np.abs(planes - expected).max(axis=1).min() < 1e-3
+    centre = np.array([10, 0, 0])
+    assert (planes[:, :3] @ centre + planes[:, 3] > 0).all(), "normals point to the centre"
+
+
+def test_probe_agrees_with_path_traced_views(tmp_path: Path) -> None:
+    scene = room_with_step()
+    small = SceneObject("ball", placed(sphere(0.02, 16, 8), (-0.8, 0.5, 0)), "mirror")  # casts next to no shadow
+    scene = replace(scene, objects=(*scene.objects[:-1], small))
+    quality = replace(TINY, light_map_texels=128, probe_texels=32, probe_samples=32)
+    store = bake(scene, tmp_path / "s", quality=quality)
+    radiance = store.read("probe/ball/radiance").astype(float)
+    centre = np.array(store.artefact("probe/ball/radiance").meta["centre"])
+    without = replace(scene, objects=scene.objects[:-1])
+    y, x = np.meshgrid(1 - (np.arange(24) + 0.5) / 12, (np.arange(24) + 0.5) / 12 - 1, indexing="ij")
+    for forward, up in VIEWS:
+        camera = Camera("view", tuple(centre), tuple(centre + forward), up, 90.0)
+        image, _ = render_reference(without, camera, 24, 24, 128)
+        w = forward + x[..., None] * np.cross(forward, up) + y[..., None] * np.asarray(up)
+        seen = sample(radiance, w)
+        assert np.median(np.abs(seen - image) / (image + 0.02)) < 0.08, f"towards {forward}"
+        assert seen.mean() == pytest.approx(image.mean(), rel=0.05), f"towards {forward}"
+
+
+def test_planes_ignore_what_stands_within_the_room() -> None:
+    n = 32
+    w = normalize(face_directions(n))
+    distance = 2 / np.abs(w).max(axis=-1)
+    normals = np.zeros((6, n, n, 3))
+    for face in range(6):
+        normals[face, ..., face // 2] = -(1 - 2 * (face % 2))
+    pillar = np.zeros((n, n), bool)
+    pillar[:, 12:18] = True
+    distance[0, pillar] /= 2
+    planes = bounding_planes(distance, normals)
+    assert len(planes) == 6 and np.allclose(np.sort(planes[:, 3]), 2, atol=1e-3)
+
+
+def test_open_sky_needs_few_planes() -> None:
+    n = 16
+    w = normalize(face_directions(n))
+    down = w[..., 1] < -0.01
+    distance = np.where(down, -1 / np.minimum(w[..., 1], -0.01), FAR)
+    normals = np.where(down[..., None], (0.0, 1.0, 0.0), -w)
+    planes = bounding_planes(distance, normals)
+    assert np.allclose(planes[0], (0, 1, 0, 1), atol=1e-3)
+    assert bounding_planes(np.full((6, n, n), FAR), -w).shape == (0, 4)
+
+
+def test_given_planes_and_centre_are_kept_and_only_planes_are_made_anew(tmp_path: Path) -> None:
+    scene = coloured_room()
+    centred = replace(scene, probe_centres={"ball": (0.5, 0.0, 0.0)})
+    store = bake(centred, tmp_path / "s", quality=TINY)
+    assert store.artefact("probe/ball/radiance").meta["centre"] == [0.5, 0, 0]
+    key = store.artefact("probe/ball/radiance").key
+    planes = np.array([[0, 1, 0, 2.5]], np.float32)
+    store = bake(replace(centred, probe_planes={"ball": planes}), tmp_path / "s", quality=TINY)
+    assert np.array_equal(store.read("probe/ball/planes"), planes)
+    assert store.artefact("probe/ball/radiance").key == key
+
+
+def centre_of(objects: tuple[SceneObject, ...], name: str) -> np.ndarray:
+    builder = SceneBuilder(Scene("s", objects, {"m": MIRROR, "d": Material(kd=0.5)}))
+    return probe_centre(builder, name, builder.build(leave_out={name}))
+
+
+def test_the_floors_probe_stands_at_eye_height_in_the_room() -> None:
+    floor = SceneObject("floor", placed(box((8, 0.1, 6)), (0, -0.05, 0)), "m")
+    walls = SceneObject("walls", placed(box((8, 6, 6)), (0, 3, 0)), "d")
+    assert np.allclose(centre_of((floor, walls), "floor"), (0, 1.6, 0), atol=1e-3)
+    low = SceneObject("walls", placed(box((8, 2, 6)), (0, 1, 0)), "d")
+    assert np.allclose(centre_of((floor, low), "floor"), (0, 1.0, 0), atol=2e-3), "half way to a low ceiling"
+
+
+def test_the_probe_of_a_thing_within_another_is_moved_out() -> None:
+    block = SceneObject("block", box((2, 2, 2)), "d")
+    ball = SceneObject("ball", placed(sphere(0.5, 24, 12), (0.7, 0, 0)), "m")
+    assert np.allclose(centre_of((block, ball), "ball"), (1.02, 0, 0), atol=0.06)
+
+
+def test_flat_and_not_flat() -> None:
+    mirror = patch((0, 0, 0), (1, 0, 1), (0, 1, 0))
+    axis = flat_axis(mirror)
+    assert axis is not None and abs(axis @ normalize(np.array([1.0, 0, -1.0]))) == pytest.approx(1)
+    assert flat_axis(sphere(1.0, 24, 12)) is None and flat_axis(box((1, 1, 1))) is None
+
+
+def test_a_glossy_room_of_one_mesh_sees_itself(tmp_path: Path) -> None:
+    scene = room_with_step()
+    glossy = Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.3),))
+    store = bake(replace(scene, materials={**scene.materials, "grey": glossy}), tmp_path / "s", quality=TINY)
+    assert not store.artefact("probe/shell/radiance").meta["object_left_out"]
+    assert store.artefact("probe/block/radiance").meta["object_left_out"]

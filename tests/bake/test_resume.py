@@ -1,0 +1,133 @@
+"""What is baked again and what is not; kill -9 at any moment."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake, changed_inputs
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.scenes.scene import Camera, Scene
+from lambent.store.contract import scene_record
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, room_with_step
+
+TILED = replace(TINY, light_map_texels=300, light_map_samples=(64, 64))  # 3 x 3 tiles
+BAKE = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+from lambent.bake.bake import bake
+from tests.bake.small_scenes import room_with_step
+from tests.bake.test_resume import TILED
+bake(room_with_step(), Path(sys.argv[1]), quality=TILED)
+"""
+
+
+def arrays(store: Store) -> dict[str, bytes]:
+    return {a.name: store.read(a.name).tobytes() for a in store.artefacts()}
+
+
+def keys(store: Store) -> dict[str, str]:
+    return {a.name: a.key for a in store.artefacts()}
+
+
+@pytest.mark.slow
+def test_killed_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
+    whole = bake(room_with_step(), tmp_path / "whole", quality=TILED)
+    path = tmp_path / "killed"
+    root = Path(__file__).parents[2]
+    for chunks in (1, 4):  # killed in the light map, twice
+        process = subprocess.Popen([sys.executable, "-c", BAKE, str(path)], cwd=root)
+        while process.poll() is None and done(path) < chunks:
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+        assert done(path) >= chunks
+    before = Store.open(path)
+    assert "light_map/irradiance" not in before
+    with pytest.raises(UserError, match=r"partial|does not hold"):
+        before.read("light_map/irradiance")
+    assert arrays(bake(room_with_step(), path, quality=TILED)) == arrays(whole)
+
+
+def done(path: Path) -> int:
+    """Tiles of the light map on disk."""
+    if not (path / "manifest.json").exists():
+        return 0
+    raw = [a for a in Store.open(path).artefacts() if a.name == "light_map/raw"]
+    return len(raw[0].done) if raw else 0
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
+    scene, path = room_with_step(), tmp_path_factory.mktemp("store") / "s"
+    bake(scene, path, quality=TINY)
+    return scene, path
+
+
+def test_only_what_depends_on_a_change_is_baked_again(baked: tuple[Scene, Path]) -> None:
+    scene, path = baked
+    before = keys(Store.open(path))
+    timings = Store.open(path).documents["timings"]
+    view = Camera("new", (0, 1, 1), (0, 0, 0))
+    store = bake(replace(scene, cameras=(view,)), path, quality=TINY)
+    assert keys(store) == before and store.documents["timings"] == timings
+    assert scene_record(store).cameras[0].name == "new"
+    darker = replace(scene, materials={**scene.materials, "grey": Material(kd=0.2)})
+    after = keys(bake(darker, path, quality=TINY))
+    changed = {name for name in before if after[name] != before[name]}
+    assert changed == {n for n in before if n.startswith(("light_map/", "probe/"))}
+    assert keys(bake(scene, path, quality=TINY)) == before
+
+
+def test_anew_on_request_is_the_same(baked: tuple[Scene, Path]) -> None:
+    scene, path = baked
+    before = arrays(Store.open(path))
+    calls: list[str] = []
+    store = bake(scene, path, quality=TINY, resume=False, progress=lambda done, total, what: calls.append(what))
+    assert "light map" in calls and arrays(store) == before
+    calls.clear()
+    bake(scene, path, quality=TINY, progress=lambda done, total, what: calls.append(what))
+    assert not calls, "nothing left to do"
+
+
+def test_other_seed_other_noise(baked: tuple[Scene, Path], tmp_path: Path) -> None:
+    scene, path = baked
+    other = bake(scene, tmp_path / "s", quality=TINY, only=["light_map"], seed=1)
+    assert "probe/ball/radiance" not in other and "geometry/uv2" in other
+    assert not np.array_equal(other.read("light_map/raw"), Store.open(path).read("light_map/raw"))
+
+
+def test_a_changed_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    source = tmp_path / "scene.toml"
+    source.write_text("one")
+    scene = replace(room_with_step(), sources=(source,))
+    store = bake(scene, tmp_path / "s", quality=TINY, only=["geometry"])
+    assert changed_inputs(store, scene) == []
+    source.write_text("two")
+    assert changed_inputs(Store.open(tmp_path / "s"), scene) == ["scene.toml"]
+    with caplog.at_level(logging.WARNING):
+        store = bake(scene, tmp_path / "s", quality=TINY, only=["geometry"])
+    assert "scene.toml" in caplog.text and store.documents["changes"] == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    "options", [{"quality": "prewiev"}, {"only": ["lightmap"]}], ids=["unknown quality", "unknown kind"]
+)
+def test_misspelt_options_are_told(tmp_path: Path, options: dict[str, object]) -> None:
+    with pytest.raises(UserError, match="did you mean"):
+        bake(room_with_step(), tmp_path / "s", **options)
+
+
+def test_an_empty_scene_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no objects"):
+        bake(Scene("empty", (), {}), tmp_path / "s")
