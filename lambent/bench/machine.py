@@ -32,8 +32,9 @@ def machine(device: Any = None) -> dict[str, Any]:
 
 
 def inputs_of(paths: Iterable[Path]) -> list[dict[str, str]]:
-    """[{"path": name, "sha256": ...}] of the files that a bench read."""
-    return [{"path": path.name, "sha256": sha256_of(path)} for path in paths]
+    """[{"path": name, "sha256": ...}] of the files that a bench read; of a store, its manifest's hash."""
+    hashed = ((path, path / "manifest.json" if path.is_dir() else path) for path in paths)
+    return [{"path": path.name, "sha256": sha256_of(file)} for path, file in hashed]
 
 
 def _cpu() -> str:

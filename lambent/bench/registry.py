@@ -1,24 +1,23 @@
 """Benches: found by discovery, run in one form.
 
 A bench is a module of this package with `NAME` and `run(quick, inputs, progress)`, which returns {"rows": [...],
-"summary": {...}} and, where it read files of its own choice, {"inputs": [paths]}. Names, rows and fields are those of
-docs/performance.md; times are medians of at least five runs taken alternately, their spread beside them.
+"summary": {...}}, and "machine" and "inputs" (see machine.py) where it knows them better than this module. Names, rows
+and fields are those of docs/performance.md; times are medians of at least five runs taken alternately, their spread
+beside them.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 import pkgutil
-import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from lambent import bench
+from lambent.bench.machine import inputs_of, machine
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.files import sha256_of
 from lambent.core.progress import Progress, silent
 
 
@@ -46,33 +45,11 @@ def run_bench(
     measured: Mapping[str, Any] = _module(name).run(quick, list(inputs), progress)
     return {
         "bench": name,
-        "machine": machine(),
-        "inputs": [_input(Path(path)) for path in [*inputs, *measured.get("inputs", [])]],
+        "machine": measured.get("machine") or machine(),
+        "inputs": measured.get("inputs") or inputs_of(inputs),
         "rows": list(measured["rows"]),
         "summary": dict(measured["summary"]),
     }
-
-
-def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
-    from lambent.bake.engine import probe_engine
-    from lambent.realtime.device import adapter_info, choose_adapter
-
-    engine = probe_engine().engine
-    facts: dict[str, Any] = {"cpu": cpu_name(), "cores": os.cpu_count(), "variant": engine.variant if engine else None}
-    try:
-        adapter = adapter_info(choose_adapter())
-    except UserError:
-        return facts | {"adapter": None, "adapter_type": None, "driver": None}
-    return facts | {"adapter": adapter.name, "adapter_type": adapter.type, "driver": adapter.driver}
-
-
-def cpu_name() -> str:
-    """The processor as its maker calls it, else its architecture."""
-    path = Path("/proc/cpuinfo")
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.exists() else []
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, "") or platform.processor() or platform.machine()
 
 
 def _module(name: str) -> ModuleType:
@@ -80,7 +57,3 @@ def _module(name: str) -> ModuleType:
     if name not in found:
         raise UserError("unknown bench", got=name, expected=", ".join(sorted(found)), hint=did_you_mean(name, found))
     return importlib.import_module(found[name])
-
-
-def _input(path: Path) -> dict[str, Any]:
-    return {"path": path.name, "sha256": sha256_of(path if path.is_file() else path / "manifest.json")}

@@ -29,7 +29,7 @@ def command(
     ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same material.")] = 0,
     output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw measurement and fit (.png, .pdf, .svg).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw both: X.png gives X_polar, X_in_plane, X_albedo.")] = None,
     json: Json = False,
 ) -> None:
     """Fit a diffuse term and lobes to a measured material.
@@ -40,16 +40,17 @@ def command(
     from lambent.materials import measured
     from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
+    from lambent.materials.fitting.plot import save_plots
 
     if output is not None:
         check_writable(output, (".json",))
     if plot is not None:
-        check_writable(plot, (".png", ".pdf", ".svg"))
+        check_writable(plot, (".png",))
     fixed, ranges = parse_fix(fix or ()), parse_ranges(range_ or ())
-    measurement = measured.load(file)
+    samples = measured.load(file).samples()
     with progress_bar() as progress:
         result = fit(
-            measurement,
+            samples,
             lobes=lobes,
             method=method,
             metric=metric,
@@ -61,12 +62,7 @@ def command(
         )
     if output is not None:
         result.material.save(output)
-    if plot is not None:
-        from lambent.materials.bsdf import MaterialBSDF
-        from lambent.materials.plots import plot_plane_of_incidence
-
-        evals = {"measured": measurement.eval, "fit": MaterialBSDF(result.material).eval}
-        plot_plane_of_incidence(plot, evals, title=file.name, transmits=measurement.info.transmits)
+    plots = save_plots(samples, result.material, plot.parent, plot.stem) if plot is not None else []
     for warning in result.warnings:
         say(f"note: {warning}")
     facts = {
@@ -77,6 +73,7 @@ def command(
         "partial": result.partial,
         "warnings": result.warnings,
         "written": output,
+        "plots": plots,
     }
     show(facts, describe(result), json)
     if result.partial:
