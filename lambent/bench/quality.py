@@ -96,7 +96,9 @@ def _cases(device: Any, environments: dict[str, Floats], size: int) -> Iterable[
     base = MATERIALS[0].model_copy(update={"name": "shown"})
     for environment, cube in environments.items():
         renderer = Renderer(device, specular_scene.baked_scene(meshes, base, cube))
-        shown = renderer.image(replace(state, n=1, materials={"shown": MATERIALS[5]}))[..., 1] > 0
+        shown = (
+            renderer.image(replace(state, n=1, materials={"shown": _material("rough", 0.4, 0.4, 0.7, 0.5)}))[..., 1] > 0
+        )
         for material in MATERIALS:
             reference = renderer.converged(replace(state, materials={"shown": material}), REFERENCE_SPP)
             yield renderer, Case(material, environment, reference, shown)
@@ -133,8 +135,10 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     groups: dict[tuple[str, int], list[float]] = defaultdict(list)
     for row in rows:
         groups[row["integrator"], row["n"]].append(row["psnr_qmc"])
-    means = {name: {n: round(float(np.mean(groups[name, n])), 2) for n in NS} for name in INTEGRATORS}
+    means = {name: {str(n): round(float(np.mean(groups[name, n])), 2) for n in NS} for name in INTEGRATORS}
     above = {
-        name: {n: round(means["rings"][n] - means[name][n], 2) for n in NS} for name in INTEGRATORS if name != "rings"
+        name: {n: round(means["rings"][n] - means[name][n], 2) for n in means[name]}
+        for name in INTEGRATORS
+        if name != "rings"
     }
     return {"psnr_qmc": means, "rings_above": above}

@@ -30,6 +30,7 @@ NAME = "walk-cube"
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19)
 BY_N = ("rings", "lobe-4.25", "fis")  # split-sum and diffuse do not know n
 ROUNDS = 5
+SIZES = {True: (560, 350), False: (1680, 1050)}  # by quick
 MATERIAL = Material(name="shown", lobes=(Lobe(mx=0.1, my=0.1, r0=(0.9, 0.9, 0.9), alpha=0.4),))
 CAMERA = CameraRecord(name="front", position=(0.0, 0.0, 1.5), target=(0.0, 0.0, 0.0), fov_y_deg=45.0)
 ROOM = np.array([[x, y, z, 3.0] for x, y, z in np.concatenate([np.eye(3), -np.eye(3)])], np.float32)
@@ -53,7 +54,7 @@ def run(quick: bool, inputs: list[Path], progress: Progress = silent) -> dict[st
     if inputs:
         raise UserError("this bench reads no inputs", got=inputs[0])
     device = open_device()
-    size = (560, 350) if quick else (1680, 1050)
+    size = SIZES[quick]
     rows = _measurements(device, *size)
     main = next(m for m in rows if (m.integrator, m.coverage, m.n) == ("rings", "full", 7))
     scaled = [_measured(main.renderer, "rings", "full", 7, *_scaled(size, factor)) for factor in (0.5, 2.0)]
