@@ -8,6 +8,7 @@ the poles. Angles in radians, lengths in metres, mouse distances in pixels of th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -79,11 +80,13 @@ def walk(
     floor_y: float | None,
     flying: bool = False,
     fast: bool = False,
+    allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
 ) -> CameraRecord:
     """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
-    On foot the eye moves level and settles at eye height above `floor_y` (the scene's lowest point where it is None).
-    Flying, it moves along the line of sight, and up and down by the keys for it.
+    On foot the eye moves level, as far as `allowed(eye, step)` gives way, and settles at eye height above `floor_y`
+    (the scene's lowest point where it is None). Flying, it moves along the line of sight, through everything, and up
+    and down by the keys for it.
     """
     right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
     if not (right or forward or (up and flying)):
@@ -95,7 +98,8 @@ def walk(
     length = float(np.linalg.norm(step))
     if length > 0:
         step = step / length
-    eye = np.array(camera.position) + step * speed_m_s(bounds, fast) * dt_s
+    eye, step = np.array(camera.position), step * speed_m_s(bounds, fast) * dt_s
+    eye = eye + (step if flying else allowed(eye, step))
     if not flying:
         eye_y = (bounds[0][1] if floor_y is None else floor_y) + eye_height_m(bounds)
         eye[1] += (eye_y - eye[1]) * (1 - math.exp(-dt_s / SETTLE_S))

@@ -90,14 +90,18 @@ class Input:
         if not self.walking or state.mode != "walk":
             return
         bounds = state.scene.bounds
-        floor_y = (
-            None if state.flying else self.geometry.floor_below(state.camera.position, cameras.eye_height_m(bounds))
+        height = cameras.eye_height_m(bounds)
+        moved = cameras.walk(
+            state.camera,
+            self.held,
+            dt_s,
+            bounds=bounds,
+            floor_y=None if state.flying else self.geometry.floor_below(state.camera.position, height),
+            flying=state.flying,
+            fast=self._fast,
+            allowed=lambda eye, step: self.geometry.allowed(eye, step, height),
         )
-        state.move(
-            cameras.walk(
-                state.camera, self.held, dt_s, bounds=bounds, floor_y=floor_y, flying=state.flying, fast=self._fast
-            )
-        )
+        state.move(moved)
 
     def _press(self, event: Mapping[str, Any]) -> None:
         if self._button is None:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from lambent.core.frames import normalize
 from lambent.realtime.camera import image_plane
 from lambent.store.contract import CameraRecord, ObjectRecord
+from lambent.viewer.walls import Walls
 
 Floats = NDArray[np.floating]
-STEP_M = 0.5  # a floor higher above the feet than this is a table, not a stair
+STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 
 
 def ray_through(camera: CameraRecord, x: float, y: float, width: int, height: int) -> tuple[Floats, Floats]:
@@ -36,6 +37,7 @@ class Geometry:
         # down).
         level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(lengths, 1e-20)
         self._level = self._triangles[level]
+        self._walls = Walls(self._triangles)
         self._level_low, self._level_high = self._level.min(axis=1), self._level.max(axis=1)
 
     def pick(self, origin: Floats, direction: Floats) -> ObjectRecord | None:
@@ -49,6 +51,10 @@ class Geometry:
                 if distance < nearest:
                     nearest, chosen = distance, item
         return chosen
+
+    def allowed(self, eye: Floats, step: Floats, eye_height_m: float) -> Floats:
+        """The part of a walker's step that nothing stands in the way of."""
+        return self._walls.allowed(eye, step, knee_y=eye[1] - eye_height_m + STEP_M)
 
     def floor_below(self, eye: Sequence[float], eye_height_m: float) -> float | None:
         """Height of the highest floor under the eye that one could step on; None where there is none."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lambent.viewer import cameras, pacing
+from lambent.viewer import cameras, pacing, picking
 from lambent.viewer.input import SHORTCUTS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
@@ -19,3 +19,4 @@ def test_the_numbers_are_those_of_the_code():
     assert f"{cameras.WALK_M_S} m/s" in TEXT
     assert f"{cameras.EYE_HEIGHT_M} m above" in TEXT
     assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
+    assert f"{100 * picking.STEP_M:.0f} cm" in TEXT

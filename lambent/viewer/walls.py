@@ -1,0 +1,79 @@
+"""What stops a walker: everything between knee and eye, seen from above.
+
+The walker is a circle of `BODY_M` around the eye, obstacles are the triangles' outlines on the floor plan. A step that
+would come nearer than that to one slides along it; whoever stands too near already may always step away.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.floating]
+BODY_M = 0.22
+SLIDES = 3  # a corner takes two
+_EDGES = ((0, 1), (1, 2), (2, 0))
+
+
+class Walls:
+    """Triangles (T, 3, 3) that may stand in the way."""
+
+    def __init__(self, triangles: Floats) -> None:
+        self._plan = triangles[:, :, [0, 2]]
+        self._low, self._high = triangles.min(axis=1), triangles.max(axis=1)
+
+    def allowed(self, eye: Floats, step: Floats, knee_y: float) -> Floats:
+        """The part of a horizontal step (3,) from `eye` that can be walked."""
+        start, move = eye[[0, 2]], step[[0, 2]]
+        length = float(np.linalg.norm(move))
+        outlines = self._near(start, BODY_M + length, knee_y, eye[1])
+        if not len(outlines):
+            return step
+        pieces = math.ceil(length / (BODY_M / 2))  # shorter than the body, so that none jumps over a wall
+        at = start
+        for _ in range(pieces):
+            at = at + _slid(at, move / pieces, outlines)
+        return np.array([at[0] - start[0], 0.0, at[1] - start[1]])
+
+    def _near(self, centre: Floats, reach: float, knee_y: float, eye_y: float) -> Floats:
+        low, high = self._low, self._high
+        near = (low[:, 1] < eye_y) & (high[:, 1] > knee_y)
+        for axis, c in ((0, centre[0]), (2, centre[1])):
+            near &= (low[:, axis] < c + reach) & (high[:, axis] > c - reach)
+        return np.asarray(self._plan[near], np.float64)
+
+
+def _slid(at: Floats, move: Floats, outlines: Floats) -> Floats:
+    """`move` without what leads into an outline; nothing where a corner leaves no way."""
+    before, _ = nearest_points(at, outlines)
+    for _ in range(SLIDES):
+        distances, points = nearest_points(at + move, outlines)
+        blocking = (distances < BODY_M) & (distances < before - 1e-9)
+        if not blocking.any():
+            return move
+        index = np.flatnonzero(blocking)[np.argmin(distances[blocking])]
+        # Inside an outline the nearest point is ahead: away is where the walker came from.
+        away = at + move - points[index] if distances[index] > 0 else at - points[index]
+        away = away / max(float(np.linalg.norm(away)), 1e-9)
+        move = move - min(float(move @ away), 0.0) * away
+    return np.zeros(2)
+
+
+def nearest_points(p: Floats, outlines: Floats) -> tuple[Floats, Floats]:
+    """Distances (T,) from p (2,) to triangles (T, 3, 2), 0 inside, and the nearest points (T, 2) of their outlines."""
+    best, points = np.full(len(outlines), np.inf), np.zeros((len(outlines), 2))
+    sides = []
+    for i, j in _EDGES:
+        a, edge = outlines[:, i], outlines[:, j] - outlines[:, i]
+        length2 = np.maximum(np.sum(edge * edge, axis=-1), 1e-20)
+        share = np.clip(np.sum((p - a) * edge, axis=-1) / length2, 0, 1)
+        on_edge = a + share[:, None] * edge
+        distance = np.linalg.norm(p - on_edge, axis=-1)
+        nearer = distance < best
+        best, points = np.where(nearer, distance, best), np.where(nearer[:, None], on_edge, points)
+        sides.append(edge[:, 0] * (p[1] - a[:, 1]) - edge[:, 1] * (p[0] - a[:, 0]))
+    low, high = np.min(sides, axis=0), np.max(sides, axis=0)
+    inside = ((low > 0) & (high > 0)) | ((low < 0) & (high < 0))
+    return np.where(inside, 0.0, best), points
