@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.viewer.walls import BODY_M, Walls, nearest_points
@@ -18,7 +18,7 @@ def block(low, high):
     return corners[[t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]]
 
 
-WALL = block((-5, 0, -2.1), (5, 2.5, -2))
+WALL = block((-20, 0, -2.1), (20, 2.5, -2))
 TABLE = block((1, 0.72, -1), (2, 0.75, 1))
 ROOM = Walls(np.concatenate([WALL, TABLE, block((-5, 0, -3), (-2, 0.1, 3)), block((-1, 2, -1), (1, 2.4, 1))]))
 
@@ -58,6 +58,7 @@ def test_who_stands_too_near_may_step_away():
     assert np.linalg.norm(ROOM.allowed(near, -away, 0.35)) < 1e-6
 
 
+@settings(max_examples=200, deadline=None)
 @given(st.floats(-4, 4), st.floats(-1.5, 3), st.floats(0, 2 * math.pi))
 def test_nobody_gets_through_the_wall(x, z, heading):
     assert walk((x, z), heading, 6, stride=0.2)[2] > -2
