@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sets Lambent up beside itself and runs it. Needs nothing but Python 3.11 or newer.
+"""Sets Lambent up beside itself and runs it. Needs nothing but Python 3.11 to 3.13.
 
     python3 run.py demo [ARGS]     the whole flow: measure, fit, bake, walk
     python3 run.py lambent ARGS    any command, e.g. `python3 run.py lambent doctor`
@@ -22,7 +22,7 @@ HOME = Path(__file__).resolve().parent
 VENV = HOME / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 STAMP = VENV / "lambent-ready.json"
-OLDEST = (3, 11)
+PYTHONS = ((3, 11), (3, 12), (3, 13))  # those that every dependency has ready-made packages for
 WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
 
 
@@ -31,9 +31,8 @@ class Stop(Exception):
 
 
 def main(arguments):
-    if sys.version_info < OLDEST:
-        found = "{}.{}".format(*sys.version_info[:2])
-        raise Stop(f"Lambent needs Python 3.11 or newer; this is {found} ({sys.executable}).")
+    if sys.version_info[:2] not in PYTHONS:
+        return subprocess.call([*suitable_python(), __file__, *arguments])
     tasks = {"demo": run_demo, "lambent": run_lambent, "test": run_tests}
     if not arguments or arguments[0] not in tasks:
         print(__doc__)
@@ -41,6 +40,18 @@ def main(arguments):
     os.environ["PYTHONUTF8"] = "1"
     set_up(for_tests=arguments[0] == "test")
     return tasks[arguments[0]](arguments[1:])
+
+
+def suitable_python():
+    """Command of another Python on this machine that will do, the newest first."""
+    for version in reversed(PYTHONS):
+        name = "{}.{}".format(*version)
+        question = ["-c", f"import sys; sys.exit(sys.version_info[:2] != {version})"]
+        for command in (["python" + name], ["py", "-" + name]):
+            if works([*command, *question]):
+                return command
+    found = "{}.{}".format(*sys.version_info[:2])
+    raise Stop(f"Lambent needs Python 3.11, 3.12 or 3.13; this is {found} ({sys.executable}), and there is no other.")
 
 
 def run_demo(arguments):

@@ -46,15 +46,23 @@ def test_standard_library_only():
     assert names <= set(sys.stdlib_module_names)
 
 
-def test_an_old_python_can_read_it_and_is_told():
+def test_an_old_python_can_read_it():
     ast.parse(RUN.read_text("utf-8"), feature_version=(3, 7))
-    program = (
-        "import sys, runpy; sys.version_info = (3, 9, 0); sys.argv = ['run.py', 'demo']; "
-        f"runpy.run_path({str(RUN)!r}, run_name='__main__')"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 1
-    assert done.stderr.startswith("run.py: Lambent needs Python 3.11 or newer; this is 3.9")
+
+
+@pytest.mark.parametrize("version", [(3, 9), (3, 14)])
+def test_another_python_is_looked_for(run, monkeypatch, version):
+    monkeypatch.setattr(run.sys, "version_info", (*version, 0))
+    monkeypatch.setattr(run, "works", lambda command: command[0] == "python3.12")
+    assert run.suitable_python() == ["python3.12"]
+    monkeypatch.setattr(run, "works", lambda command: False)
+    with pytest.raises(run.Stop, match=r"needs Python 3\.11, 3\.12 or 3\.13; this is {}\.{} ".format(*version)):
+        run.main(["demo"])
+
+
+def test_a_suitable_python_is_suitable(run):
+    question = "import sys; assert (3, 11) <= sys.version_info[:2] <= (3, 13)"
+    assert run.works([*run.suitable_python(), "-c", question])
 
 
 def test_help_and_nonsense():
