@@ -11,7 +11,7 @@ RINGS = 16  # texels grown into gutters; what is farther from any chart is never
 RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
 
 
-def fill(values: Array, known: Mask, labels: NDArray[np.integer]) -> Array:
+def fill(values: Array, known: Mask, labels: NDArray[np.integer], *, smooth: int = 0) -> Array:
     """Grow known texels into unknown ones: (H, W, C) with no black left.
 
     Parameters
@@ -21,12 +21,17 @@ def fill(values: Array, known: Mask, labels: NDArray[np.integer]) -> Array:
     labels : (H, W) int
         Chart of each texel, -1 in gutters. An unknown texel within a chart takes values from its own chart first,
         so that a wall behind a cupboard is not filled with what lies next to it in the map.
+    smooth : int
+        Times that what is grown is averaged over neighbours before: noise that is grown becomes streaks, which no
+        denoiser takes for noise.
     """
     if not known.any():
         return np.zeros_like(values)
     h, w, channels = values.shape
-    grown = _Grown(np.pad(np.where(known[..., None], values, 0.0), ((1, 1), (1, 1), (0, 0))), np.pad(known, 1))
     chart = np.pad(labels, 1, constant_values=-1).reshape(-1)
+    grown = _Grown(np.pad(np.where(known[..., None], values, 0.0), ((1, 1), (1, 1), (0, 0))), np.pad(known, 1))
+    for _ in range(smooth):
+        grown.smooth(chart)
     while grown.ring(chart):
         pass
     for _ in range(RINGS):
@@ -34,7 +39,7 @@ def fill(values: Array, known: Mask, labels: NDArray[np.integer]) -> Array:
     filled = grown.values.reshape(h + 2, w + 2, channels)[1:-1, 1:-1]
     left = ~grown.known.reshape(h + 2, w + 2)[1:-1, 1:-1]
     filled[left] = values[known].mean(axis=0)
-    return filled
+    return np.where(known[..., None], values, filled)
 
 
 class _Grown:
@@ -47,6 +52,17 @@ class _Grown:
         self.inner = np.zeros((height, width), bool)
         self.inner[1:-1, 1:-1] = True
         self.inner = self.inner.reshape(-1)
+
+    def smooth(self, chart: NDArray[np.integer]) -> None:
+        """Every known texel takes the mean of itself and the known texels of its chart around it."""
+        target = np.flatnonzero(self.known)
+        total, count = self.values[target], np.ones(len(target))
+        for step in self.steps:
+            near = target + step
+            same = self.known[near] & (chart[near] == chart[target])
+            total += self.values[near] * same[:, None]
+            count += same
+        self.values[target] = total / count[:, None]
 
     def ring(self, chart: NDArray[np.integer] | None) -> bool:
         """Unknown texels next to known ones (of their own chart, where charts are given) take the mean of those."""

@@ -24,6 +24,7 @@ from lambent.core.sequences import hammersley, r2
 Array = NDArray[np.floating]
 TILE = 128  # texels per side of a chunk
 SAMPLES_PER_PASS = 32
+SMOOTH = 8  # averaging of what is grown into gutters before denoising: some 4 texels wide
 HALF_MAX = 65504.0
 
 
@@ -130,7 +131,7 @@ def finished(raw: Array, labels: NDArray[np.integer]) -> tuple[Array, dict[str, 
         return np.zeros((*known.shape, 3), np.float16), {"noise": 0.0, "samples": 0.0}
     halves = raw[..., :3] / np.maximum(count, 1)[..., None]
     noise = relative_noise(halves[:, known])
-    filled = fill(halves.mean(axis=0), known, labels)
+    filled = fill(halves.mean(axis=0), known, labels, smooth=SMOOTH)
     clean = fill(denoise(filled), known, labels)
     meta = {"noise": noise, "samples": float(count.sum(axis=0)[known].mean())}
     return np.minimum(clean, HALF_MAX).astype(np.float16), meta
