@@ -224,3 +224,19 @@ def test_impossible_frames_are_refused(device, change: dict[str, object]) -> Non
     renderer = Renderer(device, square(gloss))
     with pytest.raises(UserError):
         renderer.image(replace(FrameState(FORWARD, 8, 8), **change))
+
+
+def test_antialiasing_draws_no_edges_inside_a_surface(device) -> None:
+    """A floor of many triangles at a grazing angle: its smooth light map shows no lattice."""
+    from lambent.scenes.geometry import patch as sheet
+
+    mesh = sheet((-20, 0, 0), (40, 0, 0), (0, 0, -60), cells=(12, 12))
+    ramp = np.linspace(0.2, 1.0, 64, dtype=np.float32)[None, :, None] * np.ones((64, 1, 3), np.float32)
+    scene = baked_scene({"floor": mesh}, PAPER, np.zeros((6, 2, 2, 3)))
+    uv2 = np.stack([scene.positions[:, 0] / 40 + 0.5, -scene.positions[:, 2] / 60], axis=-1)
+    scene = replace(scene, irradiance=np.pi * ramp, uv2=np.asarray(uv2, np.float32))
+    camera = CameraRecord(name="low", position=(0, 1.0, 0), target=(0.5, 0.6, -3))
+    state = FrameState(camera, 120, 80)
+    renderer = Renderer(device, scene)
+    smooth, plain = renderer.image(state), renderer.image(replace(state, antialias=False))
+    np.testing.assert_allclose(smooth[45:], plain[45:], atol=0.01)

@@ -4,11 +4,12 @@
 
 struct Varyings {
     @invariant @builtin(position) position: vec4f,
-    // centroid: at the edge of a triangle the pixel's centre may lie outside, where normals extrapolate
-    @location(0) @interpolate(perspective, centroid) p_world: vec3f,
-    @location(1) @interpolate(perspective, centroid) n_world: vec3f,
-    @location(2) @interpolate(perspective, centroid) t_world: vec3f,
-    @location(3) @interpolate(perspective, centroid) uv2: vec2f,
+    // Not at the centroid: Mesa's software Vulkan (22.3) divides by the depth of another place there, which drew
+    // the edges of all triangles. Extrapolation by half a pixel stays within the light map's gutters.
+    @location(0) p_world: vec3f,
+    @location(1) n_world: vec3f,
+    @location(2) t_world: vec3f,
+    @location(3) uv2: vec2f,
 }
 
 @vertex fn vertex_main(
