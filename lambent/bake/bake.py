@@ -225,16 +225,18 @@ class _Bake:
 
     def _lit_sides(self, texels: Any, sign: float) -> tuple[Any, Any]:
         """The scene, and which points of it are lit on the side of this sign."""
+        from lambent.bake.emitters import balance_emitters
         from lambent.bake.light_map import Sides
         from lambent.bake.mitsuba_scene import SceneBuilder
         from lambent.bake.solids import SolidTest
 
         builder = SceneBuilder(self.atlas.scene)
+        balance_emitters(builder)
         scene = builder.build()
         points, flat = texels.positions.reshape(-1, 3), sign * texels.flat.reshape(-1, 3)
         ours = np.ones(len(points), bool)
         if sign < 0:
-            ours = np.repeat(self._two_sided_faces()[texels.face].reshape(-1), 1)
+            ours = self._two_sided_faces()[texels.face].reshape(-1)
         valid = ours.copy()
         valid[ours] = ~SolidTest(builder, scene).embedded(points[ours], flat[ours])
         return scene, Sides(texels, sign, valid.reshape(texels.face.shape))

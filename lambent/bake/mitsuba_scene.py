@@ -64,6 +64,20 @@ class SceneBuilder:
             parts["darkness"] = {"type": "constant", "radiance": 0.0}  # Mitsuba warns about a scene without light
         return mi.load_dict({"type": "scene", **parts}, optimize=False)
 
+    def emitters(self) -> list[Any]:
+        """All mi.Emitter: of objects, lights, environment."""
+        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._lights
+        return [*found, self._environment] if self._environment is not None else found
+
+    def weigh_emitters(self, weights: Array) -> None:
+        """Set how often each of `emitters()` is chosen, relative to the others, in scenes built from now on."""
+        import mitsuba as mi
+
+        for emitter, weight in zip(self.emitters(), weights, strict=True):
+            parameters = mi.traverse(emitter)
+            parameters["sampling_weight"] = float(weight)
+            parameters.update()
+
     def object_numbers(self) -> Any:
         """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's place in the scene."""
         import drjit as dr

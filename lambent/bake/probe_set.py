@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.atlas import Atlas
+from lambent.bake.emitters import balance_emitters
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe import LightMapCache, bake_probe
@@ -23,6 +24,7 @@ class ProbeSet:
 
     def __init__(self, atlas: Atlas, irradiance: Array, irradiance_back: Array | None) -> None:
         self._builder = SceneBuilder(atlas.scene, atlas.uv2, diffuse=False)
+        balance_emitters(self._builder)
         self._cache = LightMapCache(self._builder, irradiance, irradiance_back)
 
     @cached_property

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake import paths
+from lambent.bake.emitters import balance_emitters
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.work import seed_of
 from lambent.core.frames import normalize
@@ -44,7 +45,9 @@ def render_reference(
     image, variance : (height, width, 3) float32
         Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
     """
-    whole = SceneBuilder(scene).build()
+    builder = SceneBuilder(scene)
+    balance_emitters(builder)
+    whole = builder.build()
     per_pass = max(1, min(spp, PATHS_AT_ONCE // (width * height)))
     passes = -(-spp // per_pass)
     total, squares = np.zeros((2, width * height, 3))

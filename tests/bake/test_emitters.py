@@ -1,0 +1,42 @@
+"""Emitters are chosen by what they bring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from lambent.bake.emitters import FLOOR, balance_emitters
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.reference import render_reference
+from lambent.scenes.scene import Camera, PointLight, Scene
+from tests.bake.small_scenes import GREY, plane
+
+
+def lit_plane(*intensities: float) -> Scene:
+    lights = tuple(PointLight((x, 1.0, 0.0), (i, i, i)) for x, i in enumerate(intensities))
+    return replace(plane(), lights=lights, materials={"black": GREY})
+
+
+def weights(scene: Scene) -> np.ndarray:
+    builder = SceneBuilder(scene)
+    balance_emitters(builder)
+    return np.array([float(mi.traverse(e)["sampling_weight"]) for e in builder.emitters()])
+
+
+def test_the_stronger_light_is_chosen_more_often_and_none_never() -> None:
+    weak, strong = weights(lit_plane(0.0, 10.0))
+    assert weak == pytest.approx(FLOOR) and strong == pytest.approx(2 + FLOOR)
+    first, second = weights(lit_plane(1.0, 1.0))
+    assert 1 < first / second < 3, "the one over the middle lights more of the plane"
+
+
+def test_the_picture_keeps_its_mean() -> None:
+    camera = Camera("c", (0, 2, 0.1), (0, 0, 0))
+    both, variance = render_reference(lit_plane(0.2, 10.0), camera, 16, 16, 256)
+    alone = [render_reference(lit_plane(*pair), camera, 16, 16, 64)[0] for pair in ((0.2, 0.0), (0.0, 10.0))]
+    assert both.mean() == pytest.approx(
+        (alone[0] + alone[1]).mean(), abs=5 * float(variance.mean() / variance.size) ** 0.5
+    )
