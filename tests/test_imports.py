@@ -50,7 +50,7 @@ def room_of(path: Path) -> str:
 
 def imports_of(path: Path) -> Iterator[tuple[int, str]]:
     """(line, absolute module name) of every import in a file, those inside functions included."""
-    package = ["lambent", *path.relative_to(PACKAGE).parts[:-1]]
+    package = path.relative_to(ROOT).parts[:-1]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
@@ -118,16 +118,33 @@ def test_every_data_file_is_packaged() -> None:
     assert not [name for name in data if not any(fnmatch.fnmatch(name, p.rpartition("/")[2]) for p in patterns)]
 
 
-def test_every_dependency_is_pinned_and_used() -> None:
-    """constraints.txt pins what pyproject.toml asks for, and the code imports it."""
+def dependencies() -> tuple[dict[str, str], dict[str, str]]:
+    """Distribution -> module, of what the package needs and of what its tests need besides."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    module_of = {"pillow": "PIL", "colour-science": "colour"}
+
+    def modules(names: list[str]) -> dict[str, str]:
+        return {name: module_of.get(name, name.replace("-", "_")) for name in names}
+
+    return modules(project["dependencies"]), modules(project["optional-dependencies"]["test"])
+
+
+def third_party(paths: list[Path]) -> set[str]:
+    names = {name.partition(".")[0] for path in paths for _, name in imports_of(path)}
+    return names - set(sys.stdlib_module_names) - {"__future__", "lambent", "tests", "conftest"}
+
+
+def test_every_dependency_is_pinned() -> None:
     pinned = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
     assert all(line.count("==") == 1 for line in pinned)
-    names = {line.partition("==")[0].lower().replace("_", "-") for line in pinned}
-    wanted = [*project["dependencies"], *project["optional-dependencies"]["test"]]
-    assert {name.lower() for name in wanted} <= names
+    needed, for_tests = dependencies()
+    assert {name.lower() for name in needed | for_tests} <= {line.partition("==")[0].lower() for line in pinned}
 
-    imported = {name.partition(".")[0] for path in MODULES for _, name in imports_of(path)}
-    module_of = {"pillow": "PIL", "scikit-image": "skimage", "colour-science": "colour"}
-    modules = {name: module_of.get(name, name.replace("-", "_")) for name in project["dependencies"]}
-    assert not [name for name, module in modules.items() if module not in imported]
+
+def test_every_dependency_is_used_and_every_import_is_a_dependency() -> None:
+    needed, for_tests = dependencies()
+    comes_along = {"drjit"}  # with mitsuba
+    assert third_party(MODULES) == set(needed.values()) | comes_along
+    in_tests = third_party(sorted((ROOT / "tests").rglob("*.py")))
+    local = {path.stem for path in (ROOT / "tests").rglob("*.py")}
+    assert in_tests - local <= set((needed | for_tests).values()) | comes_along
