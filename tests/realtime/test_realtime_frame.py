@@ -239,4 +239,4 @@ def test_antialiasing_draws_no_edges_inside_a_surface(device) -> None:
     state = FrameState(camera, 120, 80)
     renderer = Renderer(device, scene)
     smooth, plain = renderer.image(state), renderer.image(replace(state, antialias=False))
-    np.testing.assert_allclose(smooth[45:], plain[45:], atol=0.01)
+    np.testing.assert_allclose(smooth[45:], plain[45:], atol=0.001)

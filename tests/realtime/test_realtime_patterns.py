@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -58,7 +60,7 @@ def test_line_is_the_quantile_of_the_marginal() -> None:
 @pytest.mark.parametrize("n", [5, 7, 19])
 def test_no_jump_while_the_roughness_slides(table, n: int) -> None:
     lobes = [Lobe(mx=0.1, my=float(0.1 * ratio)) for ratio in np.geomspace(0.1, 10, 4001)]
-    for before, after in zip(lobes, lobes[1:], strict=False):
+    for before, after in pairwise(lobes):
         rows = [table(lobe, n)[:, :2] / [lobe.mx, lobe.my] for lobe in (before, after)]
         if patterns.line_share(before, n) == 0 or patterns.line_share(after, n) == 0:
             rows = [r[np.lexsort(r.round(2).T)] for r in rows]  # which row a sample stands in does not matter
