@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from lambent.bench import quality, walk_cube
-from lambent.bench.specular_scene import dusk, from_lat_long, night, studio
+from lambent.bench.specular_scene import CAMERA, baked_scene, dusk, from_lat_long, night, studio
 from lambent.core.cubemap import face_directions
 from lambent.core.errors import UserError
 from lambent.core.frames import normalize
 from lambent.core.images import write_image
 from lambent.realtime.device import choose_adapter
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.scenes.geometry import sphere
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -51,6 +53,20 @@ def test_rings_stand_above_the_published_estimates(monkeypatch: pytest.MonkeyPat
     assert above["lobe-4.25"]["7"] > 4
     assert above["lobe-4.24"]["7"] > 4
     assert all(0 < row["flip_qmc"] < row["flip_qmc_worst_tile"] < 1 for row in report["rows"])
+
+
+def test_the_path_tracer_sees_the_same_picture() -> None:
+    """A lone sphere has nothing to reflect but the environment: qmc and path tracing agree, the right way round."""
+    from lambent.bench.path_reference import path_traced
+    from lambent.realtime.device import open_device
+
+    material = quality.MATERIALS[8]  # anisotropic: the brushing direction counts
+    meshes = {"sphere": sphere(1.0)}
+    truth = path_traced(meshes, material, dusk(64), CAMERA, 48, 256)
+    renderer = Renderer(open_device(), baked_scene(meshes, material, dusk(64)))
+    image = renderer.converged(FrameState(CAMERA, 48, 48, lookup="plain"), 1024)
+    assert np.abs(image - truth).mean() < 0.02 * truth.mean()
+    assert np.abs(image - truth).mean() < 0.1 * np.abs(image[:, ::-1] - truth).mean()
 
 
 def test_frame_times_come_with_their_spread(monkeypatch: pytest.MonkeyPatch) -> None:

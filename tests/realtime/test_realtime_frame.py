@@ -196,6 +196,15 @@ def test_no_pixel_is_lost_at_silhouettes(device) -> None:
         assert image.min() > 0.05, name
 
 
+def test_broken_normals_and_tangents_make_no_nan(device) -> None:
+    gloss = Material(name="m", kd=0.2, lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),))
+    scene = baked_scene(sphere_and_torus(24), gloss, np.full((6, 4, 4, 3), np.nan), irradiance=(1, 1, 1))
+    scene = replace(scene, normals=np.zeros_like(scene.normals), tangents=np.full_like(scene.tangents, np.nan))
+    renderer = Renderer(device, scene)
+    for name in ("rings", "lobe-4.25", "split-sum", "qmc"):
+        assert np.isfinite(renderer.image(FrameState(CAMERA, 40, 30, integrator=name, accumulate=0))).all()
+
+
 def test_statistics(device) -> None:
     renderer = Renderer(device, square())
     renderer.display_image(FrameState(FORWARD, 16, 16))

@@ -10,7 +10,8 @@ const GRAZING = 1e-3; // least cos_o: interpolated normals turn away from the vi
 const HALF_MAX = 6e4; // below the largest half float, so that a resolve never meets infinity
 
 fn shading_frame(v: Varyings, facing: f32) -> Surface {
-    let n = normalize(v.n_world) * facing;
+    // a mesh may bring a zero normal, and one NaN would stay in the mean of a progressive series
+    let n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12)) * facing;
     let along = v.t_world - n * dot(n, v.t_world);
     let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
     let t = normalize(select(cross(n, other), along, dot(along, along) > 1e-8));

@@ -1,0 +1,41 @@
+"""The bench's pictures path traced: with the light that the shapes throw at each other, which a probe leaves out."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.cubemap import sample
+from lambent.core.images import write_image
+from lambent.materials.document import Material
+from lambent.scenes.scene import Camera, ImageEnvironment, Mesh, Scene, SceneObject
+from lambent.store.contract import CameraRecord
+
+Floats = NDArray[np.floating]
+
+
+def to_lat_long(cube: Floats, height: int = 512) -> Floats:
+    """Lat-long picture (height, 2 height, 3) of an environment (6, N, N, 3): top +y, middle column -z."""
+    theta = (np.arange(height)[:, None] + 0.5) / height * np.pi
+    phi = (np.arange(2 * height)[None, :] + 0.5) / height * np.pi - np.pi
+    parts = (np.sin(theta) * np.sin(phi), np.cos(theta) + 0 * phi, -np.sin(theta) * np.cos(phi))
+    return sample(cube, np.stack(parts, axis=-1))
+
+
+def path_traced(
+    meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: CameraRecord, size: int, spp: int
+) -> Floats:
+    """Radiance (size, size, 3) of `meshes` in `material` under `environment` (6, N, N, 3), the sky behind them."""
+    from lambent.bake.reference import render_reference
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "environment.exr"
+        write_image(file, to_lat_long(environment))
+        objects = tuple(SceneObject(name, mesh, material.name) for name, mesh in meshes.items())
+        scene = Scene("bench", objects, {material.name: material}, ImageEnvironment(file))
+        view = Camera(camera.name, camera.position, camera.target, camera.up, camera.fov_y_deg)
+        return render_reference(scene, view, size, size, spp)[0]
