@@ -123,9 +123,10 @@ class _Bake:
             self.store.forget_all()
         geometry = keys.geometry_parts(scene)
         self.geometry_key = keys.key_of("geometry", quality.light_map_texels, *geometry)
-        q = [quality.light_map_samples, quality.light_map_noise, quality.max_depth, seed]
+        q = [quality.light_map_samples, quality.light_map_noise, quality.gather_samples, quality.max_depth, seed]
         looks = keys.material_parts(scene)
         self.light_map_key = keys.key_of("light_map", self.geometry_key, looks, keys.light_parts(scene), q)
+        self.irradiance_key = keys.key_of("irradiance", self.light_map_key)  # raw samples, filled and denoised
         self.environment_key = keys.key_of(
             "environment", quality.environment_texels, keys.environment_part(scene.environment)
         )
@@ -186,52 +187,66 @@ class _Bake:
         sides = ["irradiance"]
         if any(is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects):
             sides.append("irradiance_back")
-        if all(self._current(f"light_map/{side}", self.light_map_key) for side in sides):
+        if all(self._current(f"light_map/{side}", self.irradiance_key) for side in sides):
             return
         with self._timed("light_map"):
-            from lambent.bake.light_map import finished
+            from lambent.bake.light_map import gathered, path_traced
+            from lambent.bake.probe import LightMapCache
             from lambent.bake.texels import chart_labels, texels_of
 
             texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
             labels = chart_labels(self.merged, texels)
-            for side in sides:
-                raw = self._raw_light_map(texels, side)
-                self.progress(0, 1, "denoising")
-                clean, meta = finished(raw, labels)
+            builder = self._builder(diffuse=True)
+            how = path_traced(self.quality)
+            maps = {side: self._sampled_map(texels, labels, side, builder, "traced", how) for side in sides}
+            if self.quality.gather_samples:
+                builder = self._builder(diffuse=False)
+                back = maps["irradiance_back"][0] if len(sides) > 1 else None
+                how = gathered(self.quality, LightMapCache(builder, maps["irradiance"][0], back))
+                maps = {side: self._sampled_map(texels, labels, side, builder, "gathered", how) for side in sides}
+            for side, (clean, meta) in maps.items():
                 name = f"light_map/{side}"
-                self.store.put(name, "light_map", clean, key=self.light_map_key, meta=self._meta(**meta))
+                self.store.put(name, "light_map", clean, key=self.irradiance_key, meta=self._meta(**meta))
 
-    def _raw_light_map(self, texels: Any, side: str) -> Array:
-        from lambent.bake.light_map import TILE, tile_samples
+    def _builder(self, diffuse: bool) -> Any:
+        from lambent.bake.emitters import balance_emitters
+        from lambent.bake.mitsuba_scene import SceneBuilder
 
-        name = "light_map/raw" if side == "irradiance" else "light_map/raw_back"
+        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse)
+        balance_emitters(builder)
+        return builder
+
+    def _sampled_map(
+        self, texels: Any, labels: NDArray[np.integer], side: str, builder: Any, stage: str, how: Any
+    ) -> tuple[Array, dict[str, float]]:
+        """One side's map, denoised, and what to note of it; its raw tiles stay in the store as `light_map/STAGE...`."""
+        from lambent.bake.light_map import TILE, finished, tile_samples
+
+        name = f"light_map/{stage}" if side == "irradiance" else f"light_map/{stage}_back"
         shape, chunks = (2, texels.height, texels.width, 4), (2, TILE, TILE, 4)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
         if writer.missing:
-            scene, sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0)
+            scene, sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder)
             covered = np.zeros(texels.width * texels.height, bool)
             covered[texels.index[sides.valid.any(axis=1)]] = True
             covered = covered.reshape(texels.height, texels.width)
             run_tiles(
                 writer,
-                lambda region, tile_seed: tile_samples(scene, sides, region, tile_seed, self.quality),
+                lambda region, tile_seed: tile_samples(scene, sides, region, tile_seed, how),
                 seed=self.seed,
                 progress=self.progress,
-                what="light map" if side == "irradiance" else "light map, far sides",
+                what=f"light map, {stage}" + (", far sides" if side != "irradiance" else ""),
                 cost=lambda region: 1 + float(covered[region[1], region[2]].sum()),
             )
         writer.finish()
-        return self.store.read(name)
+        self.progress(0, 1, "denoising")
+        return finished(self.store.read(name), labels)
 
-    def _lit_sides(self, texels: Any, sign: float) -> tuple[Any, Any]:
+    def _lit_sides(self, texels: Any, sign: float, builder: Any) -> tuple[Any, Any]:
         """The scene, and which points of it are lit on the side of this sign."""
-        from lambent.bake.emitters import balance_emitters
         from lambent.bake.light_map import Sides
-        from lambent.bake.mitsuba_scene import SceneBuilder
         from lambent.bake.solids import SolidTest
 
-        builder = SceneBuilder(self.atlas.scene)
-        balance_emitters(builder)
         scene = builder.build()
         points, flat = texels.positions.reshape(-1, 3), sign * texels.flat.reshape(-1, 3)
         ours = np.ones(len(points), bool)
@@ -270,7 +285,7 @@ class _Bake:
     def _probe_key(self, name: str) -> str:
         q = self.quality
         centre = self.scene.probe_centres.get(name)
-        return keys.key_of("probe", self.light_map_key, name, centre, q.probe_texels, q.probe_samples, self.seed)
+        return keys.key_of("probe", self.irradiance_key, name, centre, q.probe_texels, q.probe_samples, self.seed)
 
     def _planes_key(self, name: str, probe_key: str) -> str:
         given = self.scene.probe_planes.get(name)

@@ -13,7 +13,13 @@ import numpy as np
 from lambent.core.files import sha256_of
 from lambent.scenes.scene import Environment, ImageEnvironment, Scene
 
-REVISION = {"geometry": 2, "light_map": 2, "environment": 1, "probe": 2}  # raised when a bake's result changes
+REVISION = {
+    "geometry": 2,
+    "light_map": 2,
+    "irradiance": 1,
+    "environment": 1,
+    "probe": 2,
+}  # raised when a bake's result changes
 
 
 def key_of(kind: str, *parts: object) -> str:

@@ -1,7 +1,7 @@
 """The light map: irradiance at every texel, path traced through the true materials.
 
-A tile is sampled in passes of SAMPLES_PER_PASS; even and odd passes are summed apart, so that half their difference
-tells the noise. The raw sums stay in the store (`light_map/raw`): a bake goes on from them after any interruption.
+A tile is sampled in passes; even and odd passes are summed apart, so that half their difference
+tells the noise. The raw sums stay in the store (`light_map/traced`): a bake goes on from them after any interruption.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from lambent.bake import paths
 from lambent.bake.denoise import denoise, fill
 from lambent.bake.quality import Quality
+from lambent.bake.seams import blend_seams
 from lambent.bake.texels import POINTS, Texels
 from lambent.core.colour import luminance
 from lambent.core.sequences import hammersley, r2
 
 Array = NDArray[np.floating]
 TILE = 128  # texels per side of a chunk
-SAMPLES_PER_PASS = 32
 SMOOTH = 8  # averaging of what is grown into gutters before denoising: some 4 texels wide
 HALF_MAX = 65504.0
 
@@ -41,7 +41,32 @@ class Sides:
     valid: NDArray[np.bool_]
 
 
-def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, quality: Quality) -> Array:
+@dataclass(frozen=True)
+class Sampling:
+    """How texels are sampled: at least and at most so many times, until the relative noise is reached.
+
+    With a `cache` (see `paths.radiance`) paths end at diffuse surfaces; the scene must be without diffuse terms then.
+    """
+
+    samples: tuple[int, int]
+    noise: float
+    max_depth: int
+    per_pass: int = 32
+    cache: paths.Cache | None = None
+
+
+def path_traced(quality: Quality) -> Sampling:
+    """All bounces, for the whole scene."""
+    return Sampling(quality.light_map_samples, quality.light_map_noise, quality.max_depth)
+
+
+def gathered(quality: Quality, cache: paths.Cache) -> Sampling:
+    """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
+    count = quality.gather_samples
+    return Sampling((count, count), 0.0, quality.max_depth, max(1, count // 2), cache)
+
+
+def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Array:
     """Raw content of one tile: (2, h, w, 4) float32, the two halves' sums of irradiance and their sample counts."""
     rows, columns = region[1], region[2]
     height, width = rows.stop - rows.start, columns.stop - columns.start
@@ -53,18 +78,18 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
         return raw.reshape(2, height, width, 4)
     points = _Points(sides, mine)
     sums = np.zeros((2, len(mine), 3))
-    fewest, most = quality.light_map_samples
+    fewest, most = how.samples
     passes = 0
-    while passes * SAMPLES_PER_PASS < most:
+    while passes * how.per_pass < most:
         for half in (0, 1):
-            sums[half] += _sum_of_pass(scene, points, (seed, passes), quality.max_depth)
+            sums[half] += _sum_of_pass(scene, points, (seed, passes), how)
             passes += 1
-        samples = passes * SAMPLES_PER_PASS
-        if samples >= fewest and relative_noise(sums * 2 / samples) <= quality.light_map_noise:
+        samples = passes * how.per_pass
+        if samples >= fewest and relative_noise(sums * 2 / samples) <= how.noise:
             break
     place = (row[mine] - rows.start) * width + column[mine] - columns.start
     raw[:, place, :3] = sums
-    raw[:, place, 3] = passes * SAMPLES_PER_PASS / 2
+    raw[:, place, 3] = passes * how.per_pass / 2
     return raw.reshape(2, height, width, 4)
 
 
@@ -91,13 +116,13 @@ def _vectors(array: Array) -> Any:
     return mi.Vector3f(np.ascontiguousarray(array.reshape(-1, 3).T, dtype=np.float32))
 
 
-def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], max_depth: int) -> Array:
-    """Sum (n, 3) of SAMPLES_PER_PASS samples of irradiance per texel.
+def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampling) -> Array:
+    """Sum (n, 3) of a pass's samples of irradiance per texel.
 
     Every texel sees the same two stratified point sets, each shifted by an offset of its own (Cranley & Patterson
     1976).
     """
-    n, samples = points.count, SAMPLES_PER_PASS
+    n, samples = points.count, how.per_pass
     rng = np.random.default_rng(seed)
     shifts = rng.random((4, n), dtype=np.float32)
     thread = dr.arange(mi.UInt32, n * samples)
@@ -108,7 +133,7 @@ def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], max_depth: 
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(int(rng.integers(1 << 32)), n * samples)
-    e = paths.irradiance(scene, sampler, at, u_bsdf, u_emitter, max_depth)
+    e = paths.irradiance(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
     e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
     dr.eval(e)
     return np.stack([np.array(dr.block_sum(channel, samples)) for channel in (e.x, e.y, e.z)], axis=-1)
@@ -123,7 +148,7 @@ def _shifted(points: Array, shifts: Array, k: Any, texel: Any) -> Any:
     return mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1]))
 
 
-def finished(raw: Array, labels: NDArray[np.integer]) -> tuple[Array, dict[str, float]]:
+def finished(raw: Array, texels: Texels, labels: NDArray[np.integer]) -> tuple[Array, dict[str, float]]:
     """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and what to note: noise and samples."""
     count = raw[..., 3]
     known = count[0] > 0
@@ -132,6 +157,6 @@ def finished(raw: Array, labels: NDArray[np.integer]) -> tuple[Array, dict[str, 
     halves = raw[..., :3] / np.maximum(count, 1)[..., None]
     noise = relative_noise(halves[:, known])
     filled = fill(halves.mean(axis=0), known, labels, smooth=SMOOTH)
-    clean = fill(denoise(filled), known, labels)
+    clean = fill(blend_seams(denoise(filled), known, texels, labels), known, labels)
     meta = {"noise": noise, "samples": float(count.sum(axis=0)[known].mean())}
     return np.minimum(clean, HALF_MAX).astype(np.float16), meta

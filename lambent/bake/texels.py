@@ -26,6 +26,7 @@ class Texels:
 
     index (K,) int64 is row * width + column; face (K, POINTS) int64 counts through the merged geometry; positions,
     normals (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Points repeat where there are fewer.
+    spacing (K,) is the size of a texel in metres.
     """
 
     width: int
@@ -35,6 +36,7 @@ class Texels:
     positions: Array
     normals: Array
     flat: Array
+    spacing: Array
 
 
 def texels_of(geometry: dict[str, Array], width: int, height: int) -> Texels:
@@ -55,7 +57,23 @@ def texels_of(geometry: dict[str, Array], width: int, height: int) -> Texels:
     missing = face < 0
     face = np.where(missing, face[rows, found][:, None], face)
     weights = np.where(missing[..., None], weights[rows, found][:, None], weights)
-    return Texels(width, height, index, face, *_surface(geometry, face, weights))
+    return Texels(
+        width,
+        height,
+        index,
+        face,
+        *_surface(geometry, face, weights),
+        _spacing(geometry, corners * (width, height), face),
+    )
+
+
+def _spacing(geometry: dict[str, Array], corners: Array, face: Indices) -> Array:
+    """Metres per texel (K,): root of a triangle's area in the scene over that in the map, 0 where that has none."""
+    p = geometry["positions"][geometry["faces"]].astype(float)
+    world = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    texels = np.abs(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    ratio = np.divide(world, texels, out=np.zeros(len(world)), where=texels > 0)
+    return np.asarray(np.sqrt(ratio[face[:, 0]]))
 
 
 def _pull_inwards(best: _Nearest, corners: Array) -> None:
