@@ -240,7 +240,7 @@ class _Bake:
             )
         writer.finish()
         self.progress(0, 1, "denoising")
-        return finished(self.store.read(name), labels)
+        return finished(self.store.read(name), texels, labels)
 
     def _lit_sides(self, texels: Any, sign: float, builder: Any) -> tuple[Any, Any]:
         """The scene, and which points of it are lit on the side of this sign."""

@@ -112,19 +112,23 @@ class Points:
     flat: Any
 
 
-def irradiance(scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int) -> Any:
+def irradiance(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
+) -> Any:
     """One sample of irradiance (mi.Color3f) at each point, W/m^2, all bounces.
 
     Parameters
     ----------
     u_bsdf, u_emitter : mi.Point2f
         In [0, 1)^2: they choose a cosine distributed direction and a point on an emitter. Stratify them.
+    max_depth, cache
+        As `radiance` takes them.
     """
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = si.spawn_ray(si.to_world(local))
-    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth)
+    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth, cache)
     ds, value = scene.sample_emitter_direction(si, u_emitter, True)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))

@@ -11,8 +11,9 @@ from lambent.core.errors import UserError, did_you_mean
 class Quality:
     """Sizes in texels per side, samples per texel, bounces.
 
-    Light map tiles get samples until their relative noise (root mean square, before denoising) is below
-    `light_map_noise`, within the two bounds.
+    Light map tiles get path traced samples until their relative noise (root mean square, before denoising) is below
+    `light_map_noise`, within the two bounds. Where `gather_samples` is not 0, that map is only what light meets at its
+    first bounce: a second, final map gathers it with so many samples per texel, at a fraction of the noise.
     """
 
     name: str
@@ -23,13 +24,14 @@ class Quality:
     environment_texels: int
     probe_texels: int
     probe_samples: int
+    gather_samples: int = 0
 
 
 QUALITIES = {
     quality.name: quality
     for quality in (
-        Quality("preview", 448, (64, 128), 0.30, 8, 256, 128, 16),
-        Quality("normal", 1024, (128, 1024), 0.04, 12, 512, 256, 64),
+        Quality("preview", 448, (64, 64), 0.30, 8, 256, 128, 16, gather_samples=128),
+        Quality("normal", 1024, (128, 256), 0.04, 12, 512, 256, 64, gather_samples=512),
         Quality("final", 2048, (256, 8192), 0.015, 24, 1024, 256, 512),
     )
 }
