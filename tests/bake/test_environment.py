@@ -28,7 +28,7 @@ def irradiance(cube: np.ndarray, normal: np.ndarray) -> np.ndarray:
 def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path) -> None:
     sky = SunSky(tuple(SUN))
     store = bake(replace(plane(), environment=sky), tmp_path / "s", quality=replace(TINY, light_map_samples=(128, 128)))
-    raw = store.read("light_map/raw")
+    raw = store.read("light_map/traced")
     traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum()
     assert irradiance(environment_cube(sky, 128), np.array([0, 1.0, 0])) == pytest.approx(traced, rel=0.02)
 

@@ -16,7 +16,7 @@ from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, constant_picture, furnace, plane, room_with_step
 
 
-def known(store: Store, side: str = "raw") -> np.ndarray:
+def known(store: Store, side: str = "traced") -> np.ndarray:
     """Irradiance (K, 3) of the sampled texels, before filling and denoising."""
     raw = store.read(f"light_map/{side}")
     count = raw[..., 3].sum(axis=0)
@@ -58,7 +58,7 @@ def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) 
     paper = replace(plane(), materials={"black": Material(kt_d=0.4)}, lights=(sun,))
     store = bake(paper, tmp_path / "s", quality=TINY)
     assert not known(store).any()
-    assert np.allclose(known(store, "raw_back"), 1.0, rtol=1e-5)
+    assert np.allclose(known(store, "traced_back"), 1.0, rtol=1e-5)
 
 
 def test_opaque_objects_have_no_far_side(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_no_light_is_a_black_map(tmp_path: Path) -> None:
 
 def test_texels_within_a_solid_are_not_sampled_and_do_not_darken_their_neighbours(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=replace(TINY, light_map_texels=96))
-    raw = store.read("light_map/raw")
+    raw = store.read("light_map/traced")
     sampled = raw[..., 3].sum(axis=0) > 0
     black = raw[..., :3].sum(axis=(0, 3))[sampled] == 0
     assert black.mean() < 0.035, "only the underside of the block, outside the room"

@@ -63,7 +63,7 @@ def done(path: Path) -> int:
     """Tiles of the light map on disk."""
     if not (path / "manifest.json").exists():
         return 0
-    raw = [a for a in Store.open(path).artefacts() if a.name == "light_map/raw"]
+    raw = [a for a in Store.open(path).artefacts() if a.name == "light_map/traced"]
     return len(raw[0].done) if raw else 0
 
 
@@ -94,7 +94,7 @@ def test_anew_on_request_is_the_same(baked: tuple[Scene, Path]) -> None:
     before = arrays(Store.open(path))
     calls: list[str] = []
     store = bake(scene, path, quality=TINY, resume=False, progress=lambda done, total, what: calls.append(what))
-    assert "light map" in calls and arrays(store) == before
+    assert "light map, traced" in calls and arrays(store) == before
     calls.clear()
     bake(scene, path, quality=TINY, progress=lambda done, total, what: calls.append(what))
     assert not calls, "nothing left to do"
@@ -104,7 +104,7 @@ def test_other_seed_other_noise(baked: tuple[Scene, Path], tmp_path: Path) -> No
     scene, path = baked
     other = bake(scene, tmp_path / "s", quality=TINY, only=["light_map"], seed=1)
     assert "probe/ball/radiance" not in other and "geometry/uv2" in other
-    assert not np.array_equal(other.read("light_map/raw"), Store.open(path).read("light_map/raw"))
+    assert not np.array_equal(other.read("light_map/traced"), Store.open(path).read("light_map/traced"))
 
 
 def test_a_changed_file_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
