@@ -23,7 +23,7 @@ from lambent.core.colour import luminance
 from lambent.core.sequences import hammersley, r2
 
 Array = NDArray[np.floating]
-TILE = 128  # texels per side of a chunk
+TILE = 256  # texels per side of a chunk
 SMOOTH = 8  # averaging of what is grown into gutters before denoising: some 4 texels wide
 HALF_MAX = 65504.0
 

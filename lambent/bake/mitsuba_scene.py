@@ -139,27 +139,22 @@ def light_dict(light: Light) -> dict[str, Any]:
 def environment_dict(environment: Environment) -> dict[str, Any]:
     """Mitsuba's dictionary of an environment.
 
-    Mitsuba's sky has z up: it is turned by -90 degrees about x, and the sun's direction with it. Mitsuba's picture
-    environment looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
+    Mitsuba's picture environment looks along -z at its left edge, ours in the middle: it is turned by 180 degrees
+    about y.
     """
     import mitsuba as mi
 
-    turn = mi.ScalarTransform4f()
     if isinstance(environment, SunSky):
-        return {
-            "type": "sunsky",
-            "to_world": turn.rotate([1, 0, 0], -90),
-            "sun_direction": list(environment.sun_direction),
-            "turbidity": environment.turbidity,
-            "albedo": environment.albedo,
-            "sun_scale": environment.sun_scale,
-            "sky_scale": environment.sky_scale,
-        }
-    assert isinstance(environment, ImageEnvironment)
-    picture = read_image(environment.file)[..., :3].astype(np.float32)
+        from lambent.bake.sky import sky_picture
+
+        picture, scale, rotation_deg = sky_picture(environment), 1.0, 0.0
+    else:
+        assert isinstance(environment, ImageEnvironment)
+        picture = read_image(environment.file)[..., :3].astype(np.float32)
+        scale, rotation_deg = environment.scale, environment.rotation_deg
     return {
         "type": "envmap",
         "bitmap": mi.Bitmap(np.ascontiguousarray(picture)),
-        "scale": environment.scale,
-        "to_world": turn.rotate([0, 1, 0], 180 + environment.rotation_deg),
+        "scale": scale,
+        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180 + rotation_deg),
     }

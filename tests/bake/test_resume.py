@@ -20,7 +20,7 @@ from lambent.store.contract import scene_record
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
 
-TILED = replace(TINY, light_map_texels=300, light_map_samples=(64, 64))  # 3 x 3 tiles
+TILED = replace(TINY, light_map_texels=300, light_map_samples=(64, 64))  # 2 x 2 tiles
 BAKE = """
 import sys
 from dataclasses import replace
