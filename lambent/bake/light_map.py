@@ -51,13 +51,14 @@ class Sampling:
     samples: tuple[int, int]
     noise: float
     max_depth: int
-    per_pass: int = 32
+    per_pass: int
     cache: paths.Cache | None = None
 
 
 def path_traced(quality: Quality) -> Sampling:
     """All bounces, for the whole scene."""
-    return Sampling(quality.light_map_samples, quality.light_map_noise, quality.max_depth)
+    per_pass = min(32, max(1, quality.light_map_samples[0] // 2))
+    return Sampling(quality.light_map_samples, quality.light_map_noise, quality.max_depth, per_pass)
 
 
 def gathered(quality: Quality, cache: paths.Cache) -> Sampling:

@@ -30,7 +30,7 @@ class Quality:
 QUALITIES = {
     quality.name: quality
     for quality in (
-        Quality("preview", 448, (64, 64), 0.30, 8, 256, 128, 16, gather_samples=128),
+        Quality("preview", 448, (32, 32), 0.30, 8, 256, 128, 16, gather_samples=128),
         Quality("normal", 1024, (128, 256), 0.04, 12, 512, 256, 64, gather_samples=512),
         Quality("final", 2048, (256, 8192), 0.015, 24, 1024, 256, 512),
     )

@@ -41,9 +41,13 @@ STILLS = 8
 
 @dataclass(frozen=True)
 class Effort:
-    """Sizes of one kind of demo: pictures in pixels, film in seconds, samples per pixel of the compared view."""
+    """Sizes of one kind of demo: pictures in pixels, film in seconds, samples per pixel of the compared view.
+
+    `tuples` is how many of a table's tuples are fitted; all where None.
+    """
 
     quality: Quality
+    tuples: int | None
     still: tuple[int, int]
     film: tuple[int, int]
     film_seconds: float
@@ -53,10 +57,9 @@ class Effort:
     qmc_spp: int
 
 
-FULL = Effort(quality_named("preview"), (1680, 1050), (960, 600), 8.0, 24, (840, 525), 256, 512)
-QUICK = Effort(
-    Quality("draft", 256, (32, 64), 0.25, 6, 128, 64, 8), (1680, 1050), (640, 400), 4.0, 12, (420, 262), 64, 128
-)
+DRAFT = Quality("draft", 192, (16, 16), 0.5, 6, 128, 64, 8, gather_samples=64)
+FULL = Effort(quality_named("preview"), None, (1680, 1050), (960, 600), 6.0, 24, (840, 525), 96, 512)
+QUICK = Effort(DRAFT, 5_000, (1680, 1050), (640, 400), 4.0, 10, (420, 262), 32, 128)
 
 
 class Flow:
@@ -101,7 +104,7 @@ class Flow:
         for name, path in tables.items():
             with self._timed("fit"):
                 table = measured.load(path)
-                result = fit(table, source=path, progress=self.progress)
+                result = fit(table.samples(self.effort.tuples), source=path, progress=self.progress)
                 paths[name] = self.out / "materials" / f"{name}.json"
                 result.material.model_copy(update={"name": name}).save(paths[name])
             with self._timed("plot"):
