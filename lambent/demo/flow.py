@@ -3,7 +3,7 @@
 Each step writes what it made under one folder and hands the next only that, as the commands do:
 
     measured/NAME.txt      gonio tables of four specimens
-    materials/NAME.json    the fitted materials, each with its plot NAME.png
+    materials/NAME.json    the fitted materials, each with its plots NAME_*.png
     store/                 the baked room
     walk_1.png ... _8.png  stills of the walk, walk.mp4 the film
     compare/               one view in real time, converged and path traced, with their differences
@@ -96,22 +96,18 @@ class Flow:
     def fit(self, tables: Mapping[str, Path]) -> dict[str, Path]:
         """Material documents fitted to the table files, with a plot beside each."""
         from lambent.materials import measured
-        from lambent.materials.bsdf import MaterialBSDF
         from lambent.materials.fitting.fit import fit
-        from lambent.materials.plots import plot_plane_of_incidence
+        from lambent.materials.fitting.plot import save_plots
 
         paths = {}
         for name, path in tables.items():
             with self._timed("fit"):
-                table = measured.load(path)
-                result = fit(table.samples(self.effort.tuples), source=path, progress=self.progress)
+                samples = measured.load(path).samples(self.effort.tuples)
+                result = fit(samples, source=path, progress=self.progress)
                 paths[name] = self.out / "materials" / f"{name}.json"
                 result.material.model_copy(update={"name": name}).save(paths[name])
             with self._timed("plot"):
-                evals = {"measured": table.eval, "fit": MaterialBSDF(result.material).eval}
-                plot_plane_of_incidence(
-                    paths[name].with_suffix(".png"), evals, title=name, transmits=table.info.transmits
-                )
+                save_plots(samples, result.material, paths[name].parent, name)
             self.report["fits"][name] = {
                 "seconds": result.seconds,
                 "errors": result.errors,

@@ -1,0 +1,49 @@
+"""Makes the pictures of the README from what the demo wrote.
+
+python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from lambent.core.colour import filmic, srgb_encode
+from lambent.core.images import read_encoded, read_image, to_bytes
+
+PICTURES = Path(__file__).parent / "pictures"
+LIMIT_BYTES = 300_000
+EXPOSURE_EV = 4.7  # of the built-in room
+
+
+def main(demo: Path) -> None:
+    PICTURES.mkdir(exist_ok=True)
+    for name, number in (("room", 1), ("sphere", 5), ("screen", 8)):
+        save(f"{name}.jpg", shown(demo / f"walk_{number}.png"), width=1120)
+    views = [radiance(demo / "compare" / f"{name}.exr") for name in ("moving", "path")]
+    save("compare.jpg", np.concatenate([*views, shown(demo / "compare" / "moving_total.png")], axis=1), width=1680)
+    save("fit.jpg", shown(demo / "materials" / "brushed_aluminium_polar.png"), width=1400)
+
+
+def shown(path: Path) -> np.ndarray:
+    return to_bytes(read_encoded(path))
+
+
+def radiance(path: Path) -> np.ndarray:
+    return to_bytes(srgb_encode(filmic(read_image(path), EXPOSURE_EV)))
+
+
+def save(name: str, picture: np.ndarray, width: int) -> None:
+    image = Image.fromarray(picture)
+    image = image.resize((width, round(image.height * width / image.width)), Image.Resampling.LANCZOS)
+    path = PICTURES / name
+    image.save(path, quality=88, optimize=True)
+    assert path.stat().st_size < LIMIT_BYTES, f"{path}: {path.stat().st_size} bytes"
+    print(path, path.stat().st_size)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))
