@@ -1,0 +1,79 @@
+"""The whole flow, from specimen to film, at a size for tests; and the same again after an interruption."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+
+from lambent.bake.quality import Quality
+from lambent.core.images import read_encoded
+from lambent.core.progress import Cancelled
+from lambent.demo.flow import SPECIMEN_OF, STILLS, Effort, Flow
+from lambent.materials.document import load_material
+from lambent.store.store import Store
+
+TINY = Effort(
+    quality=Quality("tiny", 64, (4, 4), 1.0, 4, 32, 16, 4, gather_samples=8),
+    tuples=2000,
+    still=(160, 100),
+    film=(96, 60),
+    film_seconds=0.5,
+    film_fps=12,
+    compared=(96, 60),
+    path_spp=32,
+    qmc_spp=64,
+)
+
+
+class Interrupt:
+    """Progress that stops the work once, in the middle of a step."""
+
+    def __init__(self, where: str) -> None:
+        self.where, self.done = where, False
+
+    def __call__(self, done: float, total: float, what: str) -> None:
+        if not self.done and self.where in what and done > 0:
+            self.done = True
+            raise Cancelled
+
+
+@pytest.mark.slow
+def test_the_flow_ends_with_everything_it_names(tmp_path: Path) -> None:
+    interrupt = Interrupt("light map")
+    with pytest.raises(Cancelled):
+        Flow(tmp_path, TINY, interrupt).prepare()
+    assert not (tmp_path / "demo.json").exists()
+    flow = Flow(tmp_path, TINY, interrupt)
+    scene = flow.prepare()
+    flow.walk()
+    flow.compare(scene)
+    flow.finish()
+    report = json.loads((tmp_path / "demo.json").read_text())
+    _check_materials(tmp_path, report)
+    assert not [a.name for a in Store.open(flow.store_path).artefacts() if not a.complete]
+    for k in range(STILLS):
+        picture = read_encoded(tmp_path / f"walk_{k + 1}.png")
+        assert picture.shape == (100, 160, 3)
+        assert 0.1 < picture.mean() < 0.95 and picture.std() > 0.05
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "walk.mp4"))
+    assert frames == 6
+    # A coarse bake and few paths: what would fail here is a mirrored, shifted, black or wrongly lit picture.
+    assert report["compare"]["sampling"]["psnr_db"] > 25
+    assert report["compare"]["total"]["psnr_db"] > 15
+
+
+def _check_materials(folder: Path, report: dict[str, Any]) -> None:
+    for name, specimen in SPECIMEN_OF.items():
+        material = load_material(folder / "materials" / f"{name}.json")
+        assert material.name == name and material.provenance is not None
+        assert specimen in (folder / "measured" / f"{name}.txt").read_text()[:500]
+        fit = report["fits"][name]
+        assert fit["errors"]["cuberoot"] < 0.5 * fit["lambertian_errors"]["cuberoot"]
+        assert list((folder / "materials").glob(f"{name}_*.png"))
+    aluminium = load_material(folder / "materials" / "brushed_aluminium.json").lobes[0]
+    assert np.array([aluminium.mx, aluminium.my]) == pytest.approx([0.05, 0.25], rel=0.15)
