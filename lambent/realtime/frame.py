@@ -15,9 +15,11 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
+from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
-from lambent.core.sequences import radical_inverse
+from lambent.core.sequences import hammersley, radical_inverse
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.camera import clip_from_world, image_plane
@@ -27,6 +29,7 @@ from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.shade import Draw, ShadePass
 from lambent.realtime.passes.sky import SkyPass
+from lambent.realtime.passes.smooth import SmoothPass
 from lambent.realtime.passes.tonemap import VIEW_TRANSFORMS, TonemapPass
 from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.resources import Layouts, SceneResources
@@ -37,7 +40,7 @@ from lambent.store.store import Store
 Floats = NDArray[np.float32]
 SHOW = {"full": (1, 1, 1), "diffuse": (1, 0, 0), "specular": (0, 1, 0)}  # weights of diffuse, specular, sky
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
-DISPLAY_FORMAT = "rgba8unorm"
+SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,9 @@ class FrameState:
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
     antialias : bool
-        Four coverage samples per pixel, or jitter when accumulating.
+        Edges of the display image are blended, or, when accumulating, frames are jittered.
+    jitter_px : tuple of float
+        Where light is looked up in each pixel: right of and above its centre, within (-.5, .5).
     """
 
     camera: CameraRecord
@@ -85,6 +90,7 @@ class FrameState:
     show: str = "full"
     accumulate: int | None = None
     antialias: bool = True
+    jitter_px: tuple[float, float] = (0.0, 0.0)
 
     def check(self) -> None:
         """Raise `UserError` for a value that no frame can have."""
@@ -125,6 +131,7 @@ class Renderer:
         self._depth, self._shade = DepthPass(device, self._layouts), ShadePass(device, self._layouts)
         self._sky, self._accumulate = SkyPass(device, self._layouts), AccumulatePass(device)
         self._tonemap = TonemapPass(device, self._layouts)
+        self._smooth = SmoothPass(device, self._layouts, self.resources.sampler)
         self._targets, self._timer = Targets(device), PassTimer(device)
         self._frame_buffer = device.create_buffer(
             size=FRAME_DTYPE.itemsize, usage=wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST
@@ -133,18 +140,18 @@ class Renderer:
         self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
         self._counts: dict[str, Any] = {}
 
-    def draw(self, state: FrameState, target_view: Any = None, target_format: str = DISPLAY_FORMAT) -> Any:
+    def draw(self, state: FrameState, target_view: Any = None) -> Any:
         """Draw a frame; returns the texture of linear radiance that it left.
 
-        With `target_view` (a window's surface or a texture of the state's size and of `target_format`) the frame is
-        also shown there. Returns before the GPU is done: see `finish`.
+        With `target_view` (of a texture of the state's size and of `DISPLAY_FORMAT`) the frame is also shown there,
+        encoded and smoothed. Returns before the GPU is done: see `finish`.
         """
         state.check()
         started = time.perf_counter()
         draws = self._draws(state)
-        self.device.queue.write_buffer(self._frame_buffer, 0, self._frame_data(state, target_format).tobytes())
-        single = state.accumulate is not None or not state.antialias
-        target = self._targets.fit(state.width, state.height, single)
+        self.device.queue.write_buffer(self._frame_buffer, 0, self._frame_data(state).tobytes())
+        passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
+        target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
         encoder = self.device.create_command_encoder()
         calls = self._encode_light(encoder, draws, target)
         radiance = target.radiance
@@ -152,8 +159,7 @@ class Renderer:
             stamps = self._timer.writes("accumulate")
             radiance = self._accumulate.encode(encoder, radiance, state.accumulate, stamps)
         if target_view is not None:
-            stamps = self._timer.writes("tonemap")
-            self._tonemap.encode(encoder, self._frame_group, radiance, target_view, target_format, stamps)
+            self._encode_display(encoder, state, radiance, target_view)
         self._timer.resolve(encoder)
         self.device.queue.submit([encoder.finish()])
         self._counts = {
@@ -177,9 +183,24 @@ class Renderer:
 
     def display_image(self, state: FrameState) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
-        view = self._targets.display(state.width, state.height, DISPLAY_FORMAT)
-        self.draw(state, view.create_view(), DISPLAY_FORMAT)
-        return self._read_pixels(view, state, np.uint8)
+        picture = self._targets.picture("display", state.width, state.height)
+        self.draw(state, picture.create_view())
+        return self._read_pixels(picture, state, np.uint8)
+
+    def still(self, state: FrameState, supersamples: int = SUPERSAMPLES) -> NDArray[np.uint8]:
+        """`display_image` from `supersamples` frames that look at other places of each pixel.
+
+        The mean is that of the light a display would emit: after the view transform, so that edges against a lamp are
+        smooth, and before the encoding, so that half a pixel of white is half as bright.
+        """
+        if supersamples < 1:
+            raise UserError("a still needs at least one frame", field="supersamples", got=supersamples)
+        emitted = srgb_decode(np.arange(256, dtype=np.float32) / 255)
+        total = np.zeros((state.height, state.width, 3), np.float32)
+        places = hammersley(supersamples)
+        for x, y in (places - places.mean(axis=0)).tolist():
+            total += emitted[self.display_image(replace(state, accumulate=None, antialias=False, jitter_px=(x, y)))]
+        return to_bytes(srgb_encode(total / supersamples))
 
     def converged(self, state: FrameState, spp: int, progress: Progress = silent) -> Floats:
         """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe (`qmc`)."""
@@ -219,9 +240,9 @@ class Renderer:
             draws.append(Draw(item, how, lobes, n, lookup, group))
         return draws
 
-    def _frame_data(self, state: FrameState, target_format: str) -> NDArray[np.void]:
+    def _frame_data(self, state: FrameState) -> NDArray[np.void]:
         camera, width, height = state.camera, state.width, state.height
-        jitter = (0.0, 0.0)
+        jitter = state.jitter_px
         if state.accumulate is not None and state.antialias:
             index = np.array([state.accumulate + 1])
             jitter = (float(radical_inverse(index, 2)[0]) - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
@@ -235,7 +256,6 @@ class Renderer:
         data["show"][:3] = SHOW[state.show]
         data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
         data["view_transform"] = VIEW_TRANSFORMS[state.view_transform]
-        data["encode_srgb"] = not target_format.endswith("-srgb")
         data["exposure"] = 2.0**state.exposure_ev
         return data
 
@@ -244,18 +264,26 @@ class Renderer:
         with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
         first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
         first.set_bind_group(0, self._frame_group)
-        calls = self._depth.draw(first, self.resources, target.pixel_samples)
+        calls = self._depth.draw(first, self.resources)
         first.end()
         shade = encoder.begin_render_pass(
-            color_attachments=[target.attachment()],
+            color_attachments=[{"view": target.radiance.create_view(), "load_op": "clear", "store_op": "store"}],
             depth_stencil_attachment={**depth, "depth_load_op": "load"},
             **self._timer.writes("shade"),
         )
         shade.set_bind_group(0, self._frame_group)
-        calls += self._shade.draw(shade, self.resources, draws, target.format, target.pixel_samples)
-        calls += self._sky.draw(shade, self.resources, target.format, target.pixel_samples)
+        calls += self._shade.draw(shade, self.resources, draws, target.radiance.format)
+        calls += self._sky.draw(shade, self.resources, target.radiance.format)
         shade.end()
         return calls
+
+    def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
+        smooth = state.antialias and state.accumulate is None
+        edged = self._targets.picture("edged", state.width, state.height) if smooth else None
+        shown = target_view if edged is None else edged.create_view()
+        self._tonemap.encode(encoder, self._frame_group, radiance, shown, self._timer.writes("tonemap"))
+        if edged is not None:
+            self._smooth.encode(encoder, edged, target_view, self._timer.writes("smooth"))
 
     def _read(self, radiance: Any, state: FrameState) -> Floats:
         dtype = np.float16 if radiance.format == "rgba16float" else np.float32

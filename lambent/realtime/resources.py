@@ -50,6 +50,7 @@ class Layouts:
         self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE)
         self.light = self._make(_FRAGMENT, _FLAT, _FLAT)
         self.cube = self._make(_FRAGMENT, _CUBE)
+        self.shown = self._make(_FRAGMENT, _FLAT, _SAMPLER)
 
     def _make(self, visibility: int, *kinds: dict[str, Any]) -> Any:
         entries = [{"binding": i, "visibility": visibility, **kind} for i, kind in enumerate(kinds)]

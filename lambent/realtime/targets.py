@@ -9,6 +9,7 @@ import numpy as np
 import wgpu
 
 from lambent.realtime.passes.depth import DEPTH_FORMAT
+from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
 
 _READ = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
 _DRAW = wgpu.TextureUsage.RENDER_ATTACHMENT
@@ -16,20 +17,10 @@ _DRAW = wgpu.TextureUsage.RENDER_ATTACHMENT
 
 @dataclass(frozen=True)
 class Target:
-    """Colour and depth of one size. `radiance` is what later passes read."""
+    """Depth and radiance of one size."""
 
-    format: str
-    pixel_samples: int
     depth: Any
-    colour: Any
     radiance: Any
-
-    def attachment(self) -> dict[str, Any]:
-        """The colour attachment: cleared to black, and resolved where it has several samples."""
-        colour = {"view": self.colour.create_view(), "load_op": "clear", "store_op": "store"}
-        if self.pixel_samples > 1:
-            colour |= {"resolve_target": self.radiance.create_view(), "store_op": "discard"}
-        return colour
 
 
 class Targets:
@@ -38,33 +29,23 @@ class Targets:
     def __init__(self, device: Any) -> None:
         self._device = device
         self._size: tuple[int, int] = (0, 0)
-        self._made: dict[Any, Any] = {}
+        self._made: dict[str, Any] = {}
 
-    def fit(self, width: int, height: int, single: bool) -> Target:
-        """Four samples of half floats, or one of full floats (`single`: progressive frames must not round)."""
-        self._forget_other_sizes(width, height)
-        if single not in self._made:
-            format, count = ("rgba32float", 1) if single else ("rgba16float", 4)
-            depth = self._texture(DEPTH_FORMAT, count, _DRAW)
-            colour = self._texture(format, count, _DRAW | _READ if single else _DRAW)
-            radiance = colour if single else self._texture(format, 1, _DRAW | _READ)
-            self._made[single] = Target(format, count, depth, colour, radiance)
-        target: Target = self._made[single]
-        return target
+    def fit(self, width: int, height: int, format: str) -> Target:
+        """What light is drawn into; `format` is that of the radiance."""
+        depth = self._texture("depth", width, height, DEPTH_FORMAT, _DRAW)
+        return Target(depth, self._texture(format, width, height, format))
 
-    def display(self, width: int, height: int, format: str) -> Any:
-        """A texture that stands in for a window."""
-        self._forget_other_sizes(width, height)
-        if format not in self._made:
-            self._made[format] = self._texture(format, 1, _DRAW | _READ)
-        return self._made[format]
+    def picture(self, name: str, width: int, height: int) -> Any:
+        """An encoded picture that stays here."""
+        return self._texture(name, width, height, DISPLAY_FORMAT)
 
-    def _forget_other_sizes(self, width: int, height: int) -> None:
+    def _texture(self, name: str, width: int, height: int, format: str, usage: int = _DRAW | _READ) -> Any:
         if self._size != (width, height):
             self._size, self._made = (width, height), {}
-
-    def _texture(self, format: str, sample_count: int, usage: int) -> Any:
-        return self._device.create_texture(size=(*self._size, 1), format=format, sample_count=sample_count, usage=usage)
+        if name not in self._made:
+            self._made[name] = self._device.create_texture(size=(width, height, 1), format=format, usage=usage)
+        return self._made[name]
 
 
 class PassTimer:

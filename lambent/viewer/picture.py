@@ -13,9 +13,9 @@ import wgpu
 from lambent.core.colour import srgb_decode
 from lambent.core.images import write_image
 from lambent.realtime.device import adapter_info
-from lambent.realtime.frame import DISPLAY_FORMAT, QMC_N, SHOW, FrameState, Renderer
+from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.passes.tonemap import VIEW_TRANSFORMS
+from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
 from lambent.viewer.input import Rect
@@ -59,7 +59,7 @@ class Picture:
         frame = self._planned(wanted, plan)
         self._fit(frame.width, frame.height)
         started = time.perf_counter()
-        self._renderer.draw(frame, self.view, DISPLAY_FORMAT)
+        self._renderer.draw(frame, self.view)
         # Waiting keeps the queue short, so that a frame shows the latest event, and tells what a frame costs.
         self._renderer.finish()
         seconds = time.perf_counter() - started

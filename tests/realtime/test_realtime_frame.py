@@ -9,7 +9,7 @@ import pytest
 from conftest import cube_of, pixel_rays, smooth_light, wall_scene
 
 from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
-from lambent.core.colour import filmic, srgb_encode
+from lambent.core.colour import filmic, srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
@@ -137,7 +137,7 @@ def test_display_image_is_exposed_and_encoded(device, view_transform: str) -> No
     state = FrameState(away, 24, 16, exposure_ev=-0.7, view_transform=view_transform)
     linear = renderer.image(state)
     exposed = filmic(linear, -0.7) if view_transform == "filmic" else linear * 2**-0.7
-    np.testing.assert_allclose(renderer.display_image(state), srgb_encode(exposed) * 255, atol=0.51)
+    np.testing.assert_allclose(renderer.display_image(state), srgb_encode(exposed) * 255, atol=0.55)
 
 
 def test_neutral_keeps_colours_and_tames_highlights(device) -> None:
@@ -170,11 +170,42 @@ def test_jitter_antialiases(device) -> None:
     renderer = Renderer(device, scene)
     state = FrameState(FORWARD, 48, 36)
     smooth = renderer.converged(replace(state, n=1), 256)[..., 0]
-    hard = renderer.image(replace(state, antialias=False))[..., 0]
-    msaa = renderer.image(state)[..., 0]
+    hard = renderer.image(state)[..., 0]
     assert set(np.unique(hard.round(2))) == {0.0, 0.5}
-    assert np.abs(msaa - smooth).mean() < 0.5 * np.abs(hard - smooth).mean()
+    assert np.abs(hard - smooth).max() > 0.1
     assert np.mean((smooth > 0.01) & (smooth < 0.49)) > 0.02
+
+
+def lamp() -> BakedScene:
+    """A slanted square so bright that a mean of radiance would have no edge."""
+    mesh = patch((-0.4, -0.3, 0), (0.8, 0.2, 0), (-0.2, 0.6, 0))
+    scene = baked_scene({"lamp": mesh}, Material(name="m"), np.zeros((6, 2, 2, 3)))
+    glowing = scene.record.objects[0].model_copy(update={"emission": (500.0, 500.0, 500.0)})
+    return replace(scene, record=scene.record.model_copy(update={"objects": (glowing,)}))
+
+
+def test_display_image_blends_the_edges_of_lamps(device) -> None:
+    renderer, state = Renderer(device, lamp()), FrameState(FORWARD, 96, 72)
+    hard, smooth = renderer.display_image(replace(state, antialias=False)), renderer.display_image(state)
+    assert set(np.unique(hard)) == {0, 255}
+    truth = srgb_decode(renderer.still(state, 64) / np.float32(255))
+    between = (truth > 0.05) & (truth < 0.95)
+    assert np.abs(hard / 255 - truth)[between].mean() > 0.2
+    assert np.abs(smooth / 255 - truth)[between].mean() < 0.13
+    np.testing.assert_array_equal(renderer.image(state) > 0, hard > 0)  # radiance is not smoothed
+
+
+def test_a_still_is_the_mean_of_what_a_display_emits(device) -> None:
+    renderer, state = Renderer(device, lamp()), FrameState(FORWARD, 48, 36)
+    still = renderer.still(state)
+    np.testing.assert_array_equal(still, renderer.still(state))
+    emitted = srgb_decode(still / np.float32(255))
+    assert len(np.unique(still)) > 8
+    area = (0.8 * 0.6 + 0.2 * 0.2) / (2 * np.tan(np.radians(30)) * 2 / 36) ** 2  # in pixels
+    assert emitted[..., 0].sum() == pytest.approx(area, rel=0.01)
+    np.testing.assert_array_equal(renderer.still(state, 1), renderer.display_image(replace(state, antialias=False)))
+    with pytest.raises(UserError, match="supersamples"):
+        renderer.still(state, 0)
 
 
 def test_a_material_edit_shows_and_is_undone(device) -> None:
@@ -186,14 +217,16 @@ def test_a_material_edit_shows_and_is_undone(device) -> None:
     np.testing.assert_array_equal(renderer.image(state), before)
 
 
-def test_no_pixel_is_lost_at_silhouettes(device) -> None:
-    """Interpolated normals turn away from the viewer at edges; there must be light all the same."""
-    gloss = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=0.5, alpha=0.5),))
+def test_silhouettes_are_neither_lost_nor_brighter_than_the_light(device) -> None:
+    """Interpolated normals turn away from the viewer at edges, where a lobe with alpha > 0 has no bound."""
+    gloss = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=0.8, alpha=0.5),))
     renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, np.ones((6, 4, 4, 3), np.float32)))
     for name in ("rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum"):
         image = renderer.image(FrameState(CAMERA, 160, 120, integrator=name, n=7, antialias=False))
         assert np.isfinite(image).all()
         assert image.min() > 0.05, name
+        # the estimates as published overstate the albedo of rough lobes anywhere
+        assert image.max() < (1.3 if name.startswith("lobe") else 1.05), name
 
 
 def test_broken_normals_and_tangents_make_no_nan(device) -> None:
@@ -212,7 +245,7 @@ def test_statistics(device) -> None:
     assert statistics["draw_calls"] == 3
     assert statistics["triangles"] == 2
     if "timestamp-query" in device.features:
-        assert set(statistics["gpu_ms"]) == {"depth", "shade", "tonemap"}
+        assert set(statistics["gpu_ms"]) == {"depth", "shade", "tonemap", "smooth"}
         assert all(0 <= ms < 1e4 for ms in statistics["gpu_ms"].values())
 
 
@@ -233,19 +266,3 @@ def test_impossible_frames_are_refused(device, change: dict[str, object]) -> Non
     renderer = Renderer(device, square(gloss))
     with pytest.raises(UserError):
         renderer.image(replace(FrameState(FORWARD, 8, 8), **change))
-
-
-def test_antialiasing_draws_no_edges_inside_a_surface(device) -> None:
-    """A floor of many triangles at a grazing angle: its smooth light map shows no lattice."""
-    from lambent.scenes.geometry import patch as sheet
-
-    mesh = sheet((-20, 0, 0), (40, 0, 0), (0, 0, -60), cells=(12, 12))
-    ramp = np.linspace(0.2, 1.0, 64, dtype=np.float32)[None, :, None] * np.ones((64, 1, 3), np.float32)
-    scene = baked_scene({"floor": mesh}, PAPER, np.zeros((6, 2, 2, 3)))
-    uv2 = np.stack([scene.positions[:, 0] / 40 + 0.5, -scene.positions[:, 2] / 60], axis=-1)
-    scene = replace(scene, irradiance=np.pi * ramp, uv2=np.asarray(uv2, np.float32))
-    camera = CameraRecord(name="low", position=(0, 1.0, 0), target=(0.5, 0.6, -3))
-    state = FrameState(camera, 120, 80)
-    renderer = Renderer(device, scene)
-    smooth, plain = renderer.image(state), renderer.image(replace(state, antialias=False))
-    np.testing.assert_allclose(smooth[45:], plain[45:], atol=0.001)

@@ -26,26 +26,18 @@ class DepthPass:
     """Draws the depth (reversed: near/z) of all objects."""
 
     def __init__(self, device: Any, layouts: Layouts) -> None:
-        self._device = device
-        self._layout = device.create_pipeline_layout(bind_group_layouts=[layouts.frame])
-        self._module = device.create_shader_module(code=assemble("vertex.wgsl"))
-        self._pipelines: dict[int, Any] = {}
+        module = device.create_shader_module(code=assemble("vertex.wgsl"))
+        self._pipeline = device.create_render_pipeline(
+            layout=device.create_pipeline_layout(bind_group_layouts=[layouts.frame]),
+            vertex={"module": module, "entry_point": "vertex_main", "buffers": VERTEX_BUFFERS},
+            primitive=TRIANGLES,
+            depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": True, "depth_compare": "greater"},
+        )
 
-    def draw(self, target: Any, resources: SceneResources, pixel_samples: int) -> int:
+    def draw(self, target: Any, resources: SceneResources) -> int:
         """Encode into the render pass `target`, whose group 0 is set; returns the draw calls."""
-        target.set_pipeline(self._pipeline(pixel_samples))
+        target.set_pipeline(self._pipeline)
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
         target.draw_indexed(resources.scene.faces.size)
         return 1
-
-    def _pipeline(self, pixel_samples: int) -> Any:
-        if pixel_samples not in self._pipelines:
-            self._pipelines[pixel_samples] = self._device.create_render_pipeline(
-                layout=self._layout,
-                vertex={"module": self._module, "entry_point": "vertex_main", "buffers": VERTEX_BUFFERS},
-                primitive=TRIANGLES,
-                depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": True, "depth_compare": "greater"},
-                multisample={"count": pixel_samples},
-            )
-        return self._pipelines[pixel_samples]

@@ -34,20 +34,20 @@ class ShadePass:
         self._modules: dict[str, Any] = {}
         self._pipelines: dict[tuple[Any, ...], Any] = {}
 
-    def draw(self, target: Any, resources: SceneResources, draws: list[Draw], format: str, pixel_samples: int) -> int:
+    def draw(self, target: Any, resources: SceneResources, draws: list[Draw], format: str) -> int:
         """Encode into the render pass `target`, whose group 0 is set; returns the draw calls."""
         target.set_bind_group(3, resources.light_group)
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
         for draw in draws:
             record = draw.item.record
-            target.set_pipeline(self._pipeline(draw, format, pixel_samples))
+            target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
             target.set_bind_group(2, draw.item.group(draw.integrator.prefiltered))
             target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
         return len(draws)
 
-    def _pipeline(self, draw: Draw, format: str, pixel_samples: int) -> Any:
+    def _pipeline(self, draw: Draw, format: str) -> Any:
         # Constants, not uniforms: the compiler unrolls, a quarter faster.
         constants = {
             "SAMPLES": draw.n,
@@ -56,7 +56,7 @@ class ShadePass:
             "PLANES": draw.item.light.plane_count if draw.lookup == "planes" else 0,
             **draw.integrator.constants,
         }
-        key = (draw.integrator.shader, format, pixel_samples, *constants.values())
+        key = (draw.integrator.shader, format, *constants.values())
         if key not in self._pipelines:
             module = self._module(draw.integrator.shader)
             self._pipelines[key] = self._device.create_render_pipeline(
@@ -70,7 +70,6 @@ class ShadePass:
                 },
                 primitive=TRIANGLES,
                 depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": False, "depth_compare": "equal"},
-                multisample={"count": pixel_samples},
             )
         return self._pipelines[key]
 

@@ -9,6 +9,7 @@ import wgpu
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
 
+DISPLAY_FORMAT = "rgba8unorm"
 VIEW_TRANSFORMS = {"linear": 0, "neutral": 1, "filmic": 2}
 
 
@@ -21,28 +22,23 @@ class TonemapPass:
         self._group_layout = device.create_bind_group_layout(
             entries=[{"binding": 0, "visibility": wgpu.ShaderStage.FRAGMENT, "texture": texture}]
         )
-        self._layout = device.create_pipeline_layout(bind_group_layouts=[layouts.frame, self._group_layout])
-        self._module = device.create_shader_module(code=assemble("tonemap.wgsl"))
-        self._pipelines: dict[str, Any] = {}
+        module = device.create_shader_module(code=assemble("tonemap.wgsl"))
+        self._pipeline = device.create_render_pipeline(
+            layout=device.create_pipeline_layout(bind_group_layouts=[layouts.frame, self._group_layout]),
+            vertex={"module": module, "entry_point": "screen_main"},
+            fragment={"module": module, "entry_point": "tonemap_main", "targets": [{"format": DISPLAY_FORMAT}]},
+            primitive={"topology": "triangle-list"},
+        )
 
-    def encode(
-        self, encoder: Any, frame_group: Any, radiance: Any, target: Any, format: str, timestamps: dict[str, Any]
-    ) -> None:
+    def encode(self, encoder: Any, frame_group: Any, radiance: Any, target: Any, timestamps: dict[str, Any]) -> None:
         """Draw the texture `radiance` into the view `target`."""
-        if format not in self._pipelines:
-            self._pipelines[format] = self._device.create_render_pipeline(
-                layout=self._layout,
-                vertex={"module": self._module, "entry_point": "screen_main"},
-                fragment={"module": self._module, "entry_point": "tonemap_main", "targets": [{"format": format}]},
-                primitive={"topology": "triangle-list"},
-            )
         group = self._device.create_bind_group(
             layout=self._group_layout, entries=[{"binding": 0, "resource": radiance.create_view()}]
         )
         draw = encoder.begin_render_pass(
             color_attachments=[{"view": target, "load_op": "clear", "store_op": "store"}], **timestamps
         )
-        draw.set_pipeline(self._pipelines[format])
+        draw.set_pipeline(self._pipeline)
         draw.set_bind_group(0, frame_group)
         draw.set_bind_group(1, group)
         draw.draw(3)

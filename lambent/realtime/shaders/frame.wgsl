@@ -9,8 +9,8 @@ struct Frame {
     show: vec4f,     // weights of: diffuse, specular, sky, unused
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
-    encode_srgb: u32,
     exposure: f32,   // factor on radiance, 2^EV
+    unused: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -34,7 +34,5 @@ fn srgb(c: vec3f) -> vec3f {
     var shown = light;
     if (frame.view_transform == 1u) { shown = neutral(light); }
     if (frame.view_transform == 2u) { shown = filmic(light); }
-    shown = clamp(shown, vec3f(0.0), vec3f(1.0));
-    if (frame.encode_srgb == 1u) { shown = srgb(shown); }
-    return vec4f(shown, 1.0);
+    return vec4f(srgb(clamp(shown, vec3f(0.0), vec3f(1.0))), 1.0);
 }

@@ -4,8 +4,6 @@
 
 struct Varyings {
     @invariant @builtin(position) position: vec4f,
-    // Not at the centroid: Mesa's software Vulkan (22.3) divides by the depth of another place there, which drew
-    // the edges of all triangles. Extrapolation by half a pixel stays within the light map's gutters.
     @location(0) p_world: vec3f,
     @location(1) n_world: vec3f,
     @location(2) t_world: vec3f,
