@@ -57,7 +57,7 @@ def command(
         width, height = even_size(width, height)
     began = time.perf_counter()
     views = _views(record, camera, path, fps if film else None)
-    radiance, shown = pictures(opened, width, height, integrator, samples, exposure_ev, scene)
+    radiance, shown = pictures(opened, width, height, integrator, samples, exposure_ev, scene, film=film)
     with progress_bar() as progress:
         if film:
             _write_film(output, views, shown, (width, height, fps), progress)
@@ -85,8 +85,13 @@ def pictures(
     samples: int | None,
     exposure_ev: float,
     scene: str | None = None,
+    *,
+    film: bool = False,
 ) -> tuple[Picture, Picture]:
-    """Two functions of (camera, progress): radiance (height, width, 3) float32, and the shown uint8 picture."""
+    """Two functions of (camera, progress): radiance (height, width, 3) float32, and the shown uint8 picture.
+
+    Of a film the latter is as the window shows it in motion; a still is averaged from many frames.
+    """
     from lambent.core.colour import filmic, srgb_encode
     from lambent.core.images import to_bytes
 
@@ -109,10 +114,11 @@ def pictures(
         def radiance(camera: CameraRecord, progress: Progress) -> Any:
             if integrator == "qmc":
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
-            return renderer.image(state(camera))
+            return renderer.still_radiance(state(camera))
 
         if integrator != "qmc":
-            return radiance, lambda camera, progress: renderer.display_image(state(camera))
+            show_frame = renderer.display_image if film else renderer.still
+            return radiance, lambda camera, progress: show_frame(state(camera))
 
     return radiance, lambda camera, progress: to_bytes(srgb_encode(filmic(radiance(camera, progress), exposure_ev)))
 

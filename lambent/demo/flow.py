@@ -20,8 +20,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lambent.bake.quality import Quality, quality_named
 from lambent.core.files import write_text
 from lambent.core.plain import plain
@@ -143,9 +141,8 @@ class Flow:
 
     def walk(self) -> None:
         """Stills along the walk and the film of it, from the frame code of the window."""
-        from lambent.core.colour import srgb_decode
         from lambent.core.film import film_writer
-        from lambent.core.images import write_image
+        from lambent.core.images import write_shown
         from lambent.realtime.frame import FrameState
         from lambent.store.camera_paths import camera_at
 
@@ -153,18 +150,16 @@ class Flow:
         path = renderer.scene.record.paths[0]
         exposure_ev = renderer.scene.record.exposure_ev
 
-        def frame(share: float, size: tuple[int, int]) -> Any:
-            return renderer.display_image(
-                FrameState(camera_at(path, share * path.seconds), *size, exposure_ev=exposure_ev)
-            )
+        def state(share: float, size: tuple[int, int]) -> FrameState:
+            return FrameState(camera_at(path, share * path.seconds), *size, exposure_ev=exposure_ev)
 
-        frame(0.0, self.effort.still)  # the first frame also builds the pipelines
+        renderer.display_image(state(0.0, self.effort.still))  # the first frame also builds the pipelines
         with self._timed("stills"):
             for k in range(STILLS):
                 started = time.perf_counter()
-                picture = frame(k / (STILLS - 1), self.effort.still)
+                picture = renderer.still(state(k / (STILLS - 1), self.effort.still))
                 self.report.setdefault("still_ms", []).append((time.perf_counter() - started) * 1e3)
-                write_image(self.out / f"walk_{k + 1}.png", srgb_decode(picture / np.float32(255)))
+                write_shown(self.out / f"walk_{k + 1}.png", picture)
                 self.progress(k + 1, STILLS, "stills")
         frames = round(self.effort.film_seconds * self.effort.film_fps)
         with (
@@ -172,7 +167,7 @@ class Flow:
             film_writer(self.out / "walk.mp4", *self.effort.film, fps=self.effort.film_fps) as write,
         ):
             for k in range(frames):
-                write(frame(k / (frames - 1), self.effort.film))
+                write(renderer.display_image(state(k / (frames - 1), self.effort.film)))
                 self.progress(k + 1, frames, "film")
 
     def compare(self, scene: Scene) -> None:
@@ -189,7 +184,7 @@ class Flow:
         )
         with self._timed("frame at rest"):
             rest = renderer.converged(state, self.effort.qmc_spp, self.progress)
-        moving = renderer.image(state)
+        moving = renderer.still_radiance(state)
         with self._timed("path tracing"):
             truth, _ = render_reference(
                 scene, camera, *self.effort.compared, self.effort.path_spp, progress=self.progress

@@ -7,7 +7,7 @@ picture = renderer.display_image(FrameState(camera, 1680, 1050))
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -193,14 +193,13 @@ class Renderer:
         The mean is that of the light a display would emit: after the view transform, so that edges against a lamp are
         smooth, and before the encoding, so that half a pixel of white is half as bright.
         """
-        if supersamples < 1:
-            raise UserError("a still needs at least one frame", field="supersamples", got=supersamples)
         emitted = srgb_decode(np.arange(256, dtype=np.float32) / 255)
-        total = np.zeros((state.height, state.width, 3), np.float32)
-        places = hammersley(supersamples)
-        for x, y in (places - places.mean(axis=0)).tolist():
-            total += emitted[self.display_image(replace(state, accumulate=None, antialias=False, jitter_px=(x, y)))]
-        return to_bytes(srgb_encode(total / supersamples))
+        mean = _mean(emitted[self.display_image(part)] for part in _subframes(state, supersamples))
+        return to_bytes(srgb_encode(mean))
+
+    def still_radiance(self, state: FrameState, supersamples: int = SUPERSAMPLES) -> Floats:
+        """`image`, the mean over each pixel, from `supersamples` frames that look at other places of it."""
+        return _mean(self.image(part) for part in _subframes(state, supersamples))
 
     def converged(self, state: FrameState, spp: int, progress: Progress = silent) -> Floats:
         """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe (`qmc`)."""
@@ -294,3 +293,18 @@ class Renderer:
         size = (state.width, state.height, 1)
         data = self.device.queue.read_texture({"texture": texture}, {"bytes_per_row": row}, size)
         return np.frombuffer(data, dtype).reshape(state.height, state.width, 4)[..., :3]
+
+
+def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:
+    if count < 1:
+        raise UserError("a still needs at least one frame", field="supersamples", got=count)
+    places = hammersley(count)
+    for x, y in (places - places.mean(axis=0)).tolist():
+        yield replace(state, accumulate=None, antialias=False, jitter_px=(x, y))
+
+
+def _mean(pictures: Iterable[Floats]) -> Floats:
+    count, total = 0, np.float32(0)
+    for picture in pictures:
+        count, total = count + 1, total + picture
+    return np.asarray(total / np.float32(count))

@@ -204,6 +204,7 @@ def test_a_still_is_the_mean_of_what_a_display_emits(device) -> None:
     area = (0.8 * 0.6 + 0.2 * 0.2) / (2 * np.tan(np.radians(30)) * 2 / 36) ** 2  # in pixels
     assert emitted[..., 0].sum() == pytest.approx(area, rel=0.01)
     np.testing.assert_array_equal(renderer.still(state, 1), renderer.display_image(replace(state, antialias=False)))
+    assert renderer.still_radiance(state)[..., 0].sum() == pytest.approx(500 * area, rel=0.01)
     with pytest.raises(UserError, match="supersamples"):
         renderer.still(state, 0)
 
