@@ -26,7 +26,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
 @fragment fn shade_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let view = normalize(frame.eye.xyz - v.p_world);
     let s = shading_frame(v, select(-1.0, 1.0, front), view);
-    let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 0.5 * GRAZING)));
+    let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
 
     let e_front = textureSampleLevel(light_map, linear_sampler, v.uv2, 0.0).rgb;
     let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
