@@ -21,6 +21,7 @@ TINY = Effort(
     quality=Quality("tiny", 64, (4, 4), 1.0, 4, 32, 16, 4, gather_samples=8),
     tuples=2000,
     still=(160, 100),
+    still_frames=2,
     film=(96, 60),
     film_seconds=0.5,
     film_fps=12,
