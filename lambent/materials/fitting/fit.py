@@ -92,7 +92,8 @@ def fit(
     lobes : int
         1 to 4 per side.
     method : "grid" or "gradient"
-        The thesis's hierarchical search, or the same followed by a joint least-squares polish of all lobes.
+        The thesis's hierarchical search, or the same followed by a joint least-squares polish of all lobes. A lobe
+        that is alone is polished in either case.
     metric : str
         What is minimised, one of `METRICS`; the result names E under all of them.
     fix, ranges : mapping, optional
@@ -127,7 +128,7 @@ def fit(
             boxes[side] = [box_of(side, i, samples.info.isotropic, channels, fix, ranges) for i in range(lobes)]
             problem = problem_of(samples, side, chosen, background)
             fit_lobes(problem, boxes[side], _named(progress, side), seed, found[side])
-            if method == "gradient":
+            if method == "gradient" or lobes == 1:
                 found[side][:] = polish(problem, boxes[side], found[side], seed)
     except (Cancelled, KeyboardInterrupt):
         partial = True

@@ -12,7 +12,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.metrics import METRICS, errors_of
 from lambent.materials.measured.registry import load
-from tests.materials.fitting.known_answers import ALANOD, FEW, FOIL, ISOTROPIC, PAINT, grey
+from tests.materials.fitting.known_answers import ALANOD, ANISOTROPIC, FEW, FOIL, ISOTROPIC, PAINT, grey
 
 
 @pytest.fixture(scope="module")
@@ -25,17 +25,17 @@ def true_errors(samples, material):
 
 
 @pytest.mark.slow
-def test_alanod_is_recovered():
-    samples = grey(ALANOD)
+@pytest.mark.parametrize("seed", range(5))
+def test_alanod_is_recovered_whatever_the_noise(seed):
+    samples = grey(ALANOD, replace(ANISOTROPIC, seed=seed))
     result = fit(samples, metric="l1")
     (found,), (true,) = result.material.lobes, ALANOD.lobes
     assert result.material.kd[0] == pytest.approx(0.003, rel=0.05)
     for name in ("mx", "my", "alpha"):
-        assert getattr(found, name) == pytest.approx(getattr(true, name), rel=0.02)
-    assert found.r0[0] == pytest.approx(true.r0[0], rel=0.05)
-    assert found.k[0] == pytest.approx(true.k[0], rel=0.05)
-    assert found.k[0] * found.r0[0] == pytest.approx(true.k[0] * true.r0[0], rel=0.01)
-    assert result.errors["l1"] <= 1.01 * true_errors(samples, ALANOD)["l1"]
+        assert getattr(found, name) == pytest.approx(getattr(true, name), rel=0.005)
+    assert found.r0[0] == pytest.approx(true.r0[0], rel=0.03)
+    assert found.k[0] == pytest.approx(true.k[0], rel=0.03)
+    assert result.errors["l1"] <= 1.0005 * true_errors(samples, ALANOD)["l1"]
 
 
 @pytest.mark.slow
