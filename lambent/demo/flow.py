@@ -41,7 +41,7 @@ STILLS = 8
 class Effort:
     """Sizes of one kind of demo: pictures in pixels, film in seconds, samples per pixel of the compared view.
 
-    `tuples` is how many of a table's tuples are fitted, all where None; `still_frames` how many frames a still averages.
+    `tuples` is how many of a table's tuples are fitted, all where None; `still_frames` how many frames make a still.
     """
 
     quality: Quality
