@@ -26,7 +26,7 @@ NAME = "Cornell / pbrt-v2 text"
 LIMIT_BYTES = 256 << 20
 _NEIGHBOURS = 8
 _WEIGHT_POINTS = 1 << 17
-_COMMENT = re.compile(rb"#[^\n]*")
+_COMMENT = re.compile(rb"\A\xef\xbb\xbf|#[^\r\n]*")  # and the byte order mark
 
 
 def recognise(head: bytes, size: int) -> bool:

@@ -10,6 +10,7 @@ Degrees; theta_o > 90 is transmission; the name of the value columns says the qu
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 from pathlib import Path
@@ -39,7 +40,7 @@ def recognise(head: bytes, size: int) -> bool:
 
 
 def _names(head: bytes) -> list[str] | None:
-    for line in head.splitlines():
+    for line in head.removeprefix(codecs.BOM_UTF8).splitlines():
         text = line.split(b"#")[0].strip()
         if text:
             return re.split(r"[\s,;]+", text.decode("utf-8", "replace").strip(",;"))
@@ -55,7 +56,8 @@ def read(path: Path) -> GonioTable:
         Where a column or the symmetry is unknown, a row is broken, the directions do not form grids, or an incident
         direction has no measured value.
     """
-    content = read_bytes(path, LIMIT_BYTES)
+    content = read_bytes(path, LIMIT_BYTES).removeprefix(codecs.BOM_UTF8)
+    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     names = _names(content[:_HEADER_BYTES])
     if names is None or tuple(names[:4]) != ANGLES:
         raise UserError("first line that is no comment must name the columns", file=path, expected=" ".join(ANGLES))
@@ -81,8 +83,7 @@ def _quantity(columns: list[str], path: Path) -> Quantity:
 def _rows(content: bytes, columns: int, path: Path) -> Floats:
     """(N, columns) numbers below the line of names; infinities become NaN."""
     lines = io.BytesIO(content)
-    while not (line := lines.readline()).split(b"#")[0].strip():
-        pass
+    line = next(line for line in lines if line.split(b"#")[0].strip())
     start = lines.tell()
     if not re.search(rb"^[^\S\n]*[^#\s]", content[start:], re.MULTILINE):
         raise UserError("holds no rows", file=path)

@@ -20,6 +20,7 @@ Floats = NDArray[np.floating]
 Flags = NDArray[np.bool_]
 
 GRAZING_DEG = 84.0  # beyond this, gonio-photometers and grids see mostly their own errors
+LARGEST_F = 1e9  # 1/sr; no surface is that bright, and its square still fits float32
 _COS_GRAZING = float(np.cos(np.radians(GRAZING_DEG)))
 
 
@@ -157,7 +158,7 @@ def collect(
     UserError
         Where nothing is left.
     """
-    finite = np.isfinite(f).all(axis=1)
+    finite = (np.isfinite(f) & (f <= LARGEST_F)).all(axis=1)
     negative = (np.where(np.isfinite(f), f, 0) < 0).any(axis=1)
     grazing = (np.abs(wi[:, 2]) < _COS_GRAZING) | (np.abs(wo[:, 2]) < _COS_GRAZING)
     used = np.ones(len(f), dtype=bool)

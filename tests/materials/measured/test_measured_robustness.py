@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
 from lambent.materials.measured.registry import readers
+from tests.materials.measured.measured_files import merl_bytes
 
 KINDS = ("merl", "rgl", "cornell", "gonio")
 WI, WO = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
@@ -116,3 +117,20 @@ def test_rgl_filled_with_nan(files: dict[str, Path], target: Path) -> None:
     target.write_bytes(content[:header] + b"\xff" * (len(content) - header))
     with pytest.raises(UserError, match="not finite"):
         load(target)
+
+
+@pytest.mark.parametrize("kind", ["cornell", "gonio"])
+@pytest.mark.parametrize("ending", [b"\n", b"\r\n", b"\r"])
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_line_ends_and_byte_order_marks_change_nothing(
+    files: dict[str, Path], target: Path, kind: str, ending: bytes, mark: bytes
+) -> None:
+    plain = files[kind].read_bytes()
+    target.write_bytes(mark + plain.replace(b"\n", ending))
+    assert np.array_equal(load(target).eval(WI, WO), load(files[kind]).eval(WI, WO))
+
+
+def test_values_no_surface_has_are_left_out(target: Path) -> None:
+    target.write_bytes(merl_bytes(np.full((6, 6, 12, 3), 1e30)))
+    with pytest.raises(UserError, match="not finite"):
+        load(target).samples()
