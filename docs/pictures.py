@@ -29,7 +29,7 @@ def main(demo: Path) -> None:
 
 
 def shown(path: Path) -> np.ndarray:
-    return to_bytes(read_encoded(path))
+    return to_bytes(read_encoded(path)[..., :3])
 
 
 def radiance(path: Path) -> np.ndarray:
