@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.frames import direction
-from lambent.core.progress import Progress
+from lambent.core.progress import Cancelled, Progress
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import METHODS, FitResult, Method, fit
@@ -74,6 +74,8 @@ def _alternated(
     for _ in range(runs):
         for method in METHODS:
             results[method] = fit(samples, lobes=lobes, method=method, metric=metric)
+            if results[method].partial:
+                raise Cancelled
             seconds[method].append(results[method].seconds)
     for method in METHODS:
         yield method, results[method], seconds[method]
