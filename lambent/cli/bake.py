@@ -37,7 +37,7 @@ def command(
     only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and what it needs. Repeatable.")] = None,
     quality: Annotated[Quality, typer.Option(help="How much work to put in.")] = Quality.preview,
     resume: Annotated[bool, typer.Option("--resume/--anew", help="Keep what is up to date, or bake it all.")] = True,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same store.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same store.")] = 0,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def command(
     material: Annotated[Path, typer.Argument(help="Material document (.json).")],
-    seed: Annotated[int, typer.Option(help="The same seed gives the same report.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same report.")] = 0,
     json: Json = False,
 ) -> None:
     """Check reciprocity, energy, and the sampler by chi-square and hemisphere integrals.

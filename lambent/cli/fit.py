@@ -27,7 +27,7 @@ def command(
     range_: Annotated[
         list[str] | None, typer.Option("--range", help="Seek a parameter within lo:hi: mx=.05:.3. Repeatable.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same material.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same material.")] = 0,
     output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw both: X.png gives X_polar, X_in_plane, X_albedo.")] = None,
     json: Json = False,

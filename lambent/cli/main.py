@@ -23,7 +23,10 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 
 INTERRUPTED = 130
-FAULTS_OF_THE_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR}
+FAULTS_OF_THE_DISK = {
+    errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EISDIR,
+    errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
+}  # fmt: skip
 
 
 def build_app() -> typer.Typer:
@@ -59,6 +62,10 @@ def run(arguments: list[str]) -> int:
     except TyperException as error:  # unknown commands and options, missing arguments
         return _fail(error.format_message())
     except (Cancelled, KeyboardInterrupt):
+        code = INTERRUPTED
+    except SystemError as error:  # what an interruption becomes while an extension module is imported
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
         code = INTERRUPTED
     except BrokenPipeError:
         # Whoever read the output is gone; what is left to flush at exit goes nowhere.

@@ -102,7 +102,7 @@ def load_material(path: Path) -> Material:
         Where the file is not JSON, not a material, of another version, or holds an unknown or impossible field.
     """
     try:
-        data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8"))
+        data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise UserError(f"not a JSON document ({error})", file=path) from error
     return material_from(data, path)

@@ -94,7 +94,7 @@ class Store:
                 found = f"{manifest['format']} {manifest['version']}"
                 raise UserError("unknown store", file=path, got=found, expected=f"{FORMAT} {VERSION}")
             return cls(Path(folder), manifest)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
             raise UserError(f"manifest is damaged ({error})", file=path, hint="bake again") from error
 
     def artefacts(self, kind: str | None = None) -> list[Artefact]:

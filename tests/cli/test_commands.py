@@ -189,6 +189,45 @@ def test_an_interruption_is_one_line_and_130(lambent, monkeypatch, material):
     assert outcome.err == "lambent: interrupted; what was finished is kept\n"
 
 
+def test_an_interrupted_import_is_an_interruption(lambent, monkeypatch, material):
+    def interrupt(*_, **__):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("lambent.materials.check.check", interrupt)
+    assert lambent("check", material).code == 130
+
+
+def test_an_interrupted_fit_ends_its_bench(lambent, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lambent.materials.fitting.fit.fit_lobes", interrupt)
+    assert lambent("bench", "fit", "--quick").code == 130
+
+
+def test_a_place_that_takes_no_file_is_one_line(refused, monkeypatch, pictures, tmp_path):
+    def nowhere(*_, **__):
+        raise FileNotFoundError(2, "No such file or directory", "/proc/d.png")
+
+    monkeypatch.setattr("lambent.core.images.write_image", nowhere)
+    assert "cannot be written" in refused("compare", *pictures, "-o", tmp_path / "d.png")
+
+
+def test_a_byte_order_mark_changes_nothing(lambent, material):
+    plain = lambent("check", material).out
+    material.write_bytes(b"\xef\xbb\xbf" + material.read_bytes())
+    assert lambent("check", material).out == plain
+
+
+def test_seeds_are_not_negative(refused, material):
+    assert "--seed" in refused("check", material, "--seed", "-1")
+
+
+def test_a_deeply_nested_manifest_is_damaged(refused, tmp_path):
+    (tmp_path / "manifest.json").write_text("[" * 100_000)
+    assert "manifest is damaged" in refused("inspect", tmp_path)
+
+
 def test_a_full_disk_is_one_line(lambent, monkeypatch, pictures, tmp_path):
     def full(*_, **__):
         raise OSError(28, "No space left on device")

@@ -93,7 +93,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
 
 def _parse(path: Path) -> SceneDocument:
     try:
-        data = tomllib.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8"))
+        data = tomllib.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise UserError(f"not a TOML document ({error})", file=path) from error
     try:
