@@ -33,6 +33,18 @@ def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
     assert 0 < store.artefact("light_map/irradiance").meta["noise"] < 0.2
 
 
+def test_gathering_keeps_the_light_and_lowers_its_noise(tmp_path: Path) -> None:
+    gathering = replace(TINY, gather_samples=64)
+    store = bake(furnace(), tmp_path / "furnace", quality=gathering)
+    assert known(store, "gathered").mean() == pytest.approx(np.pi, rel=4e-3)
+    store = bake(room_with_step(), tmp_path / "room", quality=gathering)
+    traced, gathered = known(store), known(store, "gathered")
+    assert gathered.mean() == pytest.approx(traced.mean(), rel=0.01)
+    halves = [store.read(f"light_map/{stage}")[..., :3] for stage in ("traced", "gathered")]  # of 64 samples each
+    noise = [np.abs(half[0] - half[1]).mean() for half in halves]
+    assert noise[1] < 0.6 * noise[0]
+
+
 def test_plane_under_a_constant_sky_receives_pi(tmp_path: Path) -> None:
     environment = ImageEnvironment(constant_picture(tmp_path, 2.0))
     store = bake(replace(plane(), environment=environment), tmp_path / "s", quality=TINY)

@@ -20,7 +20,7 @@ from lambent.store.contract import scene_record
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
 
-TILED = replace(TINY, light_map_texels=300, light_map_samples=(64, 64))  # 2 x 2 tiles
+TILED = replace(TINY, light_map_texels=300, light_map_samples=(32, 32), gather_samples=8)  # 2 x 2 tiles
 BAKE = """
 import sys
 from dataclasses import replace
@@ -45,7 +45,7 @@ def test_killed_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
     whole = bake(room_with_step(), tmp_path / "whole", quality=TILED)
     path = tmp_path / "killed"
     root = Path(__file__).parents[2]
-    for chunks in (1, 4):  # killed in the light map, twice
+    for chunks in (1, 6):  # killed in the path traced map, then in the gathered one
         process = subprocess.Popen([sys.executable, "-c", BAKE, str(path)], cwd=root)
         while process.poll() is None and done(path) < chunks:
             time.sleep(0.02)
@@ -60,11 +60,12 @@ def test_killed_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
 
 
 def done(path: Path) -> int:
-    """Tiles of the light map on disk."""
+    """Tiles of the light maps on disk, path traced and gathered."""
     if not (path / "manifest.json").exists():
         return 0
-    raw = [a for a in Store.open(path).artefacts() if a.name == "light_map/traced"]
-    return len(raw[0].done) if raw else 0
+    return sum(
+        len(a.done) for a in Store.open(path).artefacts() if a.name in ("light_map/traced", "light_map/gathered")
+    )
 
 
 @pytest.fixture(scope="module")
