@@ -1,7 +1,7 @@
 """Joint polish of the lobes of one side: damped Gauss-Newton steps with exact derivatives.
 
 The grid search judges its candidates on a share of the tuples and along the axes; ks and r0 trade against each other
-almost freely, so that it ends up to 7 % from the best pair of the whole table. L1 is minimised by reweighting: least
+almost freely, so that it ends up to 4 % from the best pair of the whole table. L1 is minimised by reweighting: least
 squares with weights 1/|residual| has the same minimum.
 """
 
