@@ -48,7 +48,10 @@ def sunsky_radiance(sky: SunSky, w: Array, *, sun: bool = True) -> Array:
 
 @lru_cache(maxsize=1)
 def sky_picture(sky: SunSky) -> NDArray[np.float32]:
-    """(HEIGHT, WIDTH, 3) lat-long picture, oriented as an `ImageEnvironment`."""
+    """(HEIGHT, WIDTH, 3) lat-long picture, oriented as an `ImageEnvironment`.
+
+    The model is black below the horizon; there the picture shows a diffuse ground of the sky's own albedo, lit by it.
+    """
     rows, columns = np.arange(HEIGHT, step=COARSE), np.arange(WIDTH, step=COARSE)
     r, c = np.meshgrid(rows + (COARSE - 1) / 2, columns + (COARSE - 1) / 2, indexing="ij")
     coarse = sunsky_radiance(sky, _directions(r, c).reshape(-1, 3), sun=False)
@@ -60,6 +63,10 @@ def sky_picture(sky: SunSky) -> NDArray[np.float32]:
     r, c = near[:, 0, None, None] + offset[:, None], near[:, 1, None, None] + offset
     fine = sunsky_radiance(sky, _directions(*np.broadcast_arrays(r, c)).reshape(-1, 3))
     picture[near[:, 0], near[:, 1]] = fine.reshape(len(near), -1, 3).mean(axis=1)
+    height = np.cos(np.arange(HEIGHT) * (np.pi / (HEIGHT - 1)))  # y of the directions in each row
+    rows_sr = np.sqrt(1 - height**2) * (np.pi / (HEIGHT - 1)) * (2 * np.pi / WIDTH)
+    irradiance = np.einsum("rcx,r->x", picture, np.maximum(height, 0) * rows_sr)
+    picture[height < 0] = sky.albedo / np.pi * irradiance
     return np.ascontiguousarray(picture, dtype=np.float32)
 
 

@@ -52,6 +52,8 @@ def command(
     opened = Store.open(store)
     record = scene_record(opened)
     exposure_ev = record.exposure_ev if exposure is None else exposure
+    if not -64 <= exposure_ev <= 64:  # also refuses nan
+        raise UserError("exposure is out of range", field="--exposure", got=exposure_ev, expected="-64 to 64 EV")
     film = output.suffix.lower() == FILM
     if film:
         width, height = even_size(width, height)

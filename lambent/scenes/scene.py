@@ -54,7 +54,7 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SunSky:
-    """Clear daylight by Mitsuba's `sunsky` (Hosek-Wilkie), turned so that up is +y."""
+    """Clear daylight by Mitsuba's `sunsky` (Hosek-Wilkie), up is +y, over a diffuse ground of the same `albedo`."""
 
     sun_direction: Triple  # unit, towards the sun
     turbidity: float = 3.0

@@ -37,7 +37,13 @@ def test_the_sun_stands_where_it_is_said_to() -> None:
     cube = environment_cube(SunSky(tuple(SUN)), 64)
     brightest = np.unravel_index(cube[..., 1].argmax(), cube.shape[:3])
     assert normalize(face_directions(64))[brightest] @ SUN > np.cos(np.radians(2))
-    assert np.isfinite(cube).all() and cube[3].max() == 0, "no light from below"
+    assert np.isfinite(cube).all()
+
+
+def test_below_the_horizon_lies_a_diffuse_ground_lit_by_the_sky() -> None:
+    cube = environment_cube(SunSky(tuple(SUN), albedo=0.4), 64)
+    from_above, from_below = (irradiance(cube, np.array([0, y, 0])) for y in (1.0, -1.0))
+    assert from_below == pytest.approx(0.4 * from_above, rel=0.02)
 
 
 @pytest.mark.parametrize("rotation_deg", [0.0, 90.0, -30.0])
