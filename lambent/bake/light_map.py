@@ -1,6 +1,6 @@
 """The light map: irradiance at every texel, path traced through the true materials.
 
-A tile is sampled in passes; even and odd passes are summed apart, so that half their difference
+A tile is sampled in pairs of passes, traced at once and summed apart, so that half their difference
 tells the noise. The raw sums stay in the store (`light_map/traced`): a bake goes on from them after any interruption.
 """
 
@@ -82,9 +82,8 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
     fewest, most = how.samples
     passes = 0
     while passes * how.per_pass < most:
-        for half in (0, 1):
-            sums[half] += _sum_of_pass(scene, points, (seed, passes), how)
-            passes += 1
+        sums += _sums_of_pass(scene, points, (seed, passes), how)
+        passes += 2
         samples = passes * how.per_pass
         if samples >= fewest and relative_noise(sums * 2 / samples) <= how.noise:
             break
@@ -117,18 +116,20 @@ def _vectors(array: Array) -> Any:
     return mi.Vector3f(np.ascontiguousarray(array.reshape(-1, 3).T, dtype=np.float32))
 
 
-def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampling) -> Array:
-    """Sum (n, 3) of a pass's samples of irradiance per texel.
+def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampling) -> Array:
+    """Sums (2, n, 3) of a pair of passes' samples of irradiance per texel.
 
-    Every texel sees the same two stratified point sets, each shifted by an offset of its own (Cranley & Patterson
-    1976).
+    Every texel sees the same two stratified point sets in both, each shifted by an offset of its own (Cranley &
+    Patterson 1976).
     """
-    n, samples = points.count, how.per_pass
+    n, samples = 2 * points.count, how.per_pass
     rng = np.random.default_rng(seed)
     shifts = rng.random((4, n), dtype=np.float32)
     thread = dr.arange(mi.UInt32, n * samples)
-    texel, k = thread // samples, thread % samples
-    point = texel * POINTS + (k // 2) % POINTS  # the low bit already steers the azimuth of Hammersley points
+    texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
+    point = (
+        texel % points.count * POINTS + (k // 2) % POINTS
+    )  # the low bit already steers the azimuth of Hammersley points
     at = paths.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
@@ -137,7 +138,8 @@ def _sum_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampli
     e = paths.irradiance(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
     e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
     dr.eval(e)
-    return np.stack([np.array(dr.block_sum(channel, samples)) for channel in (e.x, e.y, e.z)], axis=-1)
+    sums = [np.array(dr.block_sum(channel, samples)) for channel in (e.x, e.y, e.z)]
+    return np.stack(sums, axis=-1).reshape(2, points.count, 3)
 
 
 def _shifted(points: Array, shifts: Array, k: Any, texel: Any) -> Any:

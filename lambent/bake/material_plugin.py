@@ -27,8 +27,12 @@ TANGENT_ATTRIBUTE = "vertex_tangent"
 
 
 def material_dict(material: Material, *, diffuse: bool = True, lobes: bool = True) -> dict[str, Any]:
-    """The dictionary for `mi.load_dict`; `diffuse` and `lobes` switch the two parts of the material."""
-    return {"type": PLUGIN, "material": material.model_dump_json(), "diffuse": diffuse, "lobes": lobes}
+    """The dictionary for `mi.load_dict`; `diffuse` and `lobes` switch the two parts of the material.
+
+    Surfaces that scatter light alike have equal dictionaries, whatever their materials' names.
+    """
+    scattering = _without(material, diffuse=diffuse, lobes=lobes)
+    return {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
 
 
 def register_material_plugin() -> None:
@@ -47,8 +51,7 @@ def _register(variant: str) -> None:
 
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
-            given = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
-            self.material = _without(given, diffuse=props.get("diffuse", True), lobes=props.get("lobes", True))
+            self.material = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
             self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
             names = _component_names(self.material)
             self.kinds = [getattr(mi.BSDFFlags, kind) for kind, *_ in names]

@@ -46,9 +46,14 @@ class SceneBuilder:
 
         register_material_plugin()
         self.scene = scene
-        used = {o.material for o in scene.objects}
-        bsdfs = {n: mi.load_dict(material_dict(m, diffuse=diffuse)) for n, m in scene.materials.items() if n in used}
-        self.meshes = {o.name: _mesh(o, bsdfs[o.material], (uv2 or {}).get(o.name)) for o in scene.objects}
+        # Equal materials share a BSDF: each one costs every kernel a function of its own.
+        bsdfs: dict[str, Any] = {}
+        self.meshes = {}
+        for o in scene.objects:
+            wanted = material_dict(scene.materials[o.material], diffuse=diffuse)
+            if wanted["material"] not in bsdfs:
+                bsdfs[wanted["material"]] = mi.load_dict(wanted)
+            self.meshes[o.name] = _mesh(o, bsdfs[wanted["material"]], (uv2 or {}).get(o.name))
         self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
         self._environment = mi.load_dict(environment_dict(scene.environment)) if scene.environment else None
 
