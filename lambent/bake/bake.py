@@ -118,6 +118,7 @@ class _Bake:
         if changes:
             log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
         self.store = Store.create(path, inputs_of(scene))
+        self._sides: dict[float, Any] = {}
         self.store.set_document("changes", changes)
         if not resume:
             self.store.forget_all()
@@ -226,7 +227,8 @@ class _Bake:
         shape, chunks = (2, texels.height, texels.width, 4), (2, TILE, TILE, 4)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
         if writer.missing:
-            scene, sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder)
+            scene = builder.build()
+            sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder, scene)
             covered = np.zeros(texels.width * texels.height, bool)
             covered[texels.index[sides.valid.any(axis=1)]] = True
             covered = covered.reshape(texels.height, texels.width)
@@ -242,19 +244,21 @@ class _Bake:
         self.progress(0, 1, "denoising")
         return finished(self.store.read(name), texels, labels)
 
-    def _lit_sides(self, texels: Any, sign: float, builder: Any) -> tuple[Any, Any]:
-        """The scene, and which points of it are lit on the side of this sign."""
+    def _lit_sides(self, texels: Any, sign: float, builder: Any, scene: Any) -> Any:
+        """Which points are lit on the side of this sign: the same in every stage, so they are tested once."""
         from lambent.bake.light_map import Sides
         from lambent.bake.solids import SolidTest
 
-        scene = builder.build()
+        if sign in self._sides:
+            return self._sides[sign]
         points, flat = texels.positions.reshape(-1, 3), sign * texels.flat.reshape(-1, 3)
         ours = np.ones(len(points), bool)
         if sign < 0:
             ours = self._two_sided_faces()[texels.face].reshape(-1)
         valid = ours.copy()
         valid[ours] = ~SolidTest(builder, scene).embedded(points[ours], flat[ours])
-        return scene, Sides(texels, sign, valid.reshape(texels.face.shape))
+        self._sides[sign] = Sides(texels, sign, valid.reshape(texels.face.shape))
+        return self._sides[sign]
 
     def _two_sided_faces(self) -> NDArray[np.bool_]:
         two_sided = [is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects]

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
 from lambent.bake.mitsuba_scene import environment_dict
+from lambent.bake.sky import SUN_RADIUS_RAD
 from lambent.core.cubemap import directions_at, face_directions
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Environment, SunSky
+from lambent.store.contract import HALF_MAX
 
 Array = NDArray[np.floating]
 GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine one where the sun may be
-SUN_RADIUS = np.radians(0.27)
-HALF_MAX = 65504.0  # a picture's brightest pixels may be brighter: they are cut here
 TEXELS_AT_ONCE = 1 << 16
 
 
@@ -53,4 +53,4 @@ def _means(emitter: object, texels: NDArray[np.integer], n: int, grid: int) -> A
 def _near(sun: Array, n: int) -> NDArray[np.integer]:
     """Texels that the sun disc may touch."""
     cosine = normalize(face_directions(n)).reshape(-1, 3) @ sun
-    return np.flatnonzero(cosine > np.cos(SUN_RADIUS + 2 * np.sqrt(2) / n))
+    return np.flatnonzero(cosine > np.cos(SUN_RADIUS_RAD + 2 * np.sqrt(2) / n))

@@ -21,11 +21,11 @@ from lambent.bake.seams import blend_seams
 from lambent.bake.texels import POINTS, Texels
 from lambent.core.colour import luminance
 from lambent.core.sequences import hammersley, r2
+from lambent.store.contract import HALF_MAX
 
 Array = NDArray[np.floating]
 TILE = 256  # texels per side of a chunk
 SMOOTH = 8  # averaging of what is grown into gutters before denoising: some 4 texels wide
-HALF_MAX = 65504.0
 
 
 @dataclass(frozen=True)

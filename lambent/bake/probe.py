@@ -19,11 +19,10 @@ from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
-from lambent.store.contract import FAR
+from lambent.store.contract import FAR, HALF_MAX
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]
-HALF_MAX = 65504.0
 PATHS_AT_ONCE = 1 << 20
 NOISE, EXTRA = 0.1, 8  # texels above this relative standard error get this many times more paths
 MIRROR_DEPTH = 6  # glossy surfaces in a row

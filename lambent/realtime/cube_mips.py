@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.store.contract import HALF_MAX
+
 Floats = NDArray[np.floating]
-HALF_MAX = 65504.0
 
 
 def exact_solid_angles(n: int) -> Floats:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.cube_mips import HALF_MAX, finite, mip_chain
+from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.realtime.device import WEBGPU_LIMITS
 from lambent.realtime.frame_data import OBJECT_DTYPE, lobe_data, material_data, sample_data
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.split_sum import prefiltered_cube
-from lambent.store.contract import ObjectRecord
+from lambent.store.contract import HALF_MAX, ObjectRecord
 
 Floats = NDArray[np.floating]
 LOOKUPS = {"plain": 0, "planes": 1, "distance": 2}

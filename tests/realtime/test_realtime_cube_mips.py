@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.realtime.cube_mips import HALF_MAX, exact_solid_angles, finite, mip_chain
+from lambent.realtime.cube_mips import exact_solid_angles, finite, mip_chain
+from lambent.store.contract import HALF_MAX
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 64])
