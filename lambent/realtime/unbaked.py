@@ -1,0 +1,110 @@
+"""Shapes under an environment that are drawn without a bake: for the benches and the preview of a material.
+
+Light comes from afar alone, so one probe serves every shape, and what a point receives depends on its normal alone.
+What the shapes throw at each other, and their shadows, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import normalize
+from lambent.materials.document import Material
+from lambent.realtime.baked import BakedScene, Probe
+from lambent.realtime.cube_mips import exact_solid_angles, finite, mip_chain
+from lambent.scenes.geometry import merge
+from lambent.scenes.scene import Mesh
+from lambent.store.contract import CameraRecord, ObjectRecord, SceneRecord, Triple
+
+Floats = NDArray[np.floating]
+
+COARSE = 16  # texels along a face of the environment that diffuse light is summed from
+CAMERA = CameraRecord(name="front", position=(0.0, 0.0, 4.2), target=(0.0, 0.0, 0.0), fov_y_deg=36.0)
+
+
+def unbaked_scene(
+    meshes: Mapping[str, Mesh],
+    material: Material,
+    environment: Floats,
+    planes: Floats | None = None,
+    distance: Floats | None = None,
+    irradiance: Triple = (0.0, 0.0, 0.0),
+    *,
+    name: str = "unbaked",
+) -> BakedScene:
+    """All `meshes` in one material, each with a probe at the origin that sees `environment` (6, N, N, 3).
+
+    Every point receives the same `irradiance`; see `with_diffuse_light`.
+    """
+    whole, records, first = merge(meshes.values()), [], 0
+    for key, mesh in meshes.items():
+        low, high = mesh.bounds
+        records.append(
+            ObjectRecord(
+                name=key, material=material.name, first_face=first, face_count=len(mesh.faces),
+                bounds=(_triple(low), _triple(high)), probe=True,
+            )
+        )  # fmt: skip
+        first += len(mesh.faces)
+    low, high = whole.bounds
+    record = SceneRecord(
+        name=name, objects=tuple(records), materials={material.name: material}, cameras=(CAMERA,),
+        bounds=(_triple(low), _triple(high)),
+    )  # fmt: skip
+    probe = Probe((0.0, 0.0, 0.0), environment, distance, np.zeros((0, 4), np.float32) if planes is None else planes)
+    return BakedScene(
+        record, whole.positions, whole.normals, whole.tangents, np.full((len(whole.positions), 2), 0.5, np.float32),
+        whole.faces, np.full((4, 4, 3), irradiance, np.float32), None, environment, dict.fromkeys(meshes, probe),
+    )  # fmt: skip
+
+
+def with_diffuse_light(scene: BakedScene) -> BakedScene:
+    """The scene with light maps that hold, at every vertex and on both sides, what its environment sends there.
+
+    Triangles no longer share vertices: each has a block of 2 x 2 texels, whose three corners are its vertices and whose
+    fourth continues their plane, so that the bilinear look-up is linear over the triangle.
+    """
+    assert scene.environment is not None, "a scene without an environment has no light from afar"
+    corners = scene.faces.reshape(-1)
+    count = len(scene.faces)
+    across = int(np.ceil(np.sqrt(count)))
+    row, column = np.divmod(np.arange(count), across)
+    maps = []
+    for side in (1, -1):
+        at = irradiance(scene.environment, side * normalize(scene.normals.astype(np.float64)))[scene.faces]
+        texels = np.zeros((2 * across, 2 * across, 3), np.float32)
+        for k, (dy, dx) in enumerate(((0, 0), (0, 1), (1, 0))):
+            texels[2 * row + dy, 2 * column + dx] = at[:, k]
+        texels[2 * row + 1, 2 * column + 1] = np.maximum(at[:, 1] + at[:, 2] - at[:, 0], 0)
+        maps.append(texels)
+    corner = np.array([(0.5, 0.5), (1.5, 0.5), (0.5, 1.5)])
+    uv2 = (2 * np.stack([column, row], axis=-1)[:, None] + corner) / (2 * across)
+    return replace(
+        scene,
+        positions=scene.positions[corners],
+        normals=scene.normals[corners],
+        tangents=scene.tangents[corners],
+        uv2=uv2.reshape(-1, 2).astype(np.float32),
+        faces=np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
+        irradiance=maps[0],
+        irradiance_back=maps[1],
+    )
+
+
+def irradiance(environment: Floats, normals: Floats) -> Floats:
+    """(V, 3) in W/m^2 at unit normals (V, 3) under an environment (6, N, N, 3); summed over a coarser cube."""
+    from lambent.core.cubemap import face_directions
+
+    cube = next(level for level in mip_chain(finite(environment)[0]) if level.shape[1] <= COARSE)
+    n = cube.shape[1]
+    light = (cube * exact_solid_angles(n)[..., None]).reshape(-1, 3)
+    cosines = np.maximum(normals @ normalize(face_directions(n)).reshape(-1, 3).T, 0)
+    return np.asarray(cosines @ light, np.float32)
+
+
+def _triple(v: Floats) -> Triple:
+    return float(v[0]), float(v[1]), float(v[2])
