@@ -10,9 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.files import atomic_path
-from lambent.core.frames import angles, direction
+from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
+from lambent.materials.fitting.disks import (
+    brightness,
+    disk_directions,
+    in_plane_directions,
+    in_plane_tuples,
+    measured_disk,
+)
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredSamples
 
@@ -20,11 +27,8 @@ Floats = NDArray[np.floating]
 
 DISK_PIXELS = 96
 WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
-NEAR_TUPLE = 1.3  # a pixel shows a tuple no further away than this times the distance to its fourth neighbour
-PLANE_DEG = 3.0  # tuples this close to the plane of incidence belong to its curve
 MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
 UNKNOWN = (0.66, 0.78, 0.93)  # shade of directions that were not measured
-THETA_STEP_DEG = 0.75
 COLUMNS = 4
 
 
@@ -59,12 +63,6 @@ def _figure(width: float, height: float) -> Any:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
-
-
-def _cube_root(f: Floats, wo: Floats) -> Floats:
-    """(..., 3) brightness: the cube root of the transfer probability."""
-    p = np.cbrt(np.maximum(f, 0) * np.abs(wo[..., 2:]))
-    return np.asarray(np.broadcast_to(p, (*p.shape[:-1], 3)))
 
 
 def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: bool) -> Any:
@@ -134,27 +132,10 @@ def _brushing(material: Material) -> float | None:
 
 def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Floats]:
     """Measured and model brightness, each (pixels, pixels, 3), NaN where nothing is known; the source is at the top."""
-    from scipy.spatial import cKDTree
-
-    steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
-    x, y = np.meshgrid(steps, -steps)
-    radius = np.hypot(x, y)
-    theta = np.where(radius < 1, radius, 1) * np.pi / 2
-    phi = np.arctan2(y, x) + np.radians(entry.phi_deg - 90)
-    wo = direction(np.pi - theta if far else theta, phi)
-    model = _cube_root(MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo), wo)
-    model = np.where(radius[..., None] < 1, model, np.nan)
-    here = (entry.wo[:, 2] < 0) == far
-    if here.sum() < 8:
-        return np.full_like(model, np.nan), model
-    points, first = np.unique(np.round(entry.wo[here], 6), axis=0, return_index=True)  # at theta_i = 0 phi_i repeats
-    tree = cKDTree(points)
-    even = np.sqrt(2 * np.pi / len(points))  # distance to a neighbour if the tuples lay evenly
-    spacing = np.maximum(tree.query(points, k=5)[0][:, -1], even)
-    distance, nearest = tree.query(wo.reshape(-1, 3))
-    known = (distance <= NEAR_TUPLE * spacing[nearest]).reshape(radius.shape) & (radius < 1)
-    values = _cube_root(entry.f[here][first], points)[nearest].reshape(model.shape)
-    return np.where(known[..., None], values, np.nan), model
+    wo, inside = disk_directions(DISK_PIXELS, entry.phi_deg, far)
+    model = brightness(MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo), wo)
+    model = np.where(inside[..., None], model, np.nan)
+    return np.array(np.broadcast_to(measured_disk(entry, far, DISK_PIXELS), model.shape)), model
 
 
 def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
@@ -204,32 +185,14 @@ def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
 
 
 def _curve(ax: Any, entry: Incidence, material: Material, far: bool) -> None:
-    from_normal, p = _in_plane_tuples(entry, far)
+    from_normal, p = in_plane_tuples(entry, far)
     side = ", transmitted" if far else ""
     mark, line = ("^", "--") if far else (".", "-")
-    ax.plot(from_normal, np.cbrt(p), mark, color=MEASURED, ms=3, label=f"measured{side}")
+    ax.plot(from_normal, np.cbrt(p.mean(axis=1)), mark, color=MEASURED, ms=3, label=f"measured{side}")
     x = np.linspace(-89.5, 89.5, 359)
-    wo_theta = np.radians(np.abs(x))
-    wo = direction(np.pi - wo_theta if far else wo_theta, np.radians(entry.phi_deg + np.where(x > 0, 180, 0)))
-    f = MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo)
+    wi, wo = in_plane_directions(entry.theta_deg, entry.phi_deg, x, far)
+    f = MaterialBSDF(material).eval(wi, wo)
     ax.plot(x, np.cbrt((f * np.abs(wo[:, 2:])).mean(axis=1)), line, color=MODEL, lw=1.2, label=f"model{side}")
-
-
-def _in_plane_tuples(entry: Incidence, far: bool) -> tuple[Floats, Floats]:
-    """Signed theta_o in degrees from the side's normal, and mean p, of the tuples nearest the plane of incidence.
-
-    Per `THETA_STEP_DEG` the nearest tuple alone, and none that is further than `PLANE_DEG` from the plane.
-    """
-    theta, phi = angles(entry.wo)
-    off = np.degrees(phi) - entry.phi_deg
-    aside_deg = np.degrees(np.arcsin(np.clip(np.sin(theta) * np.abs(np.sin(np.radians(off))), 0, 1)))
-    ahead = np.cos(np.radians(off)) <= 0
-    signed = np.degrees(np.pi - theta if far else theta) * np.where(ahead, 1, -1)
-    usable = np.flatnonzero((aside_deg <= PLANE_DEG) & ((entry.wo[:, 2] < 0) == far))
-    nearest_first = usable[np.argsort(aside_deg[usable], kind="stable")]
-    _, first = np.unique(np.round(signed[nearest_first] / THETA_STEP_DEG), return_index=True)
-    chosen = nearest_first[first]
-    return signed[chosen], (entry.f[chosen] * np.abs(entry.wo[chosen, 2:])).mean(axis=1)
 
 
 def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
