@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.materials.fitting.grid import Candidate
 from lambent.materials.fitting.metrics import METRICS, Metric
 from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
+from lambent.materials.fitting.problem import Candidate, Mixture
 from lambent.materials.fitting.scale import Channel, solve_scale
 from lambent.materials.measured.protocol import MeasuredSamples
 
@@ -22,6 +22,8 @@ AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
 ENERGY_TOLERANCE = 0.01
 PEAK_SHARE = 0.001  # of the tuples, the brightest
+LAMBERTIAN_STEPS = 12  # Gauss-Newton for one coefficient: the last ones change it by less than 1e-6
+CHUNK = 1 << 17  # tuples evaluated at once
 SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach for r0 and ks to be told apart
 
 
@@ -39,21 +41,30 @@ def best_lambertian(samples: MeasuredSamples, metric: Metric) -> Floats:
             basis = np.full((1, int(here.sum())), 1 / np.pi)
             for channel in range(samples.f.shape[1]):
                 part = Channel(samples.f[here, channel], np.zeros(basis.shape[1]), w[here], c[here])
-                k, _ = solve_scale(metric, part, basis, steps=40)
+                k, _ = solve_scale(metric, part, basis, steps=LAMBERTIAN_STEPS)
                 model[here, channel] = k[0] / np.pi
     return model
+
+
+def evaluate(material: Material, samples: MeasuredSamples) -> Floats:
+    """f (N, C) in 1/sr of the material at the tuples, with little memory."""
+    bsdf, channels = MaterialBSDF(material), samples.f.shape[1]
+    value = np.empty_like(samples.f)
+    for start in range(0, len(samples), CHUNK):
+        part = slice(start, start + CHUNK)
+        value[part] = bsdf.eval(samples.wi[part], samples.wo[part])[:, :channels]
+    return value
 
 
 def warnings_of(
     samples: MeasuredSamples,
     material: Material,
     model: Floats,
-    found: Mapping[Side, Sequence[Candidate]],
-    boxes: Mapping[Side, Sequence[Box]],
+    found: Mapping[Side, tuple[Mixture, Sequence[Box]]],
     metric: str,
 ) -> tuple[str, ...]:
     """One line per doubt about a fit; `model` is its f (N, C) at the tuples."""
-    lines = [line for side, lobes in found.items() for line in _bounds(side, lobes, boxes[side])]
+    lines = [line for side, (one, boxes) in found.items() for line in _bounds(side, one.lobes, boxes)]
     lines += _peaks(samples, model, metric)
     lines += _energy(material)
     lines += _ambiguity(samples, found)
@@ -105,7 +116,7 @@ def _energy(material: Material) -> list[str]:
     return [f"scatters more than it receives: albedo {albedo[highest]:.2f} at {at}"]
 
 
-def _ambiguity(samples: MeasuredSamples, found: Mapping[Side, Sequence[Candidate]]) -> list[str]:
+def _ambiguity(samples: MeasuredSamples, found: Mapping[Side, object]) -> list[str]:
     lines = []
     if found.get("transmission"):
         lines.append("transmission: only kt (1 - r0) can be measured")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.files import sha256_of
 from lambent.core.progress import Cancelled, Progress, silent
-from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, Provenance
-from lambent.materials.fitting import account
+from lambent.materials.fitting import account, gradient, several
 from lambent.materials.fitting.diffuse import diffuse_mode
-from lambent.materials.fitting.gradient import polish
-from lambent.materials.fitting.grid import Candidate
+from lambent.materials.fitting.grid import Schedule
+from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.metrics import Metric, errors_of, metric_named
 from lambent.materials.fitting.parameters import (
     SHAPE,
@@ -33,14 +32,20 @@ from lambent.materials.fitting.parameters import (
     per_channel,
     scalar,
 )
-from lambent.materials.fitting.problem import problem_of
-from lambent.materials.fitting.several import fit_lobes
+from lambent.materials.fitting.problem import Candidate, Distribution, Mixture, Problem, problem_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 Floats = NDArray[np.floating]
 Method = Literal["grid", "gradient"]
 METHODS: tuple[Method, ...] = ("grid", "gradient")
+DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
+    "beckmann": ("beckmann",),
+    "ggx": ("ggx",),
+    "best": ("beckmann", "ggx"),
+}
 MAX_LOBES = 4
+GAIN = 0.05  # share of E that one more lobe has to take off, where their number is not given
+DARK = 1e-5  # a diffuse coefficient below this is none
 
 
 @dataclass(frozen=True)
@@ -69,37 +74,73 @@ class FitResult:
     partial: bool
 
 
+@dataclass(frozen=True)
+class Task:
+    """What is asked of a fit; see `fit`."""
+
+    lobes: int
+    gain: float  # share of E that another lobe has to take off; 0 where the number is given
+    method: Method
+    metric: Metric
+    distributions: tuple[Distribution, ...]
+    coupled: bool
+    fix: Fixed
+    ranges: Ranges
+    schedule: Schedule
+    seed: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """The models of one side with one lobe, two, ... that were finished, and the boxes their lobes were sought in."""
+
+    problem: Problem
+    boxes: tuple[Box, ...]
+    models: list[Mixture]
+
+
 def fit(
     table: MeasuredSamples | MeasuredTable,
     *,
-    lobes: int = 1,
-    method: Method = "grid",
+    lobes: int | Literal["auto"] = 1,
+    method: Method = "gradient",
     metric: str = "cuberoot",
+    distribution: Literal["beckmann", "ggx", "best"] = "beckmann",
+    coupled: bool = False,
     fix: Fixed | None = None,
     ranges: Ranges | None = None,
+    gain: float = GAIN,
+    schedule: Schedule | None = None,
     seed: int = 0,
     source: Path | None = None,
     progress: Progress = silent,
 ) -> FitResult:
     """Fit a diffuse term and `lobes` lobes per side (3.6).
 
-    kd (and kt_d on the far side of a table that transmits) are read off the histogram, never searched; the coefficient
-    of a lobe is solved for each candidate; mx, my, r0 and alpha are searched and shared by the channels.
+    mx, my, r0 and alpha are shared by the channels; every coefficient is solved per channel.
 
     Parameters
     ----------
     table : MeasuredSamples or MeasuredTable
-    lobes : int
-        1 to 4 per side.
-    method : "grid" or "gradient"
-        The thesis's hierarchical search, or the same followed by a joint least-squares polish of all lobes. A lobe
-        that is alone is polished in either case.
+    lobes : int or "auto"
+        1 to 4 per side; "auto" adds lobes while each takes at least `gain` off the error.
+    method : "gradient" or "grid"
+        Least squares from several starts, all lobes and the diffuse term jointly; or the thesis's hierarchical search,
+        lobe by lobe, with kd and kt_d read off the histogram (3.4.1).
     metric : str
         What is minimised, one of `METRICS`; the result names E under all of them.
+    distribution : "beckmann", "ggx" or "best"
+        Of the microfacets; "best" fits either and keeps, per side, the one that leaves less.
+    coupled : bool
+        Whether the diffuse reflection falls as Fresnel reflection rises (`Material.kd_coupled`).
     fix, ranges : mapping, optional
         Parameter name -> value, or -> (lo, hi); names as in `parameters.known_parameters`.
+    gain : float
+        Share of E in (0, 1), for "auto".
+    schedule : Schedule, optional
+        Values per parameter and number of levels of the grid.
     seed : int
-        Of the choice of tuples for the first levels; the same seed gives the same material.
+        Of the choice of tuples; the same seed gives the same material.
     source : Path, optional
         The measured file, to be hashed into the provenance.
     progress : Progress
@@ -108,41 +149,31 @@ def fit(
     Raises
     ------
     UserError
-        Unknown method, metric or parameter; impossible value; number of lobes out of range; a parameter of transmission
-        for a table without any.
+        Unknown method, metric, distribution or parameter; impossible value; number of lobes out of range; a parameter
+        of transmission for a table without any.
     """
     began = time.perf_counter()
-    fix, ranges = fix or {}, ranges or {}
-    chosen = _check(lobes, method, metric, fix, ranges)
+    task = _task(lobes, gain, method, metric, distribution, coupled, fix or {}, ranges or {}, schedule, seed)
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
-    _check_sides(samples, fix, ranges)
-    channels = samples.f.shape[1]
-    kd, kt_d = (_diffuse(samples, side, fix) for side in ("reflection", "transmission"))
-    background = np.where(samples.transmitted[:, None], kt_d / np.pi, kd / np.pi)
-    found: dict[Side, list[Candidate]] = {}
-    boxes: dict[Side, list[Box]] = {}
+    _check_sides(samples, task.fix, task.ranges)
+    found: dict[Side, Found] = {}
     partial = False
     try:
         for side in _sides(samples):
-            found[side] = []
-            boxes[side] = [box_of(side, i, samples.info.isotropic, channels, fix, ranges) for i in range(lobes)]
-            problem = problem_of(samples, side, chosen, background)
-            fit_lobes(problem, boxes[side], _named(progress, side), seed, found[side])
-            if method == "gradient" or lobes == 1:
-                found[side][:] = polish(problem, boxes[side], found[side], seed)
+            _fit_side(samples, side, task, progress, found)
     except (Cancelled, KeyboardInterrupt):
         partial = True
     material = Material(
         name=Path(samples.info.file).stem,
-        kd=_rgb(kd),
-        kt_d=_rgb(kt_d),
-        lobes=tuple(
-            _lobe(side, i, candidate, fix) for side, several in found.items() for i, candidate in enumerate(several)
-        ),
+        kd=_diffuse_rgb("reflection", samples, task, found),
+        kt_d=_diffuse_rgb("transmission", samples, task, found),
+        lobes=tuple(lobe for side, one in found.items() for lobe in _document_lobes(side, one, task)),
     )
-    model = MaterialBSDF(material).eval(samples.wi, samples.wo)[:, :channels]
+    material = material.model_copy(update={"kd_coupled": True}) if coupled else material
+    model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
-    warnings = account.warnings_of(samples, material, model, found, boxes, chosen.name)
+    kept = {side: (one.models[-1], one.boxes) for side, one in found.items() if one.models}
+    warnings = (*account.warnings_of(samples, material, model, kept, task.metric.name), *_fewer(found, lobes))
     if partial:
         warnings = ("cancelled: the best found so far", *warnings)
     provenance = Provenance(
@@ -150,10 +181,10 @@ def fit(
         source_sha256=sha256_of(source) if source is not None else None,
         source_format=samples.info.format,
         method=f"{method}, {lobes} lobe(s) per side, seed {seed}",
-        metric=chosen.name,
+        metric=task.metric.name,
         errors=errors,
         samples={"used": len(samples), **asdict(samples.left_out)},
-        notes=(*samples.info.notes, *account.restrictions(fix, ranges), *warnings),
+        notes=(*samples.info.notes, *account.restrictions(task.fix, task.ranges), *_by_lobes(found), *warnings),
     )
     return FitResult(
         material.model_copy(update={"provenance": provenance}),
@@ -165,14 +196,71 @@ def fit(
     )
 
 
-def _check(lobes: int, method: str, metric: str, fix: Fixed, ranges: Ranges) -> Metric:
+def _task(
+    lobes: int | Literal["auto"],
+    gain: float,
+    method: str,
+    metric: str,
+    distribution: str,
+    coupled: bool,
+    fix: Fixed,
+    ranges: Ranges,
+    schedule: Schedule | None,
+    seed: int,
+) -> Task:
     if method not in METHODS:
         hint = did_you_mean(method, METHODS)
         raise UserError("unknown method", field="method", got=method, expected=", ".join(METHODS), hint=hint)
-    if not 1 <= lobes <= MAX_LOBES:
-        raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}")
-    check(fix, ranges, lobes)
-    return metric_named(metric)
+    if distribution not in DISTRIBUTIONS:
+        hint, known = did_you_mean(distribution, DISTRIBUTIONS), ", ".join(DISTRIBUTIONS)
+        raise UserError("unknown distribution", field="distribution", got=distribution, expected=known, hint=hint)
+    if not 0 < gain < 1:
+        raise UserError("share out of range", field="gain", got=gain, expected="between 0 and 1")
+    count = MAX_LOBES if lobes == "auto" else lobes
+    if not 1 <= count <= MAX_LOBES:
+        raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}, or auto")
+    check(fix, ranges, count)
+    return Task(
+        count,
+        gain if lobes == "auto" else 0.0,
+        "grid" if method == "grid" else "gradient",
+        metric_named(metric),
+        DISTRIBUTIONS[distribution],
+        coupled,
+        fix,
+        ranges,
+        schedule or Schedule(),
+        seed,
+    )
+
+
+def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progress, found: dict[Side, Found]) -> None:
+    """Put the side's models into `found`, also those that are finished when `progress` raises."""
+    channels = samples.f.shape[1]
+    boxes = tuple(box_of(side, i, samples.info.isotropic, channels, task.fix, task.ranges) for i in range(task.lobes))
+    diffuse = _diffuse(samples, side, task.fix)
+    problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled)
+    for number, distribution in enumerate(task.distributions):
+        one = Found(replace(problem, distribution=distribution), boxes, [])
+        if number == 0:
+            found[side] = one
+        report = _part(progress, side, number, len(task.distributions))
+        if task.method == "grid":
+            several.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule, task.gain, one.models)
+        else:
+            bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
+            gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed, task.gain, one.models)
+        if one.problem.remaining(one.models[-1]) < found[side].problem.remaining(found[side].models[-1]):
+            found[side] = one
+
+
+def _part(progress: Progress, side: Side, number: int, parts: int) -> Progress:
+    """Progress of one distribution of a side."""
+
+    def report(done: float, total: float, what: str) -> None:
+        progress(done / total + number, parts, f"{side}: {what}")
+
+    return report
 
 
 def _check_sides(samples: MeasuredSamples, fix: Fixed, ranges: Ranges) -> None:
@@ -203,23 +291,66 @@ def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
     return np.array([diffuse_mode(samples.f[here, c], weight) for c in range(channels)])
 
 
-def _named(progress: Progress, side: str) -> Progress:
-    def report(done: float, total: float, what: str) -> None:
-        progress(done, total, f"{side}: {what}")
+def _diffuse_rgb(
+    side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found]
+) -> tuple[float, float, float]:
+    """kd or kt_d of the model found, of the histogram where the fit did not get so far."""
+    if side in found and found[side].models:
+        diffuse = found[side].models[-1].diffuse
+        return _rgb(np.where(diffuse < DARK, 0.0, diffuse) if task.method == "gradient" else diffuse)
+    return _rgb(_diffuse(samples, side, task.fix))
 
-    return report
+
+def _document_lobes(side: Side, found: Found, task: Task) -> list[Lobe]:
+    """The lobes as a document holds them, narrow ones first where the user did not number them."""
+    lobes = [
+        _lobe(side, i, candidate, found.problem.distribution, task.fix)
+        for i, candidate in enumerate(found.models[-1].lobes if found.models else ())
+    ]
+    numbered = any(name.endswith(("_2", "_3", "_4")) for name in [*task.fix, *task.ranges])
+    return lobes if numbered else sorted(lobes, key=lambda lobe: lobe.mx * lobe.my)
 
 
-def _lobe(side: Side, index: int, candidate: Candidate, fix: Fixed) -> Lobe:
+def _lobe(side: Side, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
     mx, my, r0, alpha = (
         scalar(fix[parameter(side, base, index)], base) if parameter(side, base, index) in fix else float(value)
         for base, value in zip(SHAPE, candidate.shape, strict=True)
     )
     if side == "transmission" and r0 < 2e-6:
         r0 = 0.0
-    return Lobe(side=side, k=_rgb(candidate.k), mx=mx, my=my, r0=(r0, r0, r0), alpha=min(alpha, 1.0))
+    return Lobe(
+        side=side,
+        distribution=distribution,
+        k=_rgb(candidate.k),
+        mx=mx,
+        my=my,
+        r0=(r0, r0, r0),
+        alpha=min(max(alpha, 0.0), 1.0),
+    )
 
 
 def _rgb(values: Floats) -> tuple[float, float, float]:
     red, green, blue = (float(v) for v in (values if len(values) == 3 else np.repeat(values, 3)))
     return red, green, blue
+
+
+def _errors_by_lobes(found: Found) -> list[float]:
+    """E of the side alone, with one lobe, two, ..."""
+    return [found.problem.remaining(model) ** (1 / found.problem.metric.power) for model in found.models]
+
+
+def _by_lobes(found: dict[Side, Found]) -> list[str]:
+    lines = []
+    for side, one in found.items():
+        if len(one.models) > 1:
+            errors = ", ".join(f"{error:.4g}" for error in _errors_by_lobes(one))
+            lines.append(f"{side}: {one.problem.metric.name} error {errors} with 1 to {len(one.models)} lobes")
+    return lines
+
+
+def _fewer(found: dict[Side, Found], lobes: int | Literal["auto"]) -> list[str]:
+    return [
+        f"{side}: {len(one.models)} lobe(s); another one explains nothing more"
+        for side, one in found.items()
+        if lobes != "auto" and 0 < len(one.models) < lobes
+    ]

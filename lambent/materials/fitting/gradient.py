@@ -1,154 +1,140 @@
-"""Joint polish of the lobes of one side: damped Gauss-Newton steps with exact derivatives.
+"""The modern search: least squares from several starts, on few tuples first, then on all that count.
 
-The grid search judges its candidates on a share of the tuples and along the axes; ks and r0 trade against each other
-almost freely, so that it ends up to 4 % from the best pair of the whole table. L1 is minimised by reweighting: least
-squares with weights 1/|residual| has the same minimum.
+One lobe after another is added to the best model so far: a new lobe is started at several widths, at either end of
+(r0, alpha), which are bimodal, and by splitting each lobe there is into a narrow and a wide one. Its coefficients are
+solved on what the others leave (subtracted and clamped); then every shape and coefficient moves at once. The best
+starts go on with more tuples. The model with one lobe more is kept only where it explains all tuples better.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.materials.fitting.grid import ALPHA, MU, NU, R0, Candidate
-from lambent.materials.fitting.parameters import Box
-from lambent.materials.fitting.problem import Problem
-from lambent.materials.fitting.scale import TINY
-from lambent.materials.fitting.several import remaining
+from lambent.core.progress import Progress
+from lambent.materials.fitting.least_squares import Bounds, minimise
+from lambent.materials.fitting.parameters import Box, to_search
+from lambent.materials.fitting.problem import MU, NU, Candidate, Mixture, Problem
+from lambent.materials.fitting.scale import solve_scale
 
 Floats = NDArray[np.floating]
 
-VALUES = 600_000  # tuples times channels; of a larger table an importance-sampled share is taken
-STEPS = 40
-STOP_SHARE = 1e-7  # a step that lowers the error by less than this share is the last
-DAMPING = (1e-4, 1e6)  # at the start, and where no step downwards is left; shares of the normal matrix's diagonal
-LEAST_RESIDUAL = 1e-3  # share of the transformed measurement (and of its mean) below which L1 is quadratic
-K_SPAN = 7.0  # ln k may move this far
-COEFFICIENT = 4  # "axis" of an unknown that is ln k of a channel
+VALUES = (12_000, 60_000, 600_000)  # measured values (tuples times channels) that the three stages look at
+KEPT = (3, 1)  # starts that go on to the second and to the third stage
+STEPS = (30, 15, 40)
+STOP_SHARE = (1e-4, 1e-4, 1e-7)
+WIDTHS = (0.008, 0.03, 0.1, 0.3, 0.9)
+MODES = ((0.015, 0.05), (0.9, 0.85))  # (r0, alpha) of the two kinds of optimum
+STRETCHED = ((0.03, 3.0), (0.03, 1 / 3), (0.12, 3.0), (0.12, 1 / 3))  # mean width and my/mx of anisotropic starts
+SPLIT = 1.8  # a lobe is split into one so much narrower and one so much wider
+LEAST_START = 1e-6  # a coefficient of 0 has no logarithm to move
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """One coordinate of the polish: ln mx, ln my, ln r0 or alpha of a lobe, or its ln k in one channel."""
+def fit_lobes(
+    problem: Problem,
+    bounds: Bounds,
+    diffuse: Floats,
+    progress: Progress,
+    seed: int,
+    gain: float,
+    found: list[Mixture],
+) -> None:
+    """Append to `found` the best model with one lobe, two lobes, ... as many as there are boxes.
 
-    lobe: int
-    axis: int
-    channel: int
-    start: float
-    lo: float
-    hi: float
-
-
-def polish(problem: Problem, boxes: Sequence[Box], lobes: Sequence[Candidate], seed: int) -> list[Candidate]:
-    """The lobes after a joint refinement of all shapes and coefficients; never worse than before on all tuples."""
-    unknowns = _unknowns(boxes, lobes)
-    if not unknowns:
-        return list(lobes)
-    few = problem.thinned(VALUES // len(problem.measured), seed)
-    x, lo, hi = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lo", "hi"))
-    x = np.clip(x, lo, hi)
-    error = remaining(few, _moved(boxes, lobes, unknowns, x))
-    damping, most = DAMPING
-    for _ in range(STEPS):
-        matrix, gradient = _normal_equations(few, boxes, _moved(boxes, lobes, unknowns, x), unknowns)
-        before = error
-        while damping < most:
-            there = _step(matrix, gradient, damping, x, lo, hi)
-            reached = remaining(few, _moved(boxes, lobes, unknowns, there))
-            if reached < error:
-                x, error, damping = there, reached, damping / 10
-                break
-            damping *= 10
-        if before - error <= STOP_SHARE * before:
-            break
-    polished = _moved(boxes, lobes, unknowns, x)
-    return polished if remaining(problem, polished) < remaining(problem, lobes) else list(lobes)
+    Parameters
+    ----------
+    diffuse : (C,)
+        Where the diffuse coefficients start, or their values where they are given.
+    gain : float
+        Share of E that another lobe has to take off; where it does not, the search ends early.
+    found : list
+        Is what is finished when `progress` raises.
+    """
+    channels = len(problem.measured)
+    stages = problem.thinned([v // channels for v in VALUES], seed, (np.float32, np.float32, np.float64))
+    model = Mixture(np.maximum(diffuse, LEAST_START) if bounds.diffuse_free else diffuse)
+    error = np.inf
+    for count in range(1, len(bounds.boxes) + 1):
+        candidates = list(_starts(stages[0], bounds, model))
+        ranked = _descend(stages, bounds, candidates, progress, count, len(bounds.boxes))
+        reached = problem.remaining(ranked)
+        if reached >= error * (1 - gain) ** problem.metric.power:
+            return
+        found.append(ranked)
+        model, error = ranked, reached
 
 
-def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
-    """Where a damped step ends; unknowns that the gradient presses against a bound stay there."""
-    free = ~(((x <= lo) & (gradient < 0)) | ((x >= hi) & (gradient > 0)))
-    if not free.any():
-        return x
-    part = matrix[np.ix_(free, free)]
-    diagonal = np.maximum(np.diag(part), 1e-12 * np.diag(matrix).max() + 1e-300)
-    moved = x.copy()
-    moved[free] += np.linalg.solve(part + damping * np.diag(diagonal), gradient[free])
-    return np.clip(moved, lo, hi)
+def _descend(
+    stages: Sequence[Problem], bounds: Bounds, starts: Sequence[Mixture], progress: Progress, lobe: int, lobes: int
+) -> Mixture:
+    """The best end of all starts."""
+    rounds = len(starts) + sum(KEPT)
+    done = 0
+    alive = list(starts)
+    for depth, stage in enumerate(stages):
+        ends = []
+        for start in alive[: ([len(starts), *KEPT])[depth]]:
+            progress((lobe - 1) * rounds + done, lobes * rounds, f"lobe {lobe}, {len(stage)} tuples")
+            ends.append(minimise(stage, bounds, start, STEPS[depth], STOP_SHARE[depth]))
+            done += 1
+        ends.sort(key=lambda end: end[1])
+        alive = _distinct(ends)
+    progress(lobe * rounds, lobes * rounds, f"lobe {lobe}")
+    return alive[0]
 
 
-def _normal_equations(
-    problem: Problem, boxes: Sequence[Box], lobes: Sequence[Candidate], unknowns: Sequence[Unknown]
-) -> tuple[Floats, Floats]:
-    """J^T W J (U, U) and J^T W r (U,), with r the transformed residual and J the model's derivative."""
-    shapes = [
-        (problem.basis(lobe.shape), _log_derivatives(problem, box, lobe))
-        for box, lobe in zip(boxes, lobes, strict=True)
-    ]
-    matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
-    metric, c = problem.metric, problem.c
-    for channel, (measured, background) in enumerate(zip(problem.measured, problem.background, strict=True)):
-        parts = [c * lobe.k[channel] * basis for lobe, (basis, _) in zip(lobes, shapes, strict=True)]
-        model = c * background + np.sum(parts, axis=0)
-        target = metric.transform(c * measured)
-        residual = target - metric.transform(model)
-        w = problem.w
-        if metric.power == 1:
-            size = np.abs(target)
-            w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
-        slope = metric.slope(model)
-        here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
-        rows = np.empty((len(here), len(c)))
-        for row, i in zip(rows, here, strict=True):
-            u = unknowns[i]
-            np.multiply(slope, parts[u.lobe], out=row)
-            if u.axis != COEFFICIENT:
-                row *= shapes[u.lobe][1][u.axis]
-        weighted = rows * w
-        matrix[np.ix_(here, here)] += weighted @ rows.T
-        gradient[here] += weighted @ residual
-    return matrix, gradient
+def _distinct(ends: Sequence[tuple[Mixture, float]]) -> list[Mixture]:
+    """The models in their order, without those that are the same optimum again."""
+    kept: list[tuple[Mixture, float]] = []
+    for model, error in ends:
+        if all(abs(error - other) > 1e-3 * other for _, other in kept):
+            kept.append((model, error))
+    return [model for model, _ in kept]
 
 
-def _log_derivatives(problem: Problem, box: Box, lobe: Candidate) -> dict[int, Floats]:
-    """Axis -> (N,) derivative of ln f of the lobe by that search coordinate."""
-    mx, my, r0, _ = (float(v) for v in lobe.shape)
-    by_mx = 2 * problem.slope_x2 / (mx * mx) - 1
-    by_my = 2 * problem.slope_y2 / (my * my) - 1
-    sign = 1 if problem.side == "reflection" else -1
-    by_r0 = sign * r0 * (1 - problem.schlick) / np.maximum(problem.fresnel(np.array(r0)), 1e-30)
-    return {MU: by_mx + by_my if box.tied else by_mx, NU: by_my, R0: by_r0, ALPHA: -problem.log_cosines}
+def _starts(problem: Problem, bounds: Bounds, model: Mixture) -> Iterator[Mixture]:
+    """The model with one lobe more, in several ways."""
+    box = bounds.boxes[len(model.lobes)]
+    for mx, my, (r0, alpha) in _shapes(box):
+        coordinates = np.clip(to_search(np.array([mx, my, r0, alpha])), box.lo, box.hi)
+        basis = problem.basis(Candidate(coordinates, np.zeros(0)).shape)[None]
+        k = [
+            solve_scale(problem.metric, channel, basis, limits)[0][0]
+            for channel, limits in zip(problem.channels(model), box.k_limits, strict=True)
+        ]
+        yield _positive(bounds, model, Candidate(coordinates, _within(np.array(k, dtype=float), box)))
+    for index, lobe in enumerate(model.lobes):
+        narrow, wide = (_widened(lobe, scale, b) for scale, b in ((1 / SPLIT, bounds.boxes[index]), (SPLIT, box)))
+        others = list(model.lobes)
+        others[index] = narrow
+        yield _positive(bounds, replace(model, lobes=tuple(others)), wide)
 
 
-def _unknowns(boxes: Sequence[Box], lobes: Sequence[Candidate]) -> list[Unknown]:
-    """What may move of all lobes; a coefficient of 0 or a fixed one is no unknown."""
-    unknowns = []
-    for index, (box, lobe) in enumerate(zip(boxes, lobes, strict=True)):
-        for axis in range(COEFFICIENT):
-            lo, hi = float(box.lo[axis]), float(box.hi[axis])
-            if lo < hi and not (box.tied and axis == NU):
-                unknowns.append(Unknown(index, axis, 0, float(lobe.coordinates[axis]), lo, hi))
-        for channel, (k, (least, most)) in enumerate(zip(lobe.k, box.k_limits, strict=True)):
-            if k > 0 and least < most:
-                start = float(np.log(k))
-                lo = max(start - K_SPAN, float(np.log(max(least, 1e-300))))
-                hi = min(start + K_SPAN, float(np.log(most)))
-                unknowns.append(Unknown(index, COEFFICIENT, channel, start, lo, hi))
-    return unknowns
+def _shapes(box: Box) -> Iterator[tuple[float, float, tuple[float, float]]]:
+    for m, mode in product(WIDTHS, MODES):
+        yield m, m, mode
+    if not box.tied:
+        for (m, ratio), mode in product(STRETCHED, MODES):
+            yield m / np.sqrt(ratio), m * np.sqrt(ratio), mode
 
 
-def _moved(boxes: Sequence[Box], lobes: Sequence[Candidate], unknowns: Sequence[Unknown], x: Floats) -> list[Candidate]:
-    """The lobes with the unknowns at `x`."""
-    moved = [replace(lobe, coordinates=lobe.coordinates.copy(), k=lobe.k.astype(np.float64)) for lobe in lobes]
-    for u, value in zip(unknowns, x, strict=True):
-        if u.axis == COEFFICIENT:
-            moved[u.lobe].k[u.channel] = np.exp(value)
-        else:
-            moved[u.lobe].coordinates[u.axis] = value
-    for box, lobe in zip(boxes, moved, strict=True):
-        if box.tied:
-            lobe.coordinates[NU] = lobe.coordinates[MU]
-    return moved
+def _widened(lobe: Candidate, scale: float, box: Box) -> Candidate:
+    coordinates = lobe.coordinates.copy()
+    coordinates[[MU, NU]] += np.log(scale)
+    return Candidate(np.clip(coordinates, box.lo, box.hi), _within(lobe.k / 2, box))
+
+
+def _within(k: Floats, box: Box) -> Floats:
+    least, most = np.array(box.k_limits).T
+    return np.clip(np.maximum(k, LEAST_START), least, most)
+
+
+def _positive(bounds: Bounds, model: Mixture, lobe: Candidate) -> Mixture:
+    """The model with the lobe; what is 0 of it may move again."""
+    lobes = [replace(one, k=_within(one.k, box)) for box, one in zip(bounds.boxes, model.lobes, strict=False)]
+    diffuse = np.maximum(model.diffuse, LEAST_START) if bounds.diffuse_free else model.diffuse
+    return Mixture(diffuse, (*lobes, lobe))

@@ -1,11 +1,10 @@
-"""The hierarchical grid search of one lobe (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
+"""The hierarchical search of one lobe (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
 
-n equidistant values per free parameter; the best is kept; every interval shrinks to 1/(n - 1) of its extent around it;
-repeat. Three things keep it from getting stuck and make it practical on real tables:
-- r0 and alpha are bimodal, so the first level keeps the best of each of the four (low, high) combinations of the two,
-  and each is refined on its own;
-- a best value on the face of a shrunken box moves the box before it shrinks further;
-- the first levels look at a small, importance-sampled share of the tuples, later ones at more (`Problem.thinned`).
+n equidistant values per free parameter; the best combination is kept; every interval shrinks to 1/(n - 1) of its
+extent around it; repeated a given number of times. The coefficient of each candidate is solved, not searched. The
+first levels look at a small, importance-sampled share of the tuples, later ones at more.
+
+Nothing keeps the global optimum in the box (the thesis says so): `gradient` is never worse and far quicker.
 """
 
 from __future__ import annotations
@@ -18,50 +17,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.progress import Progress
-from lambent.materials.fitting.parameters import Box, from_search
-from lambent.materials.fitting.problem import Problem
+from lambent.materials.fitting.parameters import Box
+from lambent.materials.fitting.problem import ALPHA, MU, NU, R0, Candidate, Mixture, Problem
 from lambent.materials.fitting.scale import Channel, solve_scale
 
 Floats = NDArray[np.floating]
 
 NEGLIGIBLE = 1e-9  # f in 1/sr: tuples where no candidate reaches this are left to the background alone
-MU, NU, R0, ALPHA = range(4)
+VALUES = (
+    4_500,
+    4_500,
+    9_000,
+    20_000,
+    40_000,
+    80_000,
+)  # measured values that the levels look at; the last for all after
+LEVELS_N = (9, 6)  # the default n of the first level and number of levels
+FULL_STEPS = 40  # Gauss-Newton steps for the coefficients on all tuples
 
 
 @dataclass(frozen=True)
-class Level:
-    """One round: `n` values per parameter, judged on about `values` measured values (tuples times channels), `starts`
-    candidates refined."""
+class Schedule:
+    """n values per parameter at each of so many levels."""
 
-    n: int
-    values: int
-    starts: int
-
-
-SCHEDULE = (
-    Level(9, 4500, 4),
-    Level(5, 4500, 4),
-    Level(5, 9000, 2),
-    Level(3, 20000, 2),
-    Level(3, 20000, 2),
-    Level(3, 40000, 1),
-    Level(3, 80000, 1),
-)
-MOVES = 12  # of a box at one level
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A lobe with its coefficient per channel and what it leaves unexplained."""
-
-    coordinates: Floats  # (4,) search coordinates
-    k: Floats  # (C,)
-    total: float  # the metric's sum over tuples, averaged over channels; comparable on the same tuples only
-
-    @property
-    def shape(self) -> Floats:
-        """mx, my, r0, alpha."""
-        return from_search(self.coordinates)
+    n: int = LEVELS_N[0]
+    levels: int = LEVELS_N[1]
 
 
 class Best:
@@ -72,65 +52,22 @@ class Best:
 
 
 def search(
-    problem: Problem, box: Box, progress: Progress, best: Best, seed: int, schedule: tuple[Level, ...] = SCHEDULE
+    problem: Problem, others: Mixture, box: Box, progress: Progress, best: Best, seed: int, schedule: Schedule
 ) -> Candidate:
-    """Best lobe in `box`; `best` follows the search, so that it survives a `Cancelled` from `progress`."""
-    channels = len(problem.measured)
-    rounds = 1 + sum(level.starts for level in schedule[1:])
-    done = 0
-
-    def step(what: str) -> None:
-        nonlocal done
-        done += 1
-        progress(min(done, rounds), rounds, what)
-
-    progress(0, rounds, "search")
-    coarse = problem.thinned(schedule[0].values // channels, seed)
-    first = list(_evaluate(coarse, box, *_axes(box.lo, box.hi, box, schedule[0].n)))
-    best.candidate = min(first, key=_total)
-    step("coarse grid")
-    starts: list[tuple[Candidate, Floats]] = [
-        (start, (box.hi - box.lo) / (schedule[0].n - 1)) for start in _corners(first, box)
-    ]
-    for depth, level in enumerate(schedule[1:], start=1):
-        refined: list[tuple[Candidate, Floats]] = []
-        thinned = problem.thinned(level.values // channels, seed)
-        for start, extent in starts[: level.starts]:
-            refined.append(_refine(thinned, box, start, extent, level.n))
-            step(f"level {depth + 1} of {len(schedule)}")
-        refined.sort(key=lambda pair: pair[0].total)
-        best.candidate = refined[0][0]
-        starts = refined
-    return starts[0][0]
-
-
-def _total(candidate: Candidate) -> float:
-    return candidate.total
-
-
-def _corners(candidates: list[Candidate], box: Box) -> list[Candidate]:
-    """The best candidate of every (low, high) combination of r0 and alpha."""
-    middle = (box.lo + box.hi) / 2
-    found: dict[tuple[bool, bool], Candidate] = {}
-    for candidate in candidates:
-        key = (bool(candidate.coordinates[R0] > middle[R0]), bool(candidate.coordinates[ALPHA] > middle[ALPHA]))
-        if key not in found or candidate.total < found[key].total:
-            found[key] = candidate
-    return list(found.values())
-
-
-def _refine(problem: Problem, box: Box, start: Candidate, extent: Floats, n: int) -> tuple[Candidate, Floats]:
-    """Best candidate around `start` and the extent for the next level."""
-    current = start
-    for _ in range(MOVES):
-        lo = np.maximum(current.coordinates - extent / 2, box.lo)
-        hi = np.minimum(current.coordinates + extent / 2, box.hi)
-        found = min(_evaluate(problem, box, *_axes(lo, hi, box, n)), key=_total)
-        at_face = ((found.coordinates <= lo) & (lo > box.lo)) | ((found.coordinates >= hi) & (hi < box.hi))
-        current = found
-        if not at_face.any():
-            break
-    return current, extent / (n - 1)
+    """Best lobe in `box` for what `others` leave; `best` follows the search and survives what `progress` raises."""
+    counts = [VALUES[min(level, len(VALUES) - 1)] // len(problem.measured) for level in range(schedule.levels)]
+    lo, hi = box.lo, box.hi
+    for level, few in enumerate(problem.thinned(counts, seed, [np.float32] * len(counts))):
+        progress(level, schedule.levels, f"level {level + 1} of {schedule.levels}")
+        candidates = _evaluate(few, few.channels(others), box, *_axes(lo, hi, box, schedule.n), progress, level)
+        found = min(candidates, key=lambda pair: pair[1])[0]
+        best.candidate = found
+        extent = (hi - lo) / (schedule.n - 1)
+        lo = np.maximum(found.coordinates - extent / 2, box.lo)
+        hi = np.minimum(found.coordinates + extent / 2, box.hi)
+    progress(schedule.levels, schedule.levels, "searched")
+    assert best.candidate is not None
+    return best.candidate
 
 
 def _axes(lo: Floats, hi: Floats, box: Box, n: int) -> tuple[list[tuple[float, float]], Floats, Floats]:
@@ -144,17 +81,24 @@ def _axes(lo: Floats, hi: Floats, box: Box, n: int) -> tuple[list[tuple[float, f
 
 
 def _evaluate(
-    problem: Problem, box: Box, pairs: list[tuple[float, float]], r0: Floats, alpha: Floats
-) -> Iterator[Candidate]:
-    """Every combination of the pairs of slopes with r0 and alpha, each with its solved coefficient."""
+    problem: Problem,
+    channels: tuple[Channel, ...],
+    box: Box,
+    pairs: list[tuple[float, float]],
+    r0: Floats,
+    alpha: Floats,
+    progress: Progress,
+    level: int,
+) -> Iterator[tuple[Candidate, float]]:
+    """Every combination of the pairs of slopes with r0 and alpha, its coefficient solved, and what it leaves."""
     combined = np.array(list(product(r0, alpha)))
     fresnel = problem.fresnel(np.exp(combined[:, 0])).astype(problem.base.dtype)
     rest = fresnel * np.exp(-combined[:, 1:].astype(problem.base.dtype) * problem.log_cosines)
     highest = rest.max(axis=0)
-    channels = problem.channels
     unexplained = [_losses(problem, channel) for channel in channels]
-    for log_mx, log_my in pairs:
-        density = problem.distribution(np.exp(log_mx), np.exp(log_my))
+    for number, (log_mx, log_my) in enumerate(pairs):
+        progress(level + number / len(pairs), level + 1, f"level {level + 1}")
+        density = problem.density(np.exp(log_mx), np.exp(log_my))
         reached = density * highest > NEGLIGIBLE
         basis = density[reached] * rest[:, reached]
         ks, totals = [], []
@@ -168,7 +112,7 @@ def _evaluate(
         mean = np.mean(totals, axis=0)
         for row in range(len(combined)):
             coordinates = np.array([log_mx, log_my, *combined[row]])
-            yield Candidate(coordinates, np.array([k[row] for k in ks]), float(mean[row]))
+            yield Candidate(coordinates, np.array([k[row] for k in ks], dtype=float)), float(mean[row])
 
 
 def _losses(problem: Problem, channel: Channel) -> Floats:
@@ -176,3 +120,13 @@ def _losses(problem: Problem, channel: Channel) -> Floats:
     transform = problem.metric.transform
     difference = np.abs(transform(channel.c * channel.measured) - transform(channel.c * channel.background))
     return np.asarray(channel.w * difference**problem.metric.power)
+
+
+def with_exact_scale(problem: Problem, others: Mixture, lobe: Candidate, box: Box) -> Candidate:
+    """The lobe with its coefficients solved on all tuples in float64."""
+    basis = problem.basis(lobe.shape)[None]
+    solved = [
+        solve_scale(problem.metric, channel, basis, limits, FULL_STEPS)[0][0]
+        for channel, limits in zip(problem.channels(others), box.k_limits, strict=True)
+    ]
+    return Candidate(lobe.coordinates, np.array(solved, dtype=float))

@@ -1,120 +1,196 @@
 """One side of a table, prepared so that a lobe of any shape is a few multiplications per tuple.
 
-ln f_lobe / k = ln F + base - hx^2/hz^2/mx^2 - hy^2/hz^2/my^2 - ln(mx my) - alpha ln(cos_i cos_o)   (3.3-3.5)
+ln f_lobe / k = ln F + base + ln D' - alpha ln(cos_i cos_o)   (3.3-3.5), with base = -ln(4 pi hz^4 cos_d) and
+D' = exp(-q) / (mx my) of Beckmann, 1 / (mx my (1 + q)^2) of GGX, q = hx^2/hz^2/mx^2 + hy^2/hz^2/my^2.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.materials.fitting.metrics import Metric
-from lambent.materials.fitting.parameters import Side
+from lambent.materials.fitting.parameters import Side, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.measured.protocol import MeasuredSamples
 
 Floats = NDArray[np.floating]
+Distribution = Literal["beckmann", "ggx"]
+MU, NU, R0, ALPHA = range(4)  # axes of the search coordinates
+PER_TUPLE = ("slope_x2", "slope_y2", "base", "log_cosines", "schlick", "diffuse", "measured", "c")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A lobe: its place in the search (4,), its coefficient per channel (C,)."""
+
+    coordinates: Floats
+    k: Floats
+
+    @property
+    def shape(self) -> Floats:
+        """mx, my, r0, alpha."""
+        return from_search(self.coordinates)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """The model of one side: a diffuse coefficient per channel (C,) and lobes."""
+
+    diffuse: Floats
+    lobes: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What one lobe has to explain.
+    """What the model of one side has to explain.
 
     Attributes
     ----------
     slope_x2, slope_y2, base, log_cosines, schlick : (N,)
         (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d), ln(cos_i cos_o) and (1 - cos_d)^5 of every tuple.
-    measured, background : (C, N)
-        f in 1/sr, and the part of it that other terms of the model explain.
+    diffuse : (N,)
+        f in 1/sr of the diffuse term with coefficient 1.
+    measured : (C, N)
+        f in 1/sr.
     w, c : (N,)
         The metric's weight and cosine.
     """
 
     side: Side
     metric: Metric
+    distribution: Distribution
     slope_x2: Floats
     slope_y2: Floats
     base: Floats
     log_cosines: Floats
     schlick: Floats
+    diffuse: Floats
     measured: Floats
-    background: Floats
     w: Floats
     c: Floats
 
     def __len__(self) -> int:
         return len(self.w)
 
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        return tuple(Channel(m, b, self.w, self.c) for m, b in zip(self.measured, self.background, strict=True))
-
     def fresnel(self, r0: Floats) -> Floats:
         """(..., N) F, or 1 - F for transmission, of r0 (...)."""
         f = r0[..., None] + (1 - r0[..., None]) * self.schlick
         return f if self.side == "reflection" else 1 - f
 
-    def distribution(self, mx: float, my: float) -> Floats:
+    def slope2(self, mx: float, my: float) -> Floats:
+        """(N,) q, the squared slope in units of the roughness."""
+        return self.slope_x2 / (mx * mx) + self.slope_y2 / (my * my)
+
+    def density(self, mx: float, my: float) -> Floats:
         """(N,) the factor of a lobe that depends on mx and my."""
-        exponent = self.base - self.slope_x2 / (mx * mx) - self.slope_y2 / (my * my) - np.log(mx * my)
-        return np.asarray(np.exp(exponent))
+        q = self.slope2(mx, my)
+        logarithm = -2 * np.log1p(q) if self.distribution == "ggx" else -q
+        return np.asarray(np.exp(self.base - np.log(mx * my) + logarithm))
 
     def basis(self, shape: Floats) -> Floats:
         """(N,) f in 1/sr of the lobe (mx, my, r0, alpha) with coefficient 1."""
         mx, my, r0, alpha = (float(v) for v in shape)
-        return np.asarray(self.distribution(mx, my) * self.fresnel(np.array(r0)) * np.exp(-alpha * self.log_cosines))
+        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype))
+        return np.asarray(self.density(mx, my) * fresnel * np.exp(-alpha * self.log_cosines))
 
-    def against(self, measured: Floats, background: Floats) -> Problem:
-        """The same tuples with another target."""
-        return replace(self, measured=measured, background=background)
+    def log_derivatives(self, shape: Floats, tied: bool) -> tuple[Floats, Floats, Floats, Floats]:
+        """(N,) each: the derivatives of ln basis by ln mx (and by ln my at once where `tied`), ln my, ln r0, alpha."""
+        mx, my, r0, _ = (float(v) for v in shape)
+        x, y = self.slope_x2 * (2 / (mx * mx)), self.slope_y2 * (2 / (my * my))
+        if self.distribution == "ggx":
+            fall = 2 / (1 + (x + y) / 2)
+            x, y = x * fall, y * fall
+        sign = 1 if self.side == "reflection" else -1
+        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype))
+        by_r0 = sign * r0 * (1 - self.schlick) / np.maximum(fresnel, 1e-30)
+        return (x + y - 2 if tied else x - 1), y - 1, by_r0, -self.log_cosines
 
-    def take(self, index: NDArray[np.integer], w: Floats) -> Problem:
-        """The tuples `index` in float32, with weights of their own."""
-        per_tuple = ("slope_x2", "slope_y2", "base", "log_cosines", "schlick", "measured", "background", "c")
-        taken = {name: getattr(self, name)[..., index].astype(np.float32) for name in per_tuple}
-        return replace(self, **taken, w=w.astype(np.float32))
+    def evaluate(self, mixture: Mixture) -> Floats:
+        """(C, N) f in 1/sr."""
+        total = mixture.diffuse[:, None].astype(self.diffuse.dtype) * self.diffuse
+        for lobe in mixture.lobes:
+            total += lobe.k[:, None].astype(self.diffuse.dtype) * self.basis(lobe.shape)
+        return total
 
-    def thinned(self, count: int, seed: int) -> Problem:
-        """About `count` tuples that estimate the metric without bias.
+    def remaining(self, mixture: Mixture) -> float:
+        """The metric's sum over all tuples, averaged over channels, that the model leaves: E to the metric's power."""
+        transform = self.metric.transform
+        difference = np.abs(transform(self.c * self.measured) - transform(self.c * self.evaluate(mixture)))
+        return float(np.mean(difference**self.metric.power @ self.w))
+
+    def channels(self, others: Mixture) -> tuple[Channel, ...]:
+        """What one more lobe has to explain, per channel: the rest, clamped so that it is asked for nothing below 0."""
+        diffuse = others.diffuse[:, None].astype(self.diffuse.dtype) * self.diffuse
+        rest = np.maximum(self.measured - (self.evaluate(others) - diffuse), diffuse) if others.lobes else self.measured
+        return tuple(Channel(m, b, self.w, self.c) for m, b in zip(rest, diffuse, strict=True))
+
+    def take(self, index: NDArray[np.integer], w: Floats, dtype: type = np.float32) -> Problem:
+        """The tuples `index`, with weights of their own."""
+        taken = {name: getattr(self, name)[..., index].astype(dtype) for name in PER_TUPLE}
+        return replace(self, **taken, w=w.astype(dtype))
+
+    def thinned(self, counts: Sequence[int], seed: int, dtypes: Sequence[type]) -> list[Problem]:
+        """For each count about so many tuples that estimate the metric without bias.
 
         Systematic sampling along the storage order: half of the density follows the metric's weight, half follows
         weight times the transformed measurement, so that narrow peaks are met; each tuple's weight is divided by its
         density. The same seed gives the same tuples.
         """
-        if count >= len(self):
-            return self.take(np.arange(len(self)), self.w)
-        height = np.abs(self.metric.transform(self.c * self.measured.mean(axis=0))) ** self.metric.power
-        salient = self.w * height
-        density = 0.5 * self.w / self.w.sum() + 0.5 * salient / max(float(salient.sum()), 1e-300)
-        offset = np.random.default_rng(seed).random()
-        positions = (np.arange(count) + offset) / count
-        drawn = np.searchsorted(np.cumsum(density) / density.sum(), positions)
-        index, times = np.unique(np.minimum(drawn, len(self) - 1), return_counts=True)
-        return self.take(index, self.w[index] * times / (count * density[index]))
+        if len(self) > min(counts):
+            height = np.abs(self.metric.transform(self.c * self.measured.mean(axis=0))) ** self.metric.power
+            salient = self.w * height
+            density = 0.5 * self.w / self.w.sum() + 0.5 * salient / max(float(salient.sum()), 1e-300)
+            summed = np.cumsum(density)
+        parts = []
+        for count, dtype in zip(counts, dtypes, strict=True):
+            if count >= len(self):
+                parts.append(self.take(np.arange(len(self)), self.w, dtype))
+                continue
+            offset = np.random.default_rng(seed).random()
+            drawn = np.searchsorted(summed, (np.arange(count) + offset) / count * summed[-1])
+            index, times = np.unique(np.minimum(drawn, len(self) - 1), return_counts=True)
+            parts.append(self.take(index, self.w[index] * times * summed[-1] / (count * density[index]), dtype))
+        return parts
 
 
-def problem_of(samples: MeasuredSamples, side: Side, metric: Metric, background: Floats) -> Problem:
-    """The tuples of one side; `background` (N, C) is the diffuse term's f at every tuple of `samples`."""
-    here = samples.transmitted if side == "transmission" else ~samples.transmitted
-    wi, wo = samples.wi[here].astype(np.float64), samples.wo[here].astype(np.float64)
-    cos_i, cos_o = np.abs(wi[:, 2]), np.abs(wo[:, 2])
-    h = np.stack([wi[:, 0] + wo[:, 0], wi[:, 1] + wo[:, 1], cos_i + cos_o], axis=-1)
-    h /= np.linalg.norm(h, axis=-1, keepdims=True)
-    cos_d = np.clip(h[:, 0] * wo[:, 0] + h[:, 1] * wo[:, 1] + h[:, 2] * cos_o, 1e-6, 1)
-    hz2 = np.maximum(h[:, 2] ** 2, 1e-12)
+def problem_of(
+    samples: MeasuredSamples, side: Side, metric: Metric, distribution: Distribution, coupled: bool
+) -> Problem:
+    """The tuples of one side; `coupled` chooses the diffuse term of `bsdf.coupling`."""
+    here = np.flatnonzero(samples.transmitted if side == "transmission" else ~samples.transmitted)
+    wi, wo = (w[here].T.astype(np.float64) for w in (samples.wi, samples.wo))
+    cos_i, cos_o = np.abs(wi[2]), np.abs(wo[2])
+    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
+    length2 = hx * hx + hy * hy + hz * hz
+    cos_d = np.clip((hx * wo[0] + hy * wo[1] + hz * cos_o) / np.sqrt(length2), 1e-6, 1)
+    hz2 = np.maximum(hz * hz, 1e-12)
     w, c = metric.terms(samples)
     return Problem(
         side,
         metric,
-        h[:, 0] ** 2 / hz2,
-        h[:, 1] ** 2 / hz2,
-        -np.log(4 * np.pi * hz2 * hz2 * cos_d),
+        distribution,
+        hx * hx / hz2,
+        hy * hy / hz2,
+        -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d),
         np.log(np.maximum(cos_i * cos_o, 1e-12)),
         (1 - cos_d) ** 5,
+        diffuse_basis(cos_i, cos_o, coupled and side == "reflection"),
         np.ascontiguousarray(samples.f[here].T.astype(np.float64)),
-        np.ascontiguousarray(background[here].T),
         w[here],
         c[here],
     )
+
+
+def diffuse_basis(cos_i: Floats, cos_o: Floats, coupled: bool) -> Floats:
+    """f in 1/sr of the diffuse term with coefficient 1."""
+    flat = np.full_like(cos_o, 1 / np.pi)
+    if not coupled:
+        return flat
+    from lambent.materials.bsdf import coupling
+
+    return np.asarray(flat * coupling(cos_i, cos_o))

@@ -1,0 +1,173 @@
+"""Damped Gauss-Newton on the shapes and coefficients of one side's model, with exact derivatives.
+
+Coefficients enter by their logarithms: they stay positive, and ln k trades linearly against ln r0, which is nearly
+free. L1 is minimised by reweighting: least squares with weights 1/|residual| has the same minimum. Steps obey the
+bounds: an unknown that would leave its interval stops at the end of it and the rest of the step is solved again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.materials.fitting.parameters import Box
+from lambent.materials.fitting.problem import ALPHA, MU, NU, Candidate, Mixture, Problem
+from lambent.materials.fitting.scale import TINY
+
+Floats = NDArray[np.floating]
+
+DAMPING = (1e-3, 1e7)  # at the start, and where no step downwards is left; shares of the normal matrix's diagonal
+LEAST_RESIDUAL = 1e-3  # share of the transformed measurement (and of its mean) below which L1 is quadratic
+LONGEST_STEP = 2.0  # of any logarithm, because far from the optimum the model is not linear in it
+K_SPAN = 14.0  # ln k may move this far in one minimisation
+NOTHING = 1e-9  # a coefficient below this is 0
+SHAPE_AXES = range(MU, ALPHA + 1)
+COEFFICIENT = 4  # "axis" of an unknown that is ln k of a channel
+DIFFUSE = -1  # "lobe" of a diffuse coefficient
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One coordinate: ln mx, ln my, ln r0 or alpha of a lobe, or ln k of a lobe or of the diffuse term in a channel."""
+
+    lobe: int
+    axis: int
+    channel: int
+    start: float
+    lo: float
+    hi: float
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Where the model of one side may go: a box per lobe; the diffuse coefficients where they are not given."""
+
+    boxes: Sequence[Box]
+    diffuse_free: bool
+
+
+def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_share: float) -> tuple[Mixture, float]:
+    """The model after at most `steps` steps downwards, and what it leaves (`Problem.remaining`).
+
+    A step that lowers the error by less than `stop_share` of it is the last.
+    """
+    unknowns = _unknowns(bounds, start)
+    error = problem.remaining(start)
+    if not unknowns:
+        return start, error
+    x, lo, hi = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lo", "hi"))
+    current, (damping, most) = start, DAMPING
+    for _ in range(steps):
+        matrix, gradient = _normal_equations(problem, bounds, current, unknowns)
+        before = error
+        while damping < most:
+            there = _step(matrix, gradient, damping, x, lo, hi)
+            candidate = _moved(bounds, start, unknowns, there)
+            reached = problem.remaining(candidate)
+            if reached < error:
+                x, error, current, damping = there, reached, candidate, max(damping / 10, 1e-9)
+                break
+            damping *= 10
+        if before - error <= stop_share * before:
+            break
+    return current, error
+
+
+def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
+    """Where a damped step ends, the minimum of the damped quadratic within the bounds (by an active set)."""
+    diagonal = np.diag(matrix)
+    damped = matrix + damping * np.diag(np.maximum(diagonal, 1e-12 * diagonal.max() + 1e-300))
+    least, most = np.maximum(lo - x, -LONGEST_STEP), np.minimum(hi - x, LONGEST_STEP)
+    step = np.zeros_like(x)
+    free = ~(((x <= lo) & (gradient < 0)) | ((x >= hi) & (gradient > 0)))
+    while free.any():
+        rest = gradient[free] - damped[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], rest)
+        outside = free & ((step < least) | (step > most))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step[outside], least[outside], most[outside])
+        free &= ~outside
+    return np.asarray(np.clip(x + step, lo, hi))
+
+
+def _normal_equations(
+    problem: Problem, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown]
+) -> tuple[Floats, Floats]:
+    """J^T W J (U, U) and J^T W r (U,), with r the transformed residual and J the model's derivative."""
+    metric, c = problem.metric, problem.c
+    bases = [c * problem.basis(lobe.shape) for lobe in mixture.lobes]
+    slopes = [
+        problem.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
+    ]
+    diffuse = c * problem.diffuse
+    matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
+    for channel, measured in enumerate(problem.measured):
+        parts = [float(lobe.k[channel]) * basis for lobe, basis in zip(mixture.lobes, bases, strict=True)]
+        parts.append(float(mixture.diffuse[channel]) * diffuse)  # the last one: index DIFFUSE
+        model = np.sum(parts, axis=0, dtype=c.dtype)
+        target = metric.transform(c * measured)
+        residual = target - metric.transform(model)
+        w = problem.w
+        if metric.power == 1:
+            size = np.abs(target)
+            w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
+        slope = metric.slope(model)
+        here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
+        rows = np.empty((len(here), len(c)), dtype=c.dtype)
+        for row, i in zip(rows, here, strict=True):
+            u = unknowns[i]
+            np.multiply(slope, parts[u.lobe], out=row)
+            if u.axis != COEFFICIENT:
+                row *= slopes[u.lobe][u.axis]
+        weighted = rows * w
+        matrix[np.ix_(here, here)] += weighted @ rows.T
+        gradient[here] += weighted @ residual
+    return matrix, gradient
+
+
+def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:
+    """What may move; a coefficient of 0 or a fixed one is no unknown."""
+    unknowns = []
+    for index, (box, lobe) in enumerate(zip(bounds.boxes, start.lobes, strict=False)):
+        for axis in SHAPE_AXES:
+            lo, hi = float(box.lo[axis]), float(box.hi[axis])
+            if lo < hi and not (box.tied and axis == NU):
+                unknowns.append(Unknown(index, axis, 0, float(np.clip(lobe.coordinates[axis], lo, hi)), lo, hi))
+        for channel, (k, (least, most)) in enumerate(zip(lobe.k, box.k_limits, strict=True)):
+            if k > 0 and least < most:
+                unknowns.append(_coefficient(index, channel, float(k), least, most))
+    if bounds.diffuse_free:
+        for channel, k in enumerate(start.diffuse):
+            if k > 0:
+                unknowns.append(_coefficient(DIFFUSE, channel, float(k), 0.0, np.inf))
+    return unknowns
+
+
+def _coefficient(lobe: int, channel: int, k: float, least: float, most: float) -> Unknown:
+    start = float(np.log(k))
+    lo = max(start - K_SPAN, float(np.log(max(least, 1e-300))))
+    hi = min(start + K_SPAN, float(np.log(most)))
+    return Unknown(lobe, COEFFICIENT, channel, min(max(start, lo), hi), lo, hi)
+
+
+def _moved(bounds: Bounds, start: Mixture, unknowns: Sequence[Unknown], x: Floats) -> Mixture:
+    """The model with the unknowns at `x`."""
+    diffuse = start.diffuse.astype(np.float64)
+    lobes = [replace(lobe, coordinates=lobe.coordinates.copy(), k=lobe.k.astype(np.float64)) for lobe in start.lobes]
+    for u, value in zip(unknowns, x, strict=True):
+        if u.axis != COEFFICIENT:
+            lobes[u.lobe].coordinates[u.axis] = value
+            continue
+        k = np.exp(value)
+        (diffuse if u.lobe == DIFFUSE else lobes[u.lobe].k)[u.channel] = k if k > NOTHING else 0.0
+    return Mixture(diffuse, tuple(_tied(box, lobe) for box, lobe in zip(bounds.boxes, lobes, strict=False)))
+
+
+def _tied(box: Box, lobe: Candidate) -> Candidate:
+    if box.tied:
+        lobe.coordinates[NU] = lobe.coordinates[MU]
+    return lobe
