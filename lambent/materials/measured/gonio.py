@@ -1,4 +1,4 @@
-"""Gonio-photometer tables: a grid of incident directions, and for each a grid of outgoing ones on either side.
+"""Gonio-photometer tables: a grid of incident directions, and for each a sheet of outgoing ones on either side.
 
 Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o|. `half_vector` aligns the lobes first
 (Rusinkiewicz 1998): each neighbouring incident direction w_k is asked at w_k mirrored about h(wi, wo). `quadrilinear`
@@ -14,64 +14,20 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.core.frames import Floats, angles, direction, normalize, reflect
 from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values
+from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, bracket
+from lambent.materials.measured.table import IntegratedTable, require_values
 
-Indices = NDArray[np.int64]
+AnySheet = Sheet | ScatteredSheet
+Sheets = tuple[tuple[AnySheet, ...], ...]
 
 FORMAT = "gonio text"
 Symmetry = Literal["isotropic", "quadrant", "half", "none"]
 PHI_I_RANGE_DEG: dict[Symmetry, float] = {"isotropic": 0.0, "quadrant": 90.0, "half": 180.0, "none": 360.0}
 Reconstruction = Literal["half_vector", "quadrilinear"]
 _COS_MIN = 1e-4
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """What one incident direction sends to one side: f on a grid of outgoing directions.
-
-    Attributes
-    ----------
-    theta_deg : (T,) increasing in [0, 90]
-        From the normal of the side it is on: a transmitted direction straight through has 0.
-    phi_deg : (P,) increasing in [0, 360)
-        One turn, spaced as it was measured.
-    f : (T, P, C)
-        1/sr; NaN where it was not measured; negative as the sensor said.
-    """
-
-    theta_deg: Floats
-    phi_deg: Floats
-    f: Floats
-
-    @cached_property
-    def _whole(self) -> Floats:
-        """(T, P + 1, C) without holes or negative values, the first column repeated at the end."""
-        usable = np.asarray(np.isfinite(self.f).all(axis=-1))
-        filled = np.maximum(fill_holes(self.f, usable, periodic_axis=1), 0) if usable.any() else np.zeros_like(self.f)
-        return np.concatenate([filled, filled[:, :1]], axis=1)
-
-    def at(self, theta_rad: Floats, phi_rad: Floats) -> Floats:
-        """f (N, C), bilinear; beyond the grid's theta its last ring."""
-        t, u = _bracket(self.theta_deg, np.degrees(theta_rad))
-        turn = np.append(self.phi_deg, self.phi_deg[0] + 360)
-        phi = (np.degrees(phi_rad) - turn[0]) % 360 + turn[0]
-        p, v = _bracket(turn, phi)
-        t1, p1 = np.minimum(t + 1, len(self.theta_deg) - 1), p + 1
-        u, v, f = u[:, None], v[:, None], self._whole
-        low, high = f[t, p] * (1 - v) + f[t, p1] * v, f[t1, p] * (1 - v) + f[t1, p1] * v
-        return np.asarray(low * (1 - u) + high * u)
-
-    def solid_angles(self) -> Floats:
-        """(T, P) sin(theta) dtheta dphi of the nodes' cells, in sr; the cells tile what the grid spans."""
-        theta, turn = np.radians(self.theta_deg), np.radians(np.append(self.phi_deg, self.phi_deg[0] + 360))
-        half = np.diff(theta) / 2 if len(theta) > 1 else np.array([np.pi])
-        edges = np.concatenate([theta[:1] - half[:1], theta[:-1] + half[: len(theta) - 1], theta[-1:] + half[-1:]])
-        rings, widths = -np.diff(np.cos(edges.clip(0, np.pi / 2))), np.diff(turn)
-        return np.outer(rings, (widths + np.roll(widths, 1)) / 2)
 
 
 @dataclass(frozen=True)
@@ -95,39 +51,48 @@ class GonioTable(IntegratedTable):
         How `eval` looks up between incident directions.
     file : str, optional
         Name of the file it was read from.
+    notes : tuple of str
+        What the reader repaired or assumed.
+    format : str
+        Name of the reader that took it.
     """
 
     name: str
     theta_i_deg: Floats
     phi_i_deg: Floats
-    reflected: tuple[tuple[Sheet, ...], ...]
-    transmitted: tuple[tuple[Sheet, ...], ...] = ()
+    reflected: Sheets
+    transmitted: Sheets = ()
     symmetry: Symmetry = "isotropic"
     stored: Literal["f", "f_cos", "p"] = "f"
     reconstruction: Reconstruction = "half_vector"
     file: str | None = None
     notes: tuple[str, ...] = ()
+    format: str = FORMAT
 
     def __post_init__(self) -> None:
-        values = np.concatenate([sheet.f.ravel() for sheets in self._sides for row in sheets for sheet in row])
+        values = np.concatenate([sheet.values.ravel() for sheets in self._sides for row in sheets for sheet in row])
         with np.errstate(invalid="ignore"):
             require_values(values, np.isfinite(values) & (values >= 0), self.file or self.name)
 
     @property
-    def _sides(self) -> list[tuple[tuple[Sheet, ...], ...]]:
+    def _sides(self) -> list[Sheets]:
         return [sheets for sheets in (self.reflected, self.transmitted) if sheets]
 
     @cached_property
     def info(self) -> TableInfo:  # type: ignore[override]
         first = self._sides[0][0][0]
         sizes = {"theta_i": len(self.theta_i_deg), "phi_i": len(self.phi_i_deg)}
-        sizes |= {"theta_o": len(first.theta_deg), "phi_o": len(first.phi_deg)}
+        if isinstance(first, Sheet):
+            about = "o" if first.frame is None else "specular"
+            sizes |= {f"theta_{about}": len(first.theta_deg), f"phi_{about}": len(first.phi_deg)}
+        else:
+            sizes["outgoing"] = len(first.directions)
         return TableInfo(
             file=self.file or self.name,
-            format=FORMAT,
+            format=self.format,
             isotropic=self.symmetry == "isotropic",
             transmits=bool(self.transmitted),
-            channels=first.f.shape[-1],
+            channels=first.values.shape[-1],
             stored=self.stored,
             sizes=sizes,
             notes=self.notes,
@@ -160,9 +125,9 @@ class GonioTable(IntegratedTable):
         flip = np.stack([flip_x, flip_y, np.ones_like(flip_y)], axis=-1)
         return wi * flip, wo * flip
 
-    def _eval_side(self, sheets: Sequence[Sequence[Sheet]], wi: Floats, wo: Floats) -> Floats:
+    def _eval_side(self, sheets: Sequence[Sequence[AnySheet]], wi: Floats, wo: Floats) -> Floats:
         theta, phi = angles(wi)
-        i, u = _bracket(self.theta_i_deg, np.degrees(theta))
+        i, u = bracket(self.theta_i_deg, np.degrees(theta))
         i1 = np.minimum(i + 1, len(self.theta_i_deg) - 1)
         j, j1, v = self._phi_bracket(np.degrees(phi))
         h = normalize(wi + wo)
@@ -170,12 +135,11 @@ class GonioTable(IntegratedTable):
         for a, b, weight in ((i, j, (1 - u) * (1 - v)), (i, j1, (1 - u) * v), (i1, j, u * (1 - v)), (i1, j1, u * v)):
             neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b]))
             asked = reflect(neighbour, h) if self.reconstruction == "half_vector" else wo
-            theta_o, phi_o = angles(asked)
             # p is interpolated, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon.
             weight = weight * np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN)
             for k, rows in _groups(a * len(self.phi_i_deg) + b, weight > 0):
                 sheet = sheets[k // len(self.phi_i_deg)][k % len(self.phi_i_deg)]
-                f[rows] += sheet.at(theta_o[rows], phi_o[rows]) * weight[rows, None]
+                f[rows] += sheet.at(asked[rows]) * weight[rows, None]
         return f
 
     def _phi_bracket(self, phi_deg: Floats) -> tuple[Indices, Indices, Floats]:
@@ -183,10 +147,10 @@ class GonioTable(IntegratedTable):
         nodes = self.phi_i_deg
         period = {"half": 180.0, "none": 360.0}.get(self.symmetry)
         if period is None or len(nodes) == 1:
-            j, v = _bracket(nodes, phi_deg)
+            j, v = bracket(nodes, phi_deg)
             return j, np.minimum(j + 1, len(nodes) - 1), v
         closed = nodes if nodes[-1] - nodes[0] >= period - 1e-6 else np.append(nodes, nodes[0] + period)
-        j, v = _bracket(closed, (phi_deg - nodes[0]) % period + nodes[0])
+        j, v = bracket(closed, (phi_deg - nodes[0]) % period + nodes[0])
         return j, (j + 1) % len(nodes), v
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
@@ -194,24 +158,18 @@ class GonioTable(IntegratedTable):
         columns: list[tuple[Floats, ...]] = []
         for sheets, side in ((self.reflected, 1.0), (self.transmitted, -1.0)):
             for theta_i, row in zip(self.theta_i_deg, sheets, strict=False):
+                seen: set[int] = set()
                 for phi_i, sheet in zip(self.phi_i_deg, row, strict=True):
-                    columns.append(_tuples(sheet, direction(np.radians(theta_i), np.radians(phi_i)), side))
+                    if id(sheet) not in seen:  # at theta_i = 0 one sheet may stand for every phi_i
+                        columns.append(_tuples(sheet, direction(np.radians(theta_i), np.radians(phi_i)), side))
+                    seen.add(id(sheet))
         wi, wo, f, weight = (np.concatenate(column) for column in zip(*columns, strict=True))
         return collect(wi, wo, f, weight, self.info, np.isnan(f).any(axis=1), max_count)
 
 
-def _tuples(sheet: Sheet, wi: Floats, side: float) -> tuple[Floats, Floats, Floats, Floats]:
-    wo = direction(*np.radians(np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij"))).reshape(-1, 3)
-    f = sheet.f.reshape(len(wo), -1)
-    return np.broadcast_to(wi, wo.shape), wo * (1, 1, side), f, sheet.solid_angles().ravel()
-
-
-def _bracket(nodes: Floats, x: Floats) -> tuple[Indices, Floats]:
-    """Index of the node below x and the share of the next one; x beyond the nodes takes the last."""
-    if len(nodes) == 1:
-        return np.zeros(x.shape, dtype=np.int64), np.zeros(x.shape)
-    low = (np.searchsorted(nodes, x, side="right") - 1).clip(0, len(nodes) - 2)
-    return low, ((x - nodes[low]) / (nodes[low + 1] - nodes[low])).clip(0, 1)
+def _tuples(sheet: AnySheet, wi: Floats, side: float) -> tuple[Floats, Floats, Floats, Floats]:
+    wo = sheet.directions
+    return np.broadcast_to(wi, wo.shape), wo * (1, 1, side), sheet.values, sheet.solid_angles()
 
 
 def _groups(key: Indices, chosen: Flags) -> list[tuple[int, Indices]]:

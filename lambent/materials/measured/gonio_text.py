@@ -10,26 +10,23 @@ Degrees; theta_o > 90 is transmission; the name of the value columns says the qu
 
 from __future__ import annotations
 
-import codecs
 import io
 import re
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from lambent.core.errors import UserError, did_you_mean
-from lambent.core.files import atomic_path, read_bytes
-from lambent.core.frames import Floats
-from lambent.materials.measured.gonio import FORMAT, PHI_I_RANGE_DEG, GonioTable, Sheet, Symmetry
+from lambent.core.errors import UserError
+from lambent.core.files import atomic_path
+from lambent.core.frames import Floats, angles
+from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
+from lambent.materials.measured.gonio_rows import QUANTITIES, Quantity, Rows, check_angles, table_of, to_f
+from lambent.materials.measured.sheets import Sheet
+from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text
 
 NAME = FORMAT
-LIMIT_BYTES = 1 << 30
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
-Quantity = Literal["f", "f_cos", "p"]
-QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
 _HEADER_BYTES = 1 << 16
-_DECIMALS = 5  # of the angles in degrees: closer directions are the same
 _NOT_MEASURED = -1.0
 
 
@@ -40,7 +37,7 @@ def recognise(head: bytes, size: int) -> bool:
 
 
 def _names(head: bytes) -> list[str] | None:
-    for line in head.removeprefix(codecs.BOM_UTF8).splitlines():
+    for line in plain_text(head).split(b"\n"):
         text = line.split(b"#")[0].strip()
         if text:
             return re.split(r"[\s,;]+", text.decode("utf-8", "replace").strip(",;"))
@@ -53,22 +50,28 @@ def read(path: Path) -> GonioTable:
     Raises
     ------
     UserError
-        Where a column or the symmetry is unknown, a row is broken, the directions do not form grids, or an incident
-        direction has no measured value.
+        Where a column or the symmetry is unknown, a row is broken, the incident directions do not form a grid, or one
+        of them has no measured value.
     """
-    content = read_bytes(path, LIMIT_BYTES).removeprefix(codecs.BOM_UTF8)
-    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    content = read_text(path)
     names = _names(content[:_HEADER_BYTES])
     if names is None or tuple(names[:4]) != ANGLES:
         raise UserError("first line that is no comment must name the columns", file=path, expected=" ".join(ANGLES))
     quantity = _quantity(names[4:], path)
     rows = _rows(content, len(names), path)
     values = np.where(rows[:, 4:] == _NOT_MEASURED, np.nan, rows[:, 4:])
-    if quantity != "f":
-        cos_o = np.abs(np.cos(np.radians(rows[:, 2:3])))
-        values = np.divide(values, cos_o, out=np.full_like(values, np.nan), where=cos_o > 1e-6)
     keys = _keys(content[:_HEADER_BYTES])
-    return _table(rows[:, :4], values, quantity, keys, path)
+    return table_of(
+        Rows(
+            angles_deg=rows[:, :4],
+            f=to_f(values, quantity, rows[:, 2]),
+            path=path,
+            format=NAME,
+            name=keys.get("name", Path(path).stem),
+            stored=quantity,
+            symmetry=keys.get("symmetry"),
+        )
+    )
 
 
 def _quantity(columns: list[str], path: Path) -> Quantity:
@@ -92,15 +95,13 @@ def _rows(content: bytes, columns: int, path: Path) -> Floats:
     try:
         rows = np.loadtxt(text, delimiter=delimiter, ndmin=2)
     except ValueError as error:
-        raise UserError(f"a row is broken ({str(error).splitlines()[0]})", file=path) from error
+        hint = HINT_DECIMAL_COMMA if has_decimal_commas(content) else None
+        raise UserError(f"a row is broken ({str(error).splitlines()[0]})", file=path, hint=hint) from error
     if rows.shape[1] != columns:
         raise UserError(
             "a row has another number of columns than names", file=path, got=rows.shape[1], expected=columns
         )
-    if not np.isfinite(rows[:, :4]).all() or (rows[:, [0, 2]] < 0).any() or (rows[:, 0] >= 90).any():
-        raise UserError("an angle is outside its range", file=path, expected="theta_i in [0, 90), theta_o in [0, 180]")
-    if (rows[:, 2] > 180).any() or (np.abs(rows[:, [1, 3]]) > 3600).any():
-        raise UserError("an angle is outside its range", file=path, expected="degrees, theta_o in [0, 180]")
+    check_angles(rows[:, :4], path)
     rows[np.isinf(rows)] = np.nan
     return rows
 
@@ -109,83 +110,6 @@ def _keys(head: bytes) -> dict[str, str]:
     """The `# key: value` comments."""
     found = re.findall(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*?)\s*$", head, re.MULTILINE)
     return {key.decode(): value.decode("utf-8", "replace") for key, value in found}
-
-
-def _symmetry(keys: dict[str, str], phi_i_deg: Floats, path: Path) -> tuple[Symmetry, tuple[str, ...]]:
-    """The symmetry named, or else the one that the phi_i span, with a note that says so."""
-    span = phi_i_deg[-1] - phi_i_deg[0]
-    if "symmetry" not in keys:
-        spanned: Symmetry = next(name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole)
-        return spanned, (f"symmetry not stated, taken as {spanned} from phi_i",)
-    named = keys["symmetry"]
-    if named not in PHI_I_RANGE_DEG:
-        hint = did_you_mean(named, PHI_I_RANGE_DEG)
-        known = ", ".join(PHI_I_RANGE_DEG)
-        raise UserError("unknown symmetry", file=path, field="symmetry", got=named, expected=known, hint=hint)
-    symmetry = named
-    if span > PHI_I_RANGE_DEG[symmetry]:
-        got = f"phi_i from {phi_i_deg[0]:g} to {phi_i_deg[-1]:g}"
-        expected = f"a span of at most {PHI_I_RANGE_DEG[symmetry]:g} degrees"
-        raise UserError("phi_i spans more than the symmetry", file=path, field=symmetry, got=got, expected=expected)
-    return symmetry, ()
-
-
-def _table(angles_deg: Floats, f: Floats, quantity: Quantity, keys: dict[str, str], path: Path) -> GonioTable:
-    angles = np.round(angles_deg, _DECIMALS)
-    theta_i, phi_i = np.unique(angles[:, 0]), np.unique(angles[:, 1])
-    symmetry, notes = _symmetry(keys, phi_i, path)
-    if symmetry == "isotropic":
-        angles[:, 3] -= phi_i[0]
-        phi_i = np.zeros(1)
-    far = angles[:, 2] > 90
-    angles[far, 2] = np.round(180 - angles[far, 2], _DECIMALS)
-    angles[:, 3] = np.round(angles[:, 3] % 360, _DECIMALS) % 360
-    incident = np.searchsorted(theta_i, angles[:, 0]) * len(phi_i)
-    incident += np.searchsorted(phi_i, angles[:, 1]) if len(phi_i) > 1 else 0
-    sides: list[tuple[tuple[Sheet, ...], ...]] = []
-    for side in (~far, far):
-        order = np.flatnonzero(side)
-        order = order[np.lexsort((angles[order, 3], angles[order, 2], incident[order]))]
-        found, starts = np.unique(incident[order], return_index=True)
-        if len(found) == 0:
-            sides.append(())
-            continue
-        if len(found) != len(theta_i) * len(phi_i):
-            expected = f"{len(theta_i)} theta_i x {len(phi_i)} phi_i, on either side the same"
-            raise UserError("incident directions do not form a grid", file=path, got=len(found), expected=expected)
-        parts = [_sheet(angles[rows], f[rows], symmetry, path) for rows in np.split(order, starts[1:])]
-        sides.append(tuple(tuple(parts[k : k + len(phi_i)]) for k in range(0, len(parts), len(phi_i))))
-    return GonioTable(
-        name=keys.get("name", Path(path).stem),
-        file=Path(path).name,
-        theta_i_deg=theta_i,
-        phi_i_deg=phi_i,
-        reflected=sides[0],
-        transmitted=sides[1],
-        symmetry=symmetry,
-        stored=quantity,
-        notes=notes,
-    )
-
-
-def _sheet(angles_deg: Floats, f: Floats, symmetry: Symmetry, path: Path) -> Sheet:
-    """The sorted rows of one incident direction and side as a grid."""
-    theta, phi = np.unique(angles_deg[:, 2]), np.unique(angles_deg[:, 3])
-    where = f"theta_i {angles_deg[0, 0]:g}, phi_i {angles_deg[0, 1]:g}"
-    if len(angles_deg) != len(theta) * len(phi):
-        got = f"{len(angles_deg)} rows of {len(theta)} theta_o and {len(phi)} phi_o"
-        raise UserError("outgoing directions do not form a grid", file=path, field=where, got=got)
-    grid = angles_deg.reshape(len(theta), len(phi), 4)
-    if (grid[..., 2] != theta[:, None]).any() or (grid[..., 3] != phi).any():
-        raise UserError("outgoing directions do not form a grid", file=path, field=where, got="a direction twice")
-    values = f.reshape(len(theta), len(phi), -1)
-    if not np.isfinite(values).all(axis=-1).any():
-        raise UserError("no value was measured for an incident direction", file=path, field=where)
-    if symmetry == "isotropic" and len(phi) > 1 and phi[-1] <= 180:
-        inner = (phi > 0) & (phi < 180)  # half a turn measured: the other half mirrors it
-        phi = np.concatenate([phi, 360 - phi[inner][::-1]])
-        values = np.concatenate([values, values[:, inner][:, ::-1]], axis=1)
-    return Sheet(theta, phi, values)
 
 
 def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None:
@@ -209,9 +133,14 @@ def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None
                     np.savetxt(file, _columns(theta_i, phi_i, sheet, far, quantity), fmt=formats)
 
 
-def _columns(theta_i_deg: float, phi_i_deg: float, sheet: Sheet, far: bool, quantity: Quantity) -> Floats:
-    theta, phi = (a.ravel() for a in np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij"))
-    values = sheet.f.reshape(len(theta), -1)
+def _columns(theta_i_deg: float, phi_i_deg: float, sheet: AnySheet, far: bool, quantity: Quantity) -> Floats:
+    if isinstance(sheet, Sheet) and sheet.frame is None:  # phi is kept where theta is 0
+        theta, phi = (grid.ravel() for grid in np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij"))
+        values = sheet.values
+    else:
+        above = sheet.directions[:, 2] >= 0
+        theta, phi = (np.degrees(angle) for angle in angles(sheet.directions[above]))
+        values = sheet.values[above]
     if quantity != "f":
         values = values * np.cos(np.radians(theta))[:, None]
     fixed = np.broadcast_to((theta_i_deg, phi_i_deg), (len(theta), 2))

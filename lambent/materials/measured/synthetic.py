@@ -15,7 +15,8 @@ from lambent.core.frames import Floats, direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheet, Symmetry
+from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Symmetry
+from lambent.materials.measured.sheets import Sheet
 
 Evaluate = Callable[[Floats, Floats], Floats]
 """f (N, C) in 1/sr without the cosine, of wi and wo (N, 3)."""

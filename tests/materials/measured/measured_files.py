@@ -60,3 +60,46 @@ def cornell_rows(value: float = 0.2, count: int = 60, wavelengths: int = 5) -> n
 
 
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4, 0.4, 0.4), mx=0.2, my=0.2),))
+
+
+def zemax_text(evaluate, symmetry: str, kind: str = "BRDF", rotations: tuple[int, ...] = (0,)) -> str:
+    """A Zemax file of f(wi, wo) with 1 or 3 channels; below the horizon it has zeros, TIS is .5 throughout."""
+    incident, radial = (10, 40, 70), np.array([0, 5, 15, 30, 50, 70, 90])
+    azimuth = np.arange(0, 181 if symmetry == "PlaneSymmetrical" else 360, 30)
+    r, a = (np.radians(grid) for grid in np.meshgrid(radial, azimuth))
+    side = -1 if kind == "BTDF" else 1
+    blocks = []
+    for rotation in rotations:
+        turn = np.radians(rotation)
+        c, s = np.cos(turn), np.sin(turn)
+        about_n = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        for theta in np.radians(incident):
+            wi = np.array([np.sin(theta), 0, np.cos(theta)])
+            mirror, towards_n = wi * (-1, 1, 1), np.array([np.cos(theta), 0, np.sin(theta)])
+            aside = np.cross(mirror, towards_n)
+            offset = np.cos(a)[..., None] * towards_n + np.sin(a)[..., None] * aside
+            wo = np.cos(r)[..., None] * mirror + np.sin(r)[..., None] * offset
+            seen = np.broadcast_to(wi @ about_n, wo.shape), (wo @ about_n) * (1, 1, side)
+            blocks.append(evaluate(*seen) * (wo[..., 2:] > 0))
+    lines = ["# made up", "Source\tMeasured", f"Symmetry\t{symmetry}"]
+    channels = blocks[0].shape[-1]
+    lines += [f"SpectralContent\t{'Monochrome' if channels == 1 else 'XYZ'}", f"ScatterType\t{kind}"]
+    names = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+    for name, angles in zip(names, (rotations, incident, azimuth, radial), strict=True):
+        lines += [f"{name}\t{len(angles)}", "\t".join(f"{angle:g}" for angle in angles)]
+    for channel in range(channels):
+        lines += ["", "Monochrome" if channels == 1 else f"Tristimulus{'XYZ'[channel]}", "DataBegin"]
+        for block in blocks:
+            lines.append("TIS\t0.5")
+            lines += ["\t".join(f"{value:.6e}" for value in row) for row in block[..., channel]]
+        lines.append("DataEnd")
+    return "\n".join(lines) + "\n"
+
+
+def fred_text(blocks: dict[tuple[float, float], tuple[np.ndarray, np.ndarray]], words: str = "") -> str:
+    """A FRED file: specular direction -> ((N, 2) angles, (N,) values)."""
+    lines = ["type bsdf_data", f"format {words or 'angles=deg bsdf=value scale=1'}"]
+    for (theta, phi), (angles, values) in blocks.items():
+        lines.append(f"{theta:g}\t{phi:g}")
+        lines += [f"{a:.9g}\t{b:.9g}\t{v:.9g}" for (a, b), v in zip(angles, values, strict=True)]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,205 @@
+"""From single measurements (theta_i, phi_i, theta_o, phi_o, f) to a table: what the text formats of gonio data share.
+
+Incident directions form a grid. The outgoing directions of each may form one of their own, with holes, or none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.frames import Floats, direction
+from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, AnySheet, GonioTable, Sheets, Symmetry
+from lambent.materials.measured.protocol import Flags
+from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, specular_frame
+
+Quantity = Literal["f", "f_cos", "p"]
+QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
+DECIMALS = 5  # of the angles in degrees: closer directions are the same
+_LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
+_PLANE_DEG = 0.1  # so close to the plane of incidence a scan is in it
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Measurements, and what their file says of them.
+
+    Attributes
+    ----------
+    angles_deg : (N, 4)
+        theta_i, phi_i, theta_o, phi_o in absolute directions; theta_o > 90 is on the far side.
+    f : (N, C)
+        1/sr, NaN where it was not measured.
+    path : Path
+    format : str
+    name : str
+    stored : {"f", "f_cos", "p"}
+    symmetry : str, optional
+        As the file names it.
+    notes : tuple of str
+    """
+
+    angles_deg: Floats
+    f: Floats
+    path: Path
+    format: str
+    name: str
+    stored: Quantity = "f"
+    symmetry: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+def check_angles(angles_deg: Floats, path: Path) -> None:
+    """`UserError` where an angle (N, 4) is not finite or outside its range."""
+    expected = "degrees: theta_i in [0, 90), theta_o in [0, 180], phi up to 3600"
+    theta_i, theta_o, phi = angles_deg[:, 0], angles_deg[:, 2], np.abs(angles_deg[:, [1, 3]])
+    finite = np.isfinite(angles_deg).all(axis=1)
+    inside = finite & (theta_i >= 0) & (theta_i < 90) & (theta_o >= 0) & (theta_o <= 180) & (phi <= 3600).all(axis=1)
+    if not inside.all():
+        row = int(np.argmin(inside))
+        got = ", ".join(f"{angle:g}" for angle in angles_deg[row])
+        field = f"measurement {row + 1}"
+        raise UserError("an angle is outside its range", file=path, field=field, got=got, expected=expected)
+
+
+def to_f(values: Floats, quantity: Quantity, theta_o_deg: Floats) -> Floats:
+    """f (N, C) of stored values: f_cos and p are divided by |cos theta_o|; where that is 0 nothing was measured."""
+    if quantity == "f":
+        return values
+    cos_o = np.abs(np.cos(np.radians(theta_o_deg)))[:, None]
+    return np.divide(values, cos_o, out=np.full_like(values, np.nan), where=cos_o > 1e-6)
+
+
+def table_of(rows: Rows) -> GonioTable:
+    """The table of single measurements.
+
+    Raises
+    ------
+    UserError
+        Where the symmetry is unknown or contradicted, the incident directions do not form a grid, or one of them has
+        no measured value.
+    """
+    angles = np.round(rows.angles_deg, DECIMALS)
+    theta_i, phi_i = np.unique(angles[:, 0]), np.unique(angles[:, 1])
+    symmetry, notes = _symmetry(rows, phi_i)
+    f = rows.f
+    if symmetry == "isotropic":
+        angles[:, 3] -= angles[:, 1]
+        angles[:, 1], phi_i = 0, np.zeros(1)
+        angles, f = _mirrored(angles, f)
+    far = angles[:, 2] > 90
+    angles[far, 2] = np.round(180 - angles[far, 2], DECIMALS)
+    angles[:, 3] = np.round(angles[:, 3] % 360, DECIMALS) % 360
+    angles[angles[:, 2] == 0, 3] = np.where(_pole_repeats(angles), angles[angles[:, 2] == 0, 3], 0)
+    angles, f, far, repeated = _averaged(angles, f, far)
+    if repeated:
+        notes += (f"{repeated} measurements repeat a direction; their mean was taken",)
+    sides = tuple(_side(angles[side], f[side], theta_i, phi_i, rows.path) for side in (~far, far))
+    return GonioTable(
+        name=rows.name,
+        file=Path(rows.path).name,
+        theta_i_deg=theta_i,
+        phi_i_deg=phi_i,
+        reflected=sides[0],
+        transmitted=sides[1],
+        symmetry=symmetry,
+        stored=rows.stored,
+        notes=rows.notes + notes,
+        format=rows.format,
+    )
+
+
+def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]:
+    """The symmetry named, or else the one that the phi_i span, with a note that says so."""
+    span = phi_i_deg[-1] - phi_i_deg[0]
+    if rows.symmetry is None:
+        spanned: Symmetry = next((name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole), "none")
+        return spanned, (f"symmetry not stated, taken as {spanned} from phi_i",)
+    named, path = rows.symmetry, rows.path
+    if named not in PHI_I_RANGE_DEG:
+        hint = did_you_mean(named, PHI_I_RANGE_DEG)
+        known = ", ".join(PHI_I_RANGE_DEG)
+        raise UserError("unknown symmetry", file=path, field="symmetry", got=named, expected=known, hint=hint)
+    symmetry = named
+    if span > PHI_I_RANGE_DEG[symmetry]:
+        got = f"phi_i from {phi_i_deg[0]:g} to {phi_i_deg[-1]:g}"
+        expected = f"a span of at most {PHI_I_RANGE_DEG[symmetry]:g} degrees"
+        raise UserError("phi_i spans more than the symmetry", file=path, field=symmetry, got=got, expected=expected)
+    return symmetry, ()
+
+
+def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats]:
+    """Rows of an isotropic specimen that cover one side of the plane of incidence alone, and their mirror images."""
+    phi = np.round(angles_deg[:, 3] % 360, DECIMALS) % 360
+    left, right = (phi > 0) & (phi < 180), phi > 180
+    if left.any() == right.any():
+        return angles_deg, f
+    inner = left | right
+    return np.concatenate([angles_deg, angles_deg[inner] * (1, 1, 1, -1)]), np.concatenate([f, f[inner]])
+
+
+def _pole_repeats(angles_deg: Floats) -> bool:
+    """Whether the file gives theta_o = 0 at several phi_o: then they are nodes of the grid like all others."""
+    return len(np.unique(angles_deg[angles_deg[:, 2] == 0, 3])) > 1
+
+
+def _averaged(angles_deg: Floats, f: Floats, far: Flags) -> tuple[Floats, Floats, Flags, int]:
+    """The rows sorted by incident and outgoing direction, repeated ones averaged, and how many those were."""
+    order = np.lexsort((angles_deg[:, 3], angles_deg[:, 2], angles_deg[:, 1], angles_deg[:, 0], far))
+    angles_deg, f, far = angles_deg[order], f[order], far[order]
+    same = (angles_deg[1:] == angles_deg[:-1]).all(axis=1) & (far[1:] == far[:-1])
+    if not same.any():
+        return angles_deg, f, far, 0
+    first = np.flatnonzero(np.concatenate([[True], ~same]))
+    usable = np.isfinite(f)
+    total = np.add.reduceat(np.where(usable, f, 0), first, axis=0)
+    count = np.add.reduceat(usable, first, axis=0, dtype=np.int64)
+    mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
+    return angles_deg[first], mean, far[first], int(same.sum())
+
+
+def _side(angles_deg: Floats, f: Floats, theta_i: Floats, phi_i: Floats, path: Path) -> Sheets:
+    """The sheets of one side, by theta_i then phi_i; one measured at theta_i = 0 stands for every phi_i."""
+    if len(angles_deg) == 0:
+        return ()
+    incident: Indices = np.searchsorted(theta_i, angles_deg[:, 0]) * len(phi_i)
+    incident += np.searchsorted(phi_i, angles_deg[:, 1])
+    found, starts = np.unique(incident, return_index=True)
+    parts = zip(np.split(angles_deg, starts[1:]), np.split(f, starts[1:]), strict=True)
+    sheets: dict[int, AnySheet] = {
+        int(k): sheet_of(part, values, path) for k, (part, values) in zip(found, parts, strict=True)
+    }
+    if theta_i[0] == 0:
+        at_normal = [sheets[k] for k in range(len(phi_i)) if k in sheets]
+        if len(at_normal) == 1:
+            sheets |= dict.fromkeys(range(len(phi_i)), at_normal[0])
+    if len(sheets) != len(theta_i) * len(phi_i):
+        expected = f"{len(theta_i)} theta_i x {len(phi_i)} phi_i, on either side the same"
+        raise UserError("incident directions do not form a grid", file=path, got=len(sheets), expected=expected)
+    whole = [sheets[k] for k in range(len(sheets))]
+    return tuple(tuple(whole[k : k + len(phi_i)]) for k in range(0, len(whole), len(phi_i)))
+
+
+def sheet_of(angles_deg: Floats, f: Floats, path: Path) -> AnySheet:
+    """The rows (N, 4) of one incident direction and side, sorted by theta_o then phi_o, without repeats."""
+    theta_i, phi_i = angles_deg[0, :2]
+    if not np.isfinite(f).all(axis=-1).any():
+        where = f"theta_i {theta_i:g}, phi_i {phi_i:g}"
+        raise UserError("no value was measured for an incident direction", file=path, field=where)
+    frame = specular_frame(theta_i, phi_i)
+    wo = direction(*np.radians(angles_deg[:, 2:].T))
+    theta, phi = np.unique(angles_deg[:, 2]), np.unique(angles_deg[angles_deg[:, 2] > 0, 3])
+    in_plane = float(np.abs(wo @ frame[1]).max()) < np.sin(np.radians(_PLANE_DEG))
+    if in_plane or len(phi) < 3 or len(angles_deg) < _LEAST_FILLED * len(theta) * len(phi):
+        return ScatteredSheet(wo, f, frame)
+    phi = np.union1d(phi, angles_deg[:, 3])
+    row, column = np.searchsorted(theta, angles_deg[:, 2]), np.searchsorted(phi, angles_deg[:, 3])
+    grid = np.full((len(theta), len(phi), f.shape[1]), np.nan)
+    grid[row, column] = f
+    if theta[0] == 0 and (row == 0).sum() == 1:
+        grid[0] = f[0]  # one reading along the normal is that of every phi_o
+    return Sheet(theta, phi, grid)

@@ -1,0 +1,205 @@
+"""What one incident direction sends to one side: a grid of outgoing directions, about any pole, or a scattered set.
+
+Directions here are in the frame of their side: z is the side's own normal, so that a direction transmitted straight
+through has z = 1, and phi runs from t towards b on either side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import Floats, angles, direction
+from lambent.core.sequences import r2
+from lambent.materials.measured.protocol import Flags
+from lambent.materials.measured.table import fill_holes
+
+Indices = NDArray[np.int64]
+_IN_PLANE = 1e-3  # radians off a plane through the pole that still count as in it
+_LEAST_TRIANGULATED = 4
+_WEIGHT_POINTS = (1 << 12, 1 << 16)
+_HEAVIEST = 4.0  # times the median: a tuple at a gap or at the rim does not stand for all that lies beyond
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A grid of outgoing directions.
+
+    Attributes
+    ----------
+    theta_deg : (T,) increasing, from 0
+        From the grid's pole, the normal of the side unless `frame` says otherwise; at most 90 about the normal,
+        at most 180 about another pole.
+    phi_deg : (P,) increasing in [0, 360)
+        One turn, spaced as it was measured.
+    f : (T, P, C)
+        1/sr; NaN where it was not measured; negative as the sensor said. Nodes below the horizon are never used.
+    frame : (3, 3), optional
+        Rows: the directions that phi = 0 and phi = 90 run to from the pole, and the pole; orthonormal.
+    """
+
+    theta_deg: Floats
+    phi_deg: Floats
+    f: Floats
+    frame: Floats | None = None
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(T P, 3) of the nodes, phi fastest."""
+        grid = np.radians(np.meshgrid(self.theta_deg, self.phi_deg, indexing="ij"))
+        w = direction(*grid).reshape(-1, 3)
+        return w if self.frame is None else np.asarray(w @ self.frame)
+
+    @property
+    def values(self) -> Floats:
+        """(T P, C) f of `directions`, NaN below the horizon as well."""
+        f = self.f.reshape(len(self.directions), -1)
+        return f if self.frame is None else np.where(self.directions[:, 2:] > 0, f, np.nan)
+
+    @cached_property
+    def _whole(self) -> Floats:
+        """(T, P + 1, C) without holes or negative values, the first column repeated at the end."""
+        f = self.values.reshape(self.f.shape)
+        usable = np.asarray(np.isfinite(f).all(axis=-1))
+        filled = np.maximum(fill_holes(f, usable, periodic_axis=1), 0) if usable.any() else np.zeros_like(f)
+        return np.concatenate([filled, filled[:, :1]], axis=1)
+
+    def at(self, w: Floats) -> Floats:
+        """f (N, C) of directions (N, 3), bilinear; beyond the grid's theta its last ring."""
+        theta, phi = angles(w if self.frame is None else w @ self.frame.T)
+        t, u = bracket(self.theta_deg, np.degrees(theta))
+        turn = np.append(self.phi_deg, self.phi_deg[0] + 360)
+        p, v = bracket(turn, (np.degrees(phi) - turn[0]) % 360 + turn[0])
+        t1, p1 = np.minimum(t + 1, len(self.theta_deg) - 1), p + 1
+        u, v, f = u[:, None], v[:, None], self._whole
+        low, high = f[t, p] * (1 - v) + f[t, p1] * v, f[t1, p] * (1 - v) + f[t1, p1] * v
+        return np.asarray(low * (1 - u) + high * u)
+
+    def solid_angles(self) -> Floats:
+        """(T P,) sin(theta) dtheta dphi of the nodes' cells, in sr; the cells tile what the grid spans."""
+        theta, turn = np.radians(self.theta_deg), np.radians(np.append(self.phi_deg, self.phi_deg[0] + 360))
+        half = np.diff(theta) / 2 if len(theta) > 1 else np.array([np.pi])
+        edges = np.concatenate([theta[:1] - half[:1], theta[:-1] + half[: len(theta) - 1], theta[-1:] + half[-1:]])
+        rings = -np.diff(np.cos(edges.clip(0, np.pi / 2 if self.frame is None else np.pi)))
+        widths = np.diff(turn)
+        return np.outer(rings, (widths + np.roll(widths, 1)) / 2).ravel()
+
+
+@dataclass(frozen=True)
+class ScatteredSheet:
+    """Outgoing directions without a grid; those of a scan in the plane of incidence are the usual case.
+
+    Attributes
+    ----------
+    directions : (N, 3)
+    values : (N, C)
+        1/sr; NaN where it was not measured; negative as the sensor said.
+    specular : (3, 3)
+        `specular_frame` of the incident direction.
+    """
+
+    directions: Floats
+    values: Floats
+    specular: Floats
+
+    @cached_property
+    def _usable(self) -> Flags:
+        return np.asarray(np.isfinite(self.values).all(axis=1))
+
+    @cached_property
+    def _lookup(self) -> Any:
+        w, f = self.directions[self._usable], np.maximum(self.values[self._usable], 0)
+        if len(w) == 0:
+            return lambda asked: np.zeros((len(asked), f.shape[1]))
+        if np.abs(w @ self.specular[1]).max() < _IN_PLANE:
+            return _PlaneScan(w, f, self.specular)
+        return _Triangulated(w, f)
+
+    def at(self, w: Floats) -> Floats:
+        """f (N, C) of directions (N, 3).
+
+        Of a scan in the plane of incidence: by the angle from the mirror direction, which the lobe is taken to be
+        turned about from one half of the plane to the other. Otherwise linear over the triangles of the directions,
+        beyond them the nearest.
+        """
+        return np.asarray(self._lookup(w))
+
+    def solid_angles(self) -> Floats:
+        """(N,) the part of the hemisphere that is nearest to each direction, in sr."""
+        from scipy.spatial import cKDTree
+
+        count = int(np.clip(16 * len(self.directions), *_WEIGHT_POINTS))
+        u = r2(count)
+        nearest = cKDTree(self.directions).query(direction(np.arccos(u[:, 0]), 2 * np.pi * u[:, 1]))[1]
+        share = np.bincount(nearest, minlength=len(self.directions)) * (2 * np.pi / count)
+        return np.asarray(share.clip(2 * np.pi / count / 2, max(_HEAVIEST * float(np.median(share)), 1e-6)))
+
+
+class _PlaneScan:
+    """Look-up in a scan of the plane of incidence."""
+
+    def __init__(self, w: Floats, f: Floats, frame: Floats) -> None:
+        self._frame = frame
+        self._angle, order = np.unique(np.arctan2(w @ frame[0], w @ frame[2]), return_index=True)
+        self._f = f[order]
+
+    def __call__(self, w: Floats) -> Floats:
+        local = w @ self._frame.T
+        from_pole, aside = angles(local)
+        share = ((1 + np.cos(aside)) / 2)[:, None]
+        return share * self._along(from_pole) + (1 - share) * self._along(-from_pole)
+
+    def _along(self, angle: Floats) -> Floats:
+        return np.stack([np.interp(angle, self._angle, channel) for channel in self._f.T], axis=-1)
+
+
+class _Triangulated:
+    """Linear look-up over the Delaunay triangles of the directions in the plane theta (cos phi, sin phi)."""
+
+    def __init__(self, w: Floats, f: Floats) -> None:
+        from scipy.interpolate import LinearNDInterpolator
+        from scipy.spatial import QhullError, cKDTree
+
+        self._tree, self._f, self._inside = cKDTree(w), f, None
+        if len(w) >= _LEAST_TRIANGULATED:
+            try:
+                self._inside = LinearNDInterpolator(_flat(w), f)
+            except QhullError:  # directions on one line, or all the same: the nearest has to do
+                self._inside = None
+
+    def __call__(self, w: Floats) -> Floats:
+        nearest = np.asarray(self._f[self._tree.query(w)[1]])
+        if self._inside is None:
+            return nearest
+        value = np.asarray(self._inside(_flat(w)))
+        return np.asarray(np.where(np.isfinite(value), value, nearest))
+
+
+def _flat(w: Floats) -> Floats:
+    theta, phi = angles(w)
+    return np.stack([theta * np.cos(phi), theta * np.sin(phi)], axis=-1)
+
+
+def specular_frame(theta_i_deg: float, phi_i_deg: float) -> Floats:
+    """(3, 3) frame about the mirror direction of wi; its x runs towards the normal, its y is counter-clockwise to it.
+
+    On the far side, whose directions are mirrored into the near one, the same frame is the one about the direction
+    straight through.
+    """
+    theta, phi = np.radians(theta_i_deg), np.radians(phi_i_deg)
+    back = np.array([np.cos(phi), np.sin(phi), 0.0])
+    normal = np.array([0.0, 0.0, 1.0])
+    x, pole = np.cos(theta) * back + np.sin(theta) * normal, np.cos(theta) * normal - np.sin(theta) * back
+    return np.stack([x, np.cross(pole, x), pole])
+
+
+def bracket(nodes: Floats, x: Floats) -> tuple[Indices, Floats]:
+    """Index of the node below x and the share of the next one; x beyond the nodes takes the last."""
+    if len(nodes) == 1:
+        return np.zeros(x.shape, dtype=np.int64), np.zeros(x.shape)
+    low = (np.searchsorted(nodes, x, side="right") - 1).clip(0, len(nodes) - 2)
+    return low, ((x - nodes[low]) / (nodes[low + 1] - nodes[low])).clip(0, 1)

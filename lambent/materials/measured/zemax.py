@@ -1,0 +1,216 @@
+"""Zemax / OpticStudio tabular BSDF text ("BSDF Data Interchange", Radiant Imaging): grids about the mirror direction.
+
+Lines of keyword and value, `#` begins a comment: Source, Symmetry, SpectralContent, ScatterType, then SampleRotation,
+AngleOfIncidence, ScatterAzimuth and ScatterRadial, each with a count and, on the next line, its angles in degrees.
+Then, per channel (Monochrome, or TristimulusX, Y and Z), DataBegin, the blocks, DataEnd. A block is one sample rotation
+(slow) and angle of incidence (fast): `TIS value`, then a line per azimuth with the BSDF (1/sr, no cosine) per radial
+angle.
+
+ScatterRadial is the angle from the direction of mirror reflection (BTDF: straight transmission), ScatterAzimuth turns
+about it, 0 towards the normal. The angles of incidence are those of this direction, which is the same number.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.colour import xyz_to_rgb
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.frames import Floats, direction
+from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheets, Symmetry
+from lambent.materials.measured.protocol import LARGEST_F
+from lambent.materials.measured.sheets import Sheet, specular_frame
+from lambent.materials.measured.text_numbers import head_text, numbers, read_text, without_comments
+
+NAME = "Zemax BSDF text"
+LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+_WORDS = {
+    "Symmetry": ("PlaneSymmetrical", "Asymmetrical", "Asymmetrical4D"),
+    "SpectralContent": ("Monochrome", "XYZ"),
+    "ScatterType": ("BRDF", "BTDF"),
+}
+_FIRST = re.compile(rb"\s*(?:Source\s+\w+\s+)?(?:Symmetry|SpectralContent|ScatterType|SampleRotation)\s")
+_BLOCK = re.compile(rb"\bTIS\b", re.IGNORECASE)
+_MOST_CHECKED = 16  # angles of incidence whose TIS is compared
+
+
+def recognise(head: bytes, size: int) -> bool:
+    """Whether the first words are the format's."""
+    text = head_text(head)
+    return text is not None and _FIRST.match(without_comments(text)) is not None
+
+
+def read(path: Path) -> GonioTable:
+    """The table of a Zemax BSDF file.
+
+    Raises
+    ------
+    UserError
+        Where a keyword is missing or unknown, the counts do not fit, an angle is outside its range, or nothing was
+        measured for an incident direction.
+    """
+    text = without_comments(read_text(path))
+    head, _, body = text.partition(b"DataBegin")
+    words, lists = _header(head, path)
+    if not body:
+        raise UserError("has no DataBegin", file=path)
+    shape = tuple(len(lists[name]) for name in LISTS)
+    channels = 3 if words["SpectralContent"] == "XYZ" else 1
+    parts = [part.partition(b"DataEnd")[0] for part in body.split(b"DataBegin")]
+    if len(parts) != channels:
+        expected = f"{channels} for {words['SpectralContent']}"
+        raise UserError("number of data sections does not fit", file=path, got=len(parts), expected=expected)
+    read_parts = [_section(part, shape, path) for part in parts]
+    values, tis = (np.stack(arrays, axis=-1) for arrays in zip(*read_parts, strict=True))
+    return _table(values, tis, lists, words, path)
+
+
+def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]:
+    """The words and the lists of angles above the data."""
+    words: dict[str, str] = {}
+    lists: dict[str, Floats] = {}
+    for name in LISTS:
+        found = re.search(rb"\b" + name.encode() + rb"\s([^A-Za-z]*)", head)
+        if found is None:
+            raise UserError("is missing", file=path, field=name)
+        count, *angles = numbers(found[1], path, name) if found[1].strip() else [np.nan]
+        if len(angles) == 0 or count != len(angles):
+            raise UserError("count does not fit its angles", file=path, field=name, got=f"{count:g} and {len(angles)}")
+        lists[name] = np.array(angles)
+    for name, known in _WORDS.items():
+        named = re.search(rb"\b" + name.encode() + rb"\s+(\w+)", head)
+        got = named[1].decode("utf-8", "replace") if named else None
+        word = next((word for word in known if got is not None and word.lower() == got.lower()), None)
+        if word is None:
+            hint = did_you_mean(got, known) if got else None
+            raise UserError("is unknown", file=path, field=name, got=got, expected=f"one of: {known}", hint=hint)
+        words[name] = word
+    _check_lists(lists, path)
+    return words, lists
+
+
+def _check_lists(lists: dict[str, Floats], path: Path) -> None:
+    ranges = {"SampleRotation": (-360, 360), "AngleOfIncidence": (0, 90), "ScatterAzimuth": (0, 360)}
+    for name, (low, high) in (ranges | {"ScatterRadial": (0, 180)}).items():
+        angles = lists[name]
+        open_end = name == "AngleOfIncidence" and angles[-1] >= high
+        if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high) or open_end:
+            expected = f"increasing degrees from {low} to {high}"
+            raise UserError("is not a list of angles", file=path, field=name, got=angles.tolist(), expected=expected)
+
+
+def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, Floats]:
+    """(rotations, incidences, azimuths, radials) values and (rotations, incidences) TIS of one channel."""
+    blocks = _BLOCK.split(part)
+    count, each = shape[0] * shape[1], shape[2] * shape[3]
+    if blocks[0].strip() or len(blocks) != count + 1:
+        expected = f"{shape[0]} rotations x {shape[1]} angles of incidence, each after its TIS"
+        raise UserError("number of data blocks does not fit", file=path, got=len(blocks) - 1, expected=expected)
+    read_blocks = []
+    for number, block in enumerate(blocks[1:], 1):
+        # The next channel's name stands behind the last block, where its DataEnd is missing.
+        found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, f"block {number}")
+        if len(found) != each + 1:
+            expected = f"TIS and {shape[2]} azimuths x {shape[3]} radial angles"
+            field = f"block {number}"
+            raise UserError("number of values does not fit", file=path, field=field, got=len(found), expected=expected)
+        read_blocks.append(found)
+    whole = np.stack(read_blocks)
+    return whole[:, 1:].reshape(shape), whole[:, 0].reshape(shape[:2])
+
+
+def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[str, str], path: Path) -> GonioTable:
+    values, notes = _measured(values)
+    if values.shape[-1] == 3:
+        values, said = _rgb(values)
+        notes += said
+    azimuth = lists["ScatterAzimuth"]
+    if words["Symmetry"] == "PlaneSymmetrical":
+        azimuth, values = _mirrored(azimuth, values)
+    elif azimuth[-1] - azimuth[0] >= 360:
+        azimuth, values = azimuth[:-1], values[:, :, :-1]
+    phi_i, order = np.unique(lists["SampleRotation"] % 360, return_index=True)
+    span = float(phi_i[-1] - phi_i[0])
+    symmetry: Symmetry = next(name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole)
+    if len(phi_i) > 1:
+        notes += (f"sample rotation is taken as phi_i, and the symmetry as {symmetry} from its range",)
+    else:
+        phi_i = np.zeros(1)
+    theta_i = lists["AngleOfIncidence"]
+    sheets = tuple(
+        tuple(
+            _sheet(values[k, i], azimuth, lists["ScatterRadial"], theta, phi, path)
+            for k, phi in zip(order, phi_i, strict=True)
+        )
+        for i, theta in enumerate(theta_i)
+    )
+    notes += _outside(sheets)
+    far = words["ScatterType"] == "BTDF"
+    table = GonioTable(
+        name=Path(path).stem,
+        file=Path(path).name,
+        theta_i_deg=theta_i,
+        phi_i_deg=phi_i,
+        reflected=() if far else sheets,
+        transmitted=sheets if far else (),
+        symmetry=symmetry,
+        notes=notes,
+        format=NAME,
+    )
+    return _with_tis(table, tis[order[0]], far, notes)
+
+
+def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Values with NaN where a channel is 0, which is how the format's writers say that nothing was measured."""
+    with np.errstate(invalid="ignore"):
+        empty = np.asarray((values == 0).any(axis=-1))
+        values = np.where(empty[..., None] | (np.abs(values) > LARGEST_F), np.nan, values)
+    return values, ("a BSDF of exactly 0 counts as not measured",) if empty.any() else ()
+
+
+def _rgb(values: Floats) -> tuple[Floats, tuple[str, ...]]:
+    rgb = xyz_to_rgb(values)
+    with np.errstate(invalid="ignore"):
+        outside = (rgb < 0).any(axis=-1) & (values >= 0).all(axis=-1)
+    rgb = np.where(outside[..., None], np.maximum(rgb, 0), rgb)
+    notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
+    if outside.any():
+        notes += (f"{int(outside.sum())} values are more saturated than Rec.709; the negative channel became 0",)
+    return rgb, notes
+
+
+def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """The other half of the turn: azimuth a has what -a has."""
+    half = azimuth <= 180
+    inner = (azimuth > 0) & (azimuth < 180)
+    whole = np.concatenate([azimuth[half], 360 - azimuth[inner][::-1]])
+    return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2)
+
+
+def _sheet(values: Floats, azimuth: Floats, radial: Floats, theta_i: float, phi_i: float, path: Path) -> Sheet:
+    sheet = Sheet(radial, azimuth, np.swapaxes(values, 0, 1), specular_frame(theta_i, phi_i))
+    if not np.isfinite(sheet.values).all(axis=1).any():
+        field = f"angle of incidence {theta_i:g}, rotation {phi_i:g}"
+        raise UserError("no value was measured for an incident direction", file=path, field=field)
+    return sheet
+
+
+def _outside(sheets: Sheets) -> tuple[str, ...]:
+    below = sum(int((sheet.directions[:, 2] <= 0).sum()) for row in sheets for sheet in row)
+    count = sum(len(sheet.directions) for row in sheets for sheet in row)
+    return (f"{below} of {count} directions are below the horizon and left out",) if below else ()
+
+
+def _with_tis(table: GonioTable, tis: Floats, far: bool, notes: tuple[str, ...]) -> GonioTable:
+    """The table with a note that compares the total integrated scatter of its file with its own integral."""
+    stated = tis[:_MOST_CHECKED].mean(axis=-1)
+    wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))
+    ours = (table.transmissivity(wi) if far else table.reflectivity(wi)).mean(axis=-1)
+    pairs = ", ".join(
+        f"{s:.4f} ({o:.4f}) at {theta:g}" for s, o, theta in zip(stated, ours, table.theta_i_deg, strict=False)
+    )
+    return replace(table, notes=(*notes, f"TIS stated (and by integration of the table): {pairs} degrees"))
