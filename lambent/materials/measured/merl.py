@@ -12,18 +12,22 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.frames import Floats, direction, normalize, reflect
-from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values
+from lambent.materials.measured.protocol import Flags, MeasuredSamples, collect
+from lambent.materials.measured.table import IntegratedTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500
 LIMIT_BYTES = 1 << 30
 _HEADER_BYTES = 12
 _USUAL = (90, 90, 180)
+_QUERIES_AT_ONCE = 1 << 17
+
+Indices = NDArray[np.int64]
 
 
 def recognise(head: bytes, size: int) -> bool:
@@ -73,39 +77,37 @@ class MerlTable(IntegratedTable):
         with np.errstate(invalid="ignore"):
             self._measured = np.asarray(((planes >= 0) & np.isfinite(planes)).all(axis=0))
         require_values(np.moveaxis(planes, 0, -1), self._measured, path)
-        theta_h, theta_d, phi_d = planes.shape[1:]
-        self.info = TableInfo(
-            file=Path(path).name,
-            format=NAME,
-            isotropic=True,
-            transmits=False,
-            channels=3,
-            stored="f",
-            sizes={"theta_h": theta_h, "theta_d": theta_d, "phi_d": phi_d},
-            notes=("values stand at the centres of their bins",),
-        )
+        sizes = dict(zip(("theta_h", "theta_d", "phi_d"), planes.shape[1:], strict=True))
+        self.info = isotropic_brdf(path, NAME, sizes, ("values stand at the centres of their bins",))
 
     @cached_property
     def _filled(self) -> Floats:
-        """(theta_h, theta_d, phi_d, 3) f in 1/sr without holes."""
-        return fill_holes(np.moveaxis(self._raw, 0, -1) * SCALES, self._measured)
+        """(bins, 3) f in 1/sr without holes, phi_d fastest."""
+        return fill_holes(np.moveaxis(self._raw, 0, -1) * SCALES, self._measured).reshape(-1, 3)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3), trilinear between bin centres; 0 where wi or wo is below the surface."""
+        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
+        f = np.zeros((len(flat_i), 3))
+        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
+        for start in range(0, len(above), _QUERIES_AT_ONCE):
+            part = above[start : start + _QUERIES_AT_ONCE]
+            f[part] = self._eval_above(flat_i[part], flat_o[part])
+        return f.reshape(wi.shape)
+
+    def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
         theta_h, theta_d, phi_d = half_difference_angles(wi, wo)
-        shape = np.array(self._measured.shape)
-        unit = np.stack([np.sqrt(theta_h * 2 / np.pi), theta_d * 2 / np.pi, phi_d / np.pi], axis=-1)
-        place = unit * shape - 0.5
-        low = np.floor(place).astype(np.int64)
-        share = place - low
-        value = np.zeros((*unit.shape[:-1], 3))
-        for corner in np.ndindex(2, 2, 2):
-            i, j, k = np.moveaxis(low + corner, -1, 0)
-            weight = np.where(corner, share, 1 - share).prod(axis=-1)
-            cell = self._filled[i.clip(0, shape[0] - 1), j.clip(0, shape[1] - 1), k % shape[2]]
-            value += weight[..., None] * cell
-        above = (wi[..., 2] > 0) & (wo[..., 2] > 0)
-        return np.where(above[..., None], value, 0)
+        shape = self._measured.shape
+        i, u = _between(np.sqrt(theta_h * 2 / np.pi), shape[0])
+        j, v = _between(theta_d * 2 / np.pi, shape[1])
+        k, w = _between(phi_d / np.pi, shape[2])
+        value = np.zeros((len(wi), 3))
+        for a, b, c in np.ndindex(2, 2, 2):
+            row = (i + a).clip(0, shape[0] - 1) * shape[1] + (j + b).clip(0, shape[1] - 1)
+            weight = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
+            value += weight[:, None] * np.take(self._filled, row * shape[2] + (k + c) % shape[2], axis=0)
+        return value
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
         """One tuple per bin whose directions are above the surface; wi stands at phi_i = 0.
@@ -113,19 +115,45 @@ class MerlTable(IntegratedTable):
         The weight is the bin's share of d_wi d_wo = 4 cos(theta_d) d_wh d_wd (Rusinkiewicz 1998), in sr^2.
         """
         shape = self._measured.shape
-        i, j, k = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
+        i, j, k = np.ogrid[tuple(slice(0, n) for n in shape)]
         theta_h = ((i + 0.5) / shape[0]) ** 2 * np.pi / 2
         theta_d, phi_d = (j + 0.5) / shape[1] * np.pi / 2, (k + 0.5) / shape[2] * np.pi
-        wi, wo = directions_of(theta_h, theta_d, phi_d)
-        exists = (wi[..., 2] > 0) & (wo[..., 2] > 0)
+        wi, wo, exists = _above_horizon(theta_h, theta_d, phi_d)
         cell_h = (((i + 1) / shape[0]) ** 2 - (i / shape[0]) ** 2) * np.pi / 2
         turns = 2 * np.pi * 2  # phi_h runs round, and phi_d + pi is the same bin
         cell_d = (np.pi / 2 / shape[1]) * (np.pi / shape[2]) * np.sin(theta_d)
         weight = 4 * np.cos(theta_d) * np.sin(theta_h) * cell_h * cell_d * turns
-        f = np.moveaxis(self._raw, 0, -1)[exists] * SCALES
+        f = np.empty((len(wi), 3))
+        for channel, (plane, scale) in enumerate(zip(self._raw, SCALES, strict=True)):
+            np.multiply(plane[exists], scale, out=f[:, channel])
         shadowed = np.asarray((f < 0).any(axis=1))
-        wi, wo = _turned_to_phi_0(wi[exists], wo[exists])
-        return collect(wi, wo, f, weight[exists], self.info, shadowed, max_count)
+        return collect(wi, wo, f, np.broadcast_to(weight, shape)[exists], self.info, shadowed, max_count)
+
+
+def _between(unit: Floats, count: int) -> tuple[Indices, Floats]:
+    """The bin centre at or before the place `unit` in [0, 1], from -1 on, and the share of the next one."""
+    place = unit * count - 0.5
+    low = np.floor(place)
+    return low.astype(np.int64), np.asarray(place - low)
+
+
+def _above_horizon(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Flags]:
+    """wi (N, 3) at phi_i = 0 and wo (N, 3) of the half and difference angles' grid where both are above the surface.
+
+    Written out by component: a million bins as whole (..., 3) arrays take four times the memory.
+    """
+    across, along = np.cos(theta_h) * np.sin(theta_d) * np.cos(phi_d), np.sin(theta_h) * np.cos(theta_d)
+    up, tilt = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
+    exists = np.asarray((up - tilt > 0) & (up + tilt > 0))
+    wi, wo = np.zeros((2, int(exists.sum()), 3))
+    wi[:, 2], wo[:, 2] = (up - tilt)[exists], (up + tilt)[exists]
+    x_i, x_o = (along + across)[exists], (along - across)[exists]
+    y_i = np.broadcast_to(np.sin(theta_d) * np.sin(phi_d), exists.shape)[exists]  # and y_o = -y_i, as phi_h = 0
+    sin_i = np.hypot(x_i, y_i, out=wi[:, 0])
+    c = np.divide(x_i, sin_i, out=np.ones_like(x_i), where=sin_i > 0)
+    s = np.divide(y_i, sin_i, out=np.zeros_like(y_i), where=sin_i > 0)
+    wo[:, 0], wo[:, 1] = c * x_o - s * y_i, -c * y_i - s * x_o
+    return wi, wo, exists
 
 
 def half_difference_angles(wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
@@ -146,11 +174,3 @@ def directions_of(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floa
     c, s = np.cos(theta_h), np.sin(theta_h)
     wi = np.stack([c * d[..., 0] + s * d[..., 2], d[..., 1], c * d[..., 2] - s * d[..., 0]], axis=-1)
     return wi, reflect(wi, direction(theta_h, 0.0))
-
-
-def _turned_to_phi_0(wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
-    """The pair turned about n so that wi lies in the x-z plane."""
-    sin_theta = np.hypot(wi[:, 0], wi[:, 1])
-    c, s = (np.divide(wi[:, a], sin_theta, out=np.full(len(wi), 1.0 - a), where=sin_theta > 0) for a in (0, 1))
-    turned = np.stack([c * wo[:, 0] + s * wo[:, 1], c * wo[:, 1] - s * wo[:, 0], wo[:, 2]], axis=-1)
-    return np.stack([sin_theta, np.zeros_like(sin_theta), wi[:, 2]], axis=-1), turned

@@ -71,6 +71,20 @@ def _quadrature() -> Floats:
     return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
 
 
+def isotropic_brdf(path: Path, reader: str, sizes: dict[str, int], notes: tuple[str, ...]) -> TableInfo:
+    """What a file says about itself that holds f of an opaque isotropic material, as linear RGB."""
+    return TableInfo(
+        file=Path(path).name,
+        format=reader,
+        isotropic=True,
+        transmits=False,
+        channels=3,
+        stored="f",
+        sizes=sizes,
+        notes=notes,
+    )
+
+
 def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:
     """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, in cells.
 

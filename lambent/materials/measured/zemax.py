@@ -167,16 +167,16 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
 def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Values with NaN where a channel is 0, which is how the format's writers say that nothing was measured."""
     with np.errstate(invalid="ignore"):
-        empty = np.asarray((values == 0).any(axis=-1))
-        values = np.where(empty[..., None] | (np.abs(values) > LARGEST_F), np.nan, values)
+        empty = np.any(values == 0, axis=-1, keepdims=True)
+        values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, values)
     return values, ("a BSDF of exactly 0 counts as not measured",) if empty.any() else ()
 
 
 def _rgb(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     rgb = xyz_to_rgb(values)
     with np.errstate(invalid="ignore"):
-        outside = (rgb < 0).any(axis=-1) & (values >= 0).all(axis=-1)
-    rgb = np.where(outside[..., None], np.maximum(rgb, 0), rgb)
+        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(values >= 0, axis=-1, keepdims=True)
+    rgb = np.where(outside, np.maximum(rgb, 0), rgb)
     notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
     if outside.any():
         notes += (f"{int(outside.sum())} values are more saturated than Rec.709; the negative channel became 0",)
