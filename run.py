@@ -23,6 +23,7 @@ VENV = HOME / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 STAMP = VENV / "lambent-ready.json"
 PYTHONS = ((3, 11), (3, 12), (3, 13))  # those that every dependency has ready-made packages for
+VALIDATOR = "gltf-validator@2.0.0-dev.3.10"  # of npm, without dependencies; tests that need it skip where it is not
 WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
 
 
@@ -84,6 +85,8 @@ def set_up(for_tests):
     STAMP.unlink(missing_ok=True)
     make_venv()
     install_package(for_tests)
+    if for_tests:
+        install_validator()
     install_system_parts(for_tests)
     STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
 
@@ -91,7 +94,7 @@ def set_up(for_tests):
 def fingerprint():
     """Changes whenever the installation has to be done again: requirements, Python, or the place of this folder."""
     parts = [(HOME / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")]
-    parts += [sys.version.encode(), str(HOME).encode()]
+    parts += [sys.version.encode(), str(HOME).encode(), VALIDATOR.encode()]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 
 
@@ -127,6 +130,16 @@ def install_package(for_tests):
     pip = [PYTHON, "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
     pip += [] if sys.stderr.isatty() else ["--quiet"]
     call([*pip, "-c", HOME / "constraints.txt", "-e", what], "installation failed; is there a network connection?")
+
+
+def install_validator():
+    """Khronos's glTF validator into .venv/node, where there is npm; without it the tests say what they skip."""
+    npm = shutil.which("npm")
+    if npm is None:
+        return
+    options = ["--prefix", VENV / "node", "--no-save", "--no-package-lock", "--no-audit", "--no-fund", "--silent"]
+    if subprocess.call([npm, "install", *options, VALIDATOR], stdout=subprocess.DEVNULL) != 0:
+        say(f"npm could not install {VALIDATOR}; the tests that need it will skip")
 
 
 def install_system_parts(for_tests):

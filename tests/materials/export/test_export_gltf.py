@@ -1,0 +1,122 @@
+"""glTF files are valid, say what they claim, and brush the right way."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material, material_from
+from lambent.materials.export.gltf import GltfMaterial, likeness, write
+from lambent.materials.export.pairs import pairs_of
+from lambent.materials.measured.synthetic import Setup, synthesise
+from lambent.materials.models import model_named
+from tests.materials.export.export_materials import ALL, BRUSHED, GOLD, PAPER, PLASTIC
+
+ROOT = Path(__file__).parents[3]
+VALIDATOR = ROOT / ".venv" / "node" / "node_modules" / "gltf-validator"
+ASK = """
+const validator = require(process.argv[1]), fs = require("fs");
+const all = process.argv.slice(2).map(f => validator.validateBytes(new Uint8Array(fs.readFileSync(f))));
+Promise.all(all).then(reports => console.log(JSON.stringify(reports.map(r => r.issues))));
+"""
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gltf")
+    paths = {}
+    for i, (name, material) in enumerate(ALL.items()):
+        paths[name] = folder / f"{i}{('.gltf', '.glb')[i % 2]}"
+        write(material, paths[name])
+    return paths
+
+
+def test_the_validator_finds_nothing(files):
+    if shutil.which("node") is None or not VALIDATOR.is_dir():
+        pytest.skip("gltf-validator is not installed: `python3 run.py test` does it where there is npm")
+    command = ["node", "-e", ASK, str(VALIDATOR), *map(str, files.values())]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    for name, issues in zip(files, json.loads(answer.stdout), strict=True):
+        assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), (name, issues["messages"])
+
+
+def test_trimesh_opens_them(files):
+    trimesh = pytest.importorskip("trimesh")
+    for path in files.values():
+        mesh = trimesh.load(path, force="mesh")
+        assert mesh.is_volume or trimesh.Trimesh(mesh.vertices, mesh.faces, process=True).volume > 0
+        assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.1**3, rel=0.01)
+
+
+def test_the_exact_material_travels_along(files, tmp_path):
+    path = tmp_path / "x.gltf"
+    write(PAPER, path)
+    extras = json.loads(path.read_text())["materials"][0]["extras"]
+    assert material_from(extras["lambent_material"], path) == PAPER
+
+
+def test_what_is_a_gltf_material_comes_back():
+    """Plastic of GGX facets without masking trouble: low roughness, theta in the middle; F0 and colours are found."""
+    fitted, cost = likeness(Material(kd=(0.4, 0.2, 0.1)))
+    assert fitted.metallic == 0
+    np.testing.assert_allclose(fitted.base, (0.4, 0.2, 0.1), rtol=0.01)
+    assert cost.share["l1"] < 0.005 and cost.lost == ()
+    fitted, cost = likeness(GOLD)
+    assert fitted.metallic > 0.9 and 0.15 < fitted.roughness**2 < 0.22
+    assert cost.share["cuberoot"] < 0.12
+
+
+def test_metal_of_the_specification_equals_our_ggx():
+    pairs = pairs_of(BRUSHED, 10, seed=3)
+    narrow, strength = 0.09, 0.5
+    wide = narrow + (1 - narrow) * strength**2
+    metal = GltfMaterial(np.array([0.7]), np.ones(1), np.ones(1), metallic=1, roughness=0.3, strength=strength)
+    expected = model_named("ggx")(f0=0.7, alpha_x=wide, alpha_y=narrow).eval(pairs.samples.wi, pairs.samples.wo)
+    np.testing.assert_allclose(metal.eval(pairs), expected[:, :1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("mx", "my"), [(0.25, 0.05), (0.05, 0.25)])
+def test_the_rough_axis_stays_where_it_is(mx, my, tmp_path):
+    """Rotation 0 is rough along the tangent, which on the sphere is t; 90 degrees along n x t."""
+    path = tmp_path / "x.gltf"
+    write(Material(lobes=(Lobe(distribution="ggx", k=0.9, r0=0.9, mx=mx, my=my, alpha=0.4),)), path)
+    document = json.loads(path.read_text())
+    anisotropy = document["materials"][0]["extensions"]["KHR_materials_anisotropy"]
+    assert anisotropy.get("anisotropyRotation", 0) == pytest.approx(0 if mx > my else np.pi / 2)
+    narrow = document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] ** 2
+    wide = narrow + (1 - narrow) * anisotropy["anisotropyStrength"] ** 2
+    assert narrow == pytest.approx(0.05, rel=0.3) and wide == pytest.approx(0.25, rel=0.3)
+    buffer = base64.b64decode(document["buffers"][0]["uri"].partition(",")[2])
+
+    def floats(index, width):
+        view = document["bufferViews"][index]
+        data = np.frombuffer(buffer, "<f4", view["byteLength"] // 4, view["byteOffset"])
+        return data.reshape(-1, width)
+
+    normals, tangents = floats(2, 3), floats(3, 4)
+    assert (tangents[:, 3] == 1).all()
+    np.testing.assert_allclose(np.sum(normals * tangents[:, :3], axis=1), 0, atol=1e-6)
+    bitangents = np.cross(normals, tangents[:, :3])
+    assert (bitangents[np.abs(normals[:, 1]) < 0.99, 1] > 0).all()  # t runs round the axis, n x t up
+
+
+def test_losses_are_said():
+    cost = likeness(ALL["4 % foil"])[1]
+    assert any("share one roughness" in line for line in cost.lost)
+    assert any("Beckmann" in line for line in cost.lost)
+    assert any("2 lobes of reflection became one" in line for line in likeness(BRUSHED)[1].lost)
+    assert set(cost.errors) == set(cost.share) == {"l1", "l2_ngan", "cuberoot", "log"}
+    assert likeness(PLASTIC)[1].share["cuberoot"] < 0.1
+
+
+def test_a_table_is_refused(tmp_path):
+    table = synthesise(PLASTIC, Setup((0, 40), step_deg=15, fine_deg=15))
+    with pytest.raises(UserError, match="lambent fit"):
+        write(table, tmp_path / "x.gltf", lambda *_: None)

@@ -1,0 +1,49 @@
+"""The facets are those of the models known elsewhere, and the pairs weigh what they stand for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.materials.export.pairs import pairs_of
+from lambent.materials.models import model_named
+from tests.materials.export.export_materials import BRUSHED, FOIL, PLASTIC
+
+
+def test_facets_equal_the_ggx_model():
+    pairs = pairs_of(BRUSHED, 10, seed=3)
+    model = model_named("ggx")(f0=1.0, alpha_x=0.3, alpha_y=0.1)
+    expected = model.eval(pairs.samples.wi, pairs.samples.wo)[:, 0]
+    np.testing.assert_allclose(pairs.facets(0.3, 0.1), expected, rtol=1e-9)
+
+
+def test_facets_have_our_distributions():
+    """With masking and cosines divided out, what is left is the lobe of exponent 0."""
+    for distribution in ("ggx", "beckmann"):
+        lobe = Lobe(distribution=distribution, mx=0.3, my=0.1, r0=1.0)
+        pairs = pairs_of(Material(lobes=(lobe,)), 10, seed=3)
+        masking = pairs._masking(0.3, 0.1, "separable", distribution)
+        d = pairs.facets(0.3, 0.1, "separable", distribution) / masking * pairs.wi[2] * pairs.wo[2]
+        np.testing.assert_allclose(d / pairs.cos_d, pairs.samples.f[:, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("material", [PLASTIC, FOIL], ids=lambda m: m.name)
+def test_weights_integrate_to_the_albedo(material):
+    """Mean over theta_i of the albedo, by the pairs and by importance sampling."""
+    samples = pairs_of(material, 14, seed=1).samples
+    theta = np.radians(np.linspace(0, 84, 43)[:-1] + 1)
+    phi = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    wo = np.stack(
+        np.broadcast_arrays(
+            np.sin(theta)[:, None] * np.cos(phi),
+            np.sin(theta)[:, None] * np.sin(phi),
+            np.cos(theta)[:, None] + 0 * phi,
+        ),
+        axis=-1,
+    )
+    albedo = MaterialBSDF(material).albedo(wo, samples=1024).mean(axis=(0, 1))[: samples.f.shape[1]]
+    total = (samples.weight * np.abs(samples.wo[:, 2])) @ samples.f / 2**14
+    np.testing.assert_allclose(total, albedo, rtol=0.05)  # the pairs leave out what is beyond 84 degrees
+    assert (total < 1.02 * albedo).all()
