@@ -60,15 +60,15 @@ def _register(variant: str) -> None:
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             material = self._enabled(ctx)
-            tangent = self._tangent(si, active)
-            wo = _turned(si.wi, tangent)
+            tangent = brushing_angle(si, active, self.anisotropic)
+            wo = turned(si.wi, tangent)
             wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, dr)
             density = bsdf.pdf(wi, wo, material, dr)
             active &= density > 0
             value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
 
             bs = mi.BSDFSample3f()
-            bs.wo = mi.Vector3f(_turned(wi, (tangent[0], -tangent[1])))
+            bs.wo = mi.Vector3f(turned(wi, (tangent[0], -tangent[1])))
             bs.pdf = dr.select(active, density, 0.0)
             bs.eta = 1.0
             bs.sampled_component, bs.sampled_type = self._component(sample1, wo, material)
@@ -82,8 +82,8 @@ def _register(variant: str) -> None:
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             material = self._enabled(ctx)
-            tangent = self._tangent(si, active)
-            viewer, light = _turned(si.wi, tangent), _turned(wo, tangent)
+            tangent = brushing_angle(si, active, self.anisotropic)
+            viewer, light = turned(si.wi, tangent), turned(wo, tangent)
             value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
             density = bsdf.pdf(light, viewer, material, dr)
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
@@ -99,16 +99,6 @@ def _register(variant: str) -> None:
             on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
             return self.material if all(on) else _masked(self.material, on)
 
-        def _tangent(self, si: Any, active: Any) -> tuple[Any, Any]:
-            """Cosine and sine of the angle from the s axis of the shading frame to the brushing direction."""
-            if not self.anisotropic:
-                return 1.0, 0.0
-            brushed = active & si.shape.has_attribute(TANGENT_ATTRIBUTE)
-            t = si.to_local(si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, si, brushed))
-            length = dr.sqrt(t.x * t.x + t.y * t.y)
-            brushed &= length > 1e-6
-            return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
-
         def _component(self, sample1: Any, wo: Any, material: Material) -> tuple[Any, Any]:
             """Index and flags of the component that `bsdf.sample` chose."""
             index, flags = mi.UInt32(0), mi.UInt32(self.m_components[0])
@@ -123,7 +113,20 @@ def _register(variant: str) -> None:
     mi.register_bsdf(PLUGIN, MaterialBSDF)
 
 
-def _turned(w: Any, angle: tuple[Any, Any]) -> tuple[Any, Any, Any]:
+def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
+    """Cosine and sine of the angle from the s axis of the shading frame to the brushing direction."""
+    import drjit as dr
+
+    if not anisotropic:
+        return 1.0, 0.0
+    brushed = active & si.shape.has_attribute(TANGENT_ATTRIBUTE)
+    t = si.to_local(si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, si, brushed))
+    length = dr.sqrt(t.x * t.x + t.y * t.y)
+    brushed &= length > 1e-6
+    return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
+
+
+def turned(w: Any, angle: tuple[Any, Any]) -> tuple[Any, Any, Any]:
     """Components of `w` in a frame turned about n by the angle of this cosine and sine."""
     c, s = angle
     return c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]

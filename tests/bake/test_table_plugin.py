@@ -1,0 +1,185 @@
+"""A table in the path tracer says what the table says, samples what its density says, and agrees with Mitsuba's own."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.engine import engine
+from lambent.bake.table_plugin import table_dict
+from lambent.core.errors import UserError
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF, components
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured import half_vector_grid, load
+from lambent.materials.measured.half_vector_grid import GridShape, grid_of
+from lambent.materials.measured.protocol import TableInfo
+
+SATIN = Path(os.environ.get("LAMBENT_DATA", Path(__file__).parents[3] / "shared" / "data")) / "measured" / "rgl"
+SMALL = GridShape(8, 8, 64, 32)
+
+
+class Exact:
+    """A table without gaps: a material document that offers what measured tables offer."""
+
+    def __init__(self, material: Material, isotropic: bool) -> None:
+        self.bsdf = MaterialBSDF(material)
+        self.info = TableInfo(material.name, "exact", isotropic, material.transmits, 3, "f")
+
+    def eval(self, wi, wo):
+        return self.bsdf.eval(wi, wo)
+
+
+SHEET = Material(
+    kd=(0.1, 0.2, 0.3),
+    lobes=(
+        Lobe(mx=0.3, my=0.1, k=(0.5, 0.6, 0.7), r0=0.6, alpha=0.3),
+        Lobe(side="transmission", mx=0.2, my=0.4, k=0.5, r0=0.1, alpha=0.2),
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def mi():
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    import mitsuba
+
+    return mitsuba
+
+
+@pytest.fixture(scope="module")
+def sheet(mi):
+    grid = grid_of(Exact(SHEET, isotropic=False), SMALL)
+    return grid, mi.load_dict(table_dict(grid))
+
+
+def interaction(mi, wo):
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.wi = mi.Vector3f(np.ascontiguousarray(wo.T, np.float32))
+    return si
+
+
+def random_directions(n, seed, lowest_cosine=0.05, both=True):
+    rng = np.random.default_rng(seed)
+    cosine = rng.uniform(lowest_cosine, 1, n) * (rng.choice([-1, 1], n) if both else 1)
+    return direction(np.arccos(cosine), rng.uniform(0, 2 * np.pi, n)).astype(np.float32)
+
+
+def test_eval_and_pdf_equal_numpy(mi, sheet):
+    grid, plugin = sheet
+    wi, wo = random_directions(10_000, 1), random_directions(10_000, 2)
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    pair = components(wi), components(wo)
+    expected = np.stack(half_vector_grid.evaluate(*pair, grid), axis=-1) * np.abs(wi[:, 2:])
+    np.testing.assert_allclose(np.array(value).T, expected, rtol=2e-4, atol=1e-6)
+    differs = np.abs(np.array(density) - half_vector_grid.pdf(*pair, grid)) > 1e-4 * np.array(density)
+    assert differs.mean() < 1e-3  # float32 may see a half vector on the border of a cell in the next one
+
+
+def test_sample_agrees_with_eval_pdf_and_numpy(mi, sheet):
+    grid, plugin = sheet
+    wo, u = random_directions(10_000, 3), np.random.default_rng(4).random((10_000, 3)).astype(np.float32)
+    si, context = interaction(mi, wo), mi.BSDFContext()
+    bs, weight = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+    value, density = (np.array(a).T for a in plugin.eval_pdf(context, si, bs.wo))
+    kept = np.array(bs.pdf) > 0
+    assert kept.mean() > 0.9
+    agrees = np.abs(np.array(weight).T * density[:, None] - value).max(axis=1) < 1e-3 * value.max(axis=1)
+    assert agrees[kept].mean() > 0.998
+    expected = np.stack(half_vector_grid.sample(components(wo), *u.T.astype(float), grid), axis=-1)
+    assert (np.linalg.norm(np.array(bs.wo).T - expected, axis=1)[kept] < 1e-3).mean() > 0.998
+
+
+@pytest.mark.parametrize("theta_deg", [0.0, 50.0, 120.0])
+def test_chi_square(mi, sheet, theta_deg, tmp_path, monkeypatch):
+    import drjit as dr
+    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+
+    _, plugin = sheet
+    context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
+
+    def sample_func(u):
+        si = interaction(mi, np.tile(wo, (u.shape[1], 1)))
+        bs, _ = plugin.sample(context, si, u[0], mi.Point2f(u[1], u[2]))
+        return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
+
+    def pdf_func(w):
+        return plugin.pdf(context, interaction(mi, np.tile(wo, (dr.width(w), 1))), w)
+
+    monkeypatch.chdir(tmp_path)  # a failing test writes its data to the working folder
+    test = ChiSquareTest(SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, ires=32)
+    assert test.run(), test.messages
+
+
+def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
+    """White furnace of a Lambertian table: sum of .5 (1/2)^n."""
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 40, "rr_depth": 100},
+            "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+            "box": {
+                "type": "cube",
+                "flip_normals": True,
+                "bsdf": table_dict(Exact(Material(kd=0.5), isotropic=True), shape=GridShape(8, 1, 32, 16)),
+                "emitter": {"type": "area", "radiance": 0.5},
+            },
+        }
+    )
+    assert np.array(mi.render(scene, spp=256)).mean() == pytest.approx(1.0, abs=0.003)
+
+
+def test_vertex_tangent_is_the_brushing_direction(mi, sheet, tmp_path):
+    grid, _ = sheet
+    t, b = np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0])
+    mesh = mi.Mesh("square", 4, 2)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
+    parameters["faces"] = [0, 1, 2, 0, 2, 3]
+    parameters.update()
+    mesh.add_attribute("vertex_tangent", 3, list(t) * 4)
+    mesh.write_ply(str(tmp_path / "square.ply"))
+    square = {"type": "ply", "filename": str(tmp_path / "square.ply"), "bsdf": table_dict(grid)}
+    scene = mi.load_dict({"type": "scene", "square": square})
+    wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo)))
+    frame = np.stack([t, b, [0, 0, 1]])
+    expected = np.array(half_vector_grid.evaluate(components(frame @ wi), components(frame @ wo), grid)) * wi[2]
+    value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
+    np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-3)
+
+
+def test_components_are_the_two_sides(mi, sheet):
+    _, plugin = sheet
+    assert plugin.component_count() == 2 and mi.has_flag(plugin.flags(), mi.BSDFFlags.GlossyTransmission)
+    wi, wo = random_directions(1000, 5), random_directions(1000, 6)
+    values = []
+    for i in (0, 1):
+        context = mi.BSDFContext()
+        context.component = i
+        values.append(np.array(plugin.eval(context, interaction(mi, wo), mi.Vector3f(wi.T))).T.max(axis=1) > 0)
+    across = wi[:, 2] * wo[:, 2] < 0
+    assert values[0][~across].all() and not values[0][across].any()
+    assert values[1][across].any() and not values[1][~across].any()
+
+
+@pytest.mark.skipif(not SATIN.is_dir(), reason="no measured files beside the checkout")
+def test_an_rgl_file_is_mitsubas_own_measured(mi):
+    """To the .5 % of the resampling. Mitsuba gives the file the viewer where we give it the light."""
+    file = SATIN / "satin_rosaline_rgb.bsdf"
+    ours = mi.load_dict(table_dict(load(file)))
+    theirs = mi.load_dict({"type": "measured", "filename": str(file)})
+    wi, wo = random_directions(50_000, 7, 0.1, both=False), random_directions(50_000, 8, 0.1, both=False)
+    context = mi.BSDFContext()
+    got = np.array(ours.eval(context, interaction(mi, wo), mi.Vector3f(wi.T))).T / wi[:, 2:]
+    expected = np.array(theirs.eval(context, interaction(mi, wi), mi.Vector3f(wo.T))).T / wo[:, 2:]
+    assert np.abs(got - expected).sum() < 0.01 * expected.sum()
