@@ -5,7 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
+import wgpu
 
 from lambent.core.errors import UserError
 from lambent.realtime.baked import read_baked
@@ -13,7 +16,7 @@ from lambent.realtime.device import open_device
 from lambent.realtime.frame import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.store.store import Store
-from lambent.viewer.input import Input
+from lambent.viewer.input import Input, Rect
 from lambent.viewer.picking import Geometry
 from lambent.viewer.picture import CHOICES, Picture
 from lambent.viewer.state import Mode, ViewerState
@@ -21,6 +24,7 @@ from lambent.viewer.state import Mode, ViewerState
 MODES: dict[str, Mode] = {"walk": "walk", "view": "orbit"}
 MAX_FPS = 60
 BEFORE_IMGUI = -100  # its own handlers stand at -99 and stop what they use, so that ours would not see a hover
+POLL_S = 0.1  # between two looks at what the editor does in the background
 SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
 FOR_IMGUI_ONLY = ("char", "resize", "pointer_leave")
 EVENTS = ("pointer_down", "pointer_move", "pointer_up", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
@@ -74,6 +78,21 @@ def check_display() -> None:
             raise UserError("no display", hint="use `lambent render`, or `lambent demo --headless`")
 
 
+class Drawing(Protocol):
+    """What the window shows a state by: `Picture`, or the editor's `Stage`."""
+
+    device: Any
+
+    @property
+    def views(self) -> tuple[Any, ...]: ...
+
+    def update(self, state: ViewerState, rect: Rect, pixel_ratio: float) -> None: ...
+
+    def wait_s(self, state: ViewerState) -> float | None: ...
+
+    def save(self, state: ViewerState) -> None: ...
+
+
 class FirstError:
     """Keeps the first error raised inside it and calls `then`; the event loop would log it and go on."""
 
@@ -99,7 +118,7 @@ class Window:
         self,
         state: ViewerState,
         geometry: Geometry,
-        picture: Picture,
+        picture: Drawing,
         *,
         size: tuple[int, int],
         frames: int | None = None,
@@ -121,8 +140,8 @@ class Window:
         self._imgui.set_gui(self._gui)
         layout.set_style()
         self._context = context
-        self._registered: Any = None  # the picture's view that `_texture` stands for
-        self._texture: Any = None
+        self._textures: dict[str, Any] = {}  # what Dear ImGui knows, by the names that the layout uses
+        self._made_of: dict[str, Any] = {}  # name -> the view or the array that its texture shows
         self._input = Input(geometry, layout.picture_rect(state, *size))
         self._popup_open = False
         self._extra_frames = 0
@@ -131,11 +150,13 @@ class Window:
         self._wake_at_s: float | None = None
         self._failed = FirstError(then=lambda: loop.call_soon(self.canvas.close))
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
+        self._take_dropped_files()
 
     def run(self) -> None:
         """Show the window until it is closed; raises what went wrong meanwhile."""
         self.canvas.request_draw(self._draw)
         self._loop.run()
+        self.state.close_editor()
         if self._failed.error is not None:
             raise self._failed.error
 
@@ -163,6 +184,8 @@ class Window:
         self._input.walk(state, dt_s)
         state.play(dt_s)
         state.drop_old_messages()
+        if state.editor is not None:
+            state.editor.tick()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
 
     def _show(self) -> None:
@@ -178,16 +201,43 @@ class Window:
         self._imgui.render()
 
     def _register(self) -> None:
-        """Tell Dear ImGui of the picture's texture, where that is a new one."""
-        if self._registered is self._picture.view:
-            return
-        if self._texture is not None:
-            self._imgui.backend.unregister_texture(self._texture)
-        self._registered = self._picture.view
-        self._texture = self._imgui.backend.register_texture(self._registered)
+        """Tell Dear ImGui of the pictures' textures, and of the editor's, where they are new ones."""
+        wanted: dict[str, Any] = {f"picture {'AB'[i]}": view for i, view in enumerate(self._picture.views)}
+        if self.state.editor is not None:
+            wanted |= self.state.editor.shown.images
+        for name in [name for name in self._textures if self._made_of[name] is not wanted.get(name)]:
+            self._imgui.backend.unregister_texture(self._textures.pop(name))
+            del self._made_of[name]
+        for name, source in wanted.items():
+            if name not in self._textures:
+                view = self._uploaded(source) if isinstance(source, np.ndarray) else source
+                self._textures[name], self._made_of[name] = self._imgui.backend.register_texture(view), source
+
+    def _uploaded(self, image: np.ndarray[Any, np.dtype[np.uint8]]) -> Any:
+        """View of a texture that holds an RGBA picture (H, W, 4)."""
+        height, width = image.shape[:2]
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        texture = self._device.create_texture(size=(width, height, 1), format="rgba8unorm", usage=usage)
+        layout = {"bytes_per_row": 4 * width, "rows_per_image": height}
+        self._device.queue.write_texture({"texture": texture}, image, layout, (width, height, 1))
+        return texture.create_view()
+
+    def _take_dropped_files(self) -> None:
+        """Files dropped onto the window are for the editor; the canvas has no event for that."""
+        import glfw
+
+        def dropped(_: object, paths: Any) -> None:
+            with self._failed:
+                for path in paths:
+                    if self.state.editor is not None:
+                        self.state.editor.open(path)
+            self._extra_frames = SETTLE_FRAMES
+            self.canvas.request_draw()
+
+        glfw.set_drop_callback(self.canvas._window, dropped)  # type: ignore[arg-type]
 
     def _gui(self) -> None:
-        self._popup_open = self._layout.draw(self.state, self._texture)
+        self._popup_open = self._layout.draw(self.state, self._textures)
 
     def _clear(self) -> None:
         encoder = self._device.create_command_encoder()
@@ -207,6 +257,8 @@ class Window:
         if self._moving or self._extra_frames or self._frames is not None:
             self.canvas.request_draw()
         waits = [m.until_s - self.state.clock() for m in self.state.messages]
+        if self.state.editor is not None and self.state.editor.busy:
+            waits.append(POLL_S)
         due = self._picture.wait_s(self.state)
         if due is not None:
             waits.append(due)

@@ -33,6 +33,18 @@ SHORTCUTS = (
     ("H", "hide or show the panels"),
 )
 
+PREVIEW_SHORTCUTS = (
+    ("left drag", "turn about the shape"),
+    ("right, middle drag", "shift the view"),
+    ("wheel", "nearer, or away"),
+    ("1", "the first view again"),
+    ("Ctrl+click on a slider", "type a number"),
+    ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
+    ("Ctrl+S", "save the material"),
+    ("P", "save the picture (PNG and EXR)"),
+    ("H", "hide or show everything but the picture"),
+)
+
 
 @dataclass(frozen=True)
 class Rect:
@@ -123,6 +135,8 @@ class Input:
         was_click = self._button == LEFT and self._moved_px < CLICK_PX
         self._button = None
         if was_click:
+            if state.preview is not None:
+                return  # there is nothing else to select
             x, y = event["x"] - self.picture.x, event["y"] - self.picture.y
             found = self.geometry.pick(*ray_through(state.camera, x, y, self.picture.width, self.picture.height))
             state.select(found.name if found else None)
@@ -134,16 +148,21 @@ class Input:
                 state.edits.redo()
             elif letter == "z":
                 state.edits.undo()
+            elif letter == "s" and state.editor is not None:
+                state.editor.save()
+        elif letter == "p":
+            state.screenshot_wanted = True
+        elif letter == "h":
+            state.panels_shown = not state.panels_shown
+        elif state.preview is not None:
+            if letter == "1":
+                state.jump(state.scene.cameras[0])
         elif letter in cameras.KEYS:
             self.held.add(letter)
         elif letter == "f":
             state.flying = not state.flying
         elif letter == "o":
             state.mode = "walk" if state.mode == "orbit" else "orbit"
-        elif letter == "p":
-            state.screenshot_wanted = True
-        elif letter == "h":
-            state.panels_shown = not state.panels_shown
         elif letter == "Escape":
             state.select(None)
         elif letter in "123456789" and int(letter) <= len(state.scene.cameras):

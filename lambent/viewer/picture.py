@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import wgpu
 
 from lambent.core.colour import srgb_decode
 from lambent.core.images import write_image
+from lambent.materials.document import Material
 from lambent.realtime.device import adapter_info
 from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS
@@ -48,10 +50,18 @@ class Picture:
         self.view: Any = None
         self._size: tuple[int, int] = (0, 0)
 
-    def update(self, state: ViewerState, rect: Rect, pixel_ratio: float) -> None:
-        """Draw the next frame where one is due."""
+    @property
+    def views(self) -> tuple[Any, ...]:
+        return (self.view,)
+
+    def update(
+        self, state: ViewerState, rect: Rect, pixel_ratio: float, materials: Mapping[str, Material] | None = None
+    ) -> None:
+        """Draw the next frame where one is due; `materials` stand in for the state's edited ones."""
         width, height = (min(round(size * pixel_ratio), LARGEST_PX) for size in (rect.width, rect.height))
         wanted = frame_state(state, width, height)
+        if materials is not None:
+            wanted = replace(wanted, materials=dict(materials))
         now_s = state.clock()
         plan = self._pacer.plan(wanted, now_s, refine=state.refine, adaptive=state.adaptive_resolution)
         if plan is None:

@@ -6,12 +6,16 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.store.camera_paths import camera_at
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+
+if TYPE_CHECKING:
+    from lambent.viewer.editor.editor import Editor
+    from lambent.viewer.editor.preview import Preview
 
 Mode = Literal["orbit", "walk"]
 MESSAGE_S = 6.0
@@ -52,6 +56,16 @@ class MaterialEdits:
         self.end_stroke()
         self.change(name, self.scene[name])
         self.end_stroke()
+
+    @property
+    def in_stroke(self) -> bool:
+        """Whether something is being changed at this moment."""
+        return self._before is not None
+
+    def previous(self, name: str) -> Material | None:
+        """The material before the last stroke, or before the one under way; None where there was none."""
+        before = self._before if self._before is not None else self._undo[-1] if self._undo else None
+        return None if before is None else before.get(name, self.scene[name])
 
     @property
     def can_undo(self) -> bool:
@@ -135,6 +149,7 @@ class ViewerState:
     reveal_selected: bool = False  # the list of objects has yet to scroll to it
     linked_roughness: bool = True  # mx and my keep their ratio
     file_names: dict[str, str] = field(default_factory=dict)  # material -> where it is saved
+    typed_measurement: str = ""  # path of a file to compare the selected material with
     path: PathPlay | None = None
     missing: tuple[str, ...] = ()  # what the store lacks
     refine: bool = True  # accumulate while nothing moves
@@ -143,6 +158,8 @@ class ViewerState:
     screenshot_wanted: bool = False
     statistics: Statistics = field(default_factory=Statistics)
     messages: list[Message] = field(default_factory=list)
+    preview: Preview | None = None  # where the picture is one, and no scene
+    editor: Editor | None = None  # of one of the materials, with a measurement
     folder: Path = field(default_factory=Path)
     clock: Callable[[], float] = time.monotonic
 
@@ -166,6 +183,12 @@ class ViewerState:
 
     def jump(self, camera: CameraRecord) -> None:
         self.camera, self.path = camera, None
+
+    def close_editor(self) -> None:
+        """Close the editor; the material stays as it is."""
+        if self.editor is not None:
+            self.editor.close()
+        self.editor = None
 
     @property
     def playing(self) -> bool:

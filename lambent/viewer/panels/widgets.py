@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 from imgui_bundle import imgui
@@ -11,9 +11,10 @@ from imgui_bundle import imgui
 from lambent.core.colour import srgb_decode, srgb_encode
 
 RGB = tuple[float, float, float]
+Word = TypeVar("Word", bound=str)
 
 
-def choice(label: str, value: str, options: Sequence[str]) -> str:
+def choice(label: str, value: Word, options: Sequence[Word]) -> Word:
     """A drop-down list."""
     _, index = imgui.combo(label, options.index(value), list(options))
     return options[index]
@@ -53,6 +54,17 @@ def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
     explain(meaning)
     imgui.pop_id()
     return value
+
+
+def path_field(label: str, text: str, button: str, *, hint: str = "path of a file") -> tuple[str, bool]:
+    """A field for a path with a button at its end; returns the text and whether it is to be opened now."""
+    room = imgui.calc_text_size(button).x + 2 * imgui.get_style().frame_padding.x + imgui.get_style().item_spacing.x
+    imgui.set_next_item_width(-room)
+    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.elide_left
+    entered, text = imgui.input_text_with_hint(f"##{label}", hint, text, flags)
+    imgui.same_line()
+    pressed = imgui.button(f"{button}##{label}", (-1, 0))
+    return text, bool(entered or pressed)
 
 
 def explain(text: str) -> None:

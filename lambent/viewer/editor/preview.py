@@ -1,0 +1,113 @@
+"""What a material is shown on without a scene: shapes, and the light around them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.colour import luminance
+from lambent.core.cubemap import face_directions, texel_solid_angles
+from lambent.core.errors import UserError
+from lambent.core.frames import normalize
+from lambent.core.images import read_image
+from lambent.materials.document import Material
+from lambent.scenes import environments
+from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
+from lambent.scenes.scene import Mesh
+from lambent.store.contract import CameraRecord, ObjectRecord, SceneRecord
+
+Floats = NDArray[np.floating]
+
+MEAN_RADIANCE = 0.35  # every environment is scaled to it, so that a change of light keeps the exposure
+LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.10, 0.16, -1.0), 7.0
+LAMP_SHARE = 1.0  # of the environment's light
+OBJECT = "preview"
+BOUNDS = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
+CAMERA = CameraRecord(name="front", position=(0.0, 0.75, 4.1), target=(0.0, 0.0, 0.0), fov_y_deg=32.0)
+
+BUILT_IN: dict[str, Callable[[], Floats]] = {
+    "studio": environments.studio,
+    "daylight": environments.daylight,
+    "dusk": environments.dusk,
+    "night": environments.night,
+}
+
+
+def _sheet() -> Mesh:
+    tilted = turn("x", -28.0) @ turn("y", 20.0)
+    return placed(patch((-0.8, -0.8, 0), (1.6, 0, 0), (0, 1.6, 0)), rotation=tilted)
+
+
+SHAPES: dict[str, Callable[[], Mesh]] = {
+    "sphere": lambda: sphere(0.95, around=96, rows=48),
+    "teapot": lambda: placed(teapot(2.1), (0.0, -0.5, 0.0)),
+    "sheet": _sheet,
+    "sheet before a lamp": _sheet,
+}
+
+
+@dataclass
+class Preview:
+    """Which shape in which light; `split` is where A ends and B begins, as a share of the picture's width."""
+
+    shape: str = "sphere"
+    environment: str = "studio"
+    files: dict[str, Path] = field(default_factory=dict)  # environments of the user, by the name in the list
+    split: float = 0.5
+
+    @property
+    def environments(self) -> tuple[str, ...]:
+        return (*BUILT_IN, *self.files)
+
+    def add(self, path: Path) -> str:
+        """List an environment; its name there."""
+        name = path.stem
+        while name in BUILT_IN or (name in self.files and self.files[name] != path):
+            name = f"{name}'"
+        self.files[name] = path
+        return name
+
+    def light(self, name: str) -> Floats:
+        """The environment (6, n, n, 3) of that name, scaled to `MEAN_RADIANCE`; `UserError` where it is none."""
+        if name in BUILT_IN:
+            cube = BUILT_IN[name]()
+        else:
+            picture = read_image(self.files[name])
+            height, width = picture.shape[:2]
+            if width != 2 * height:
+                raise UserError(
+                    "not a lat-long picture", file=self.files[name], got=f"{width}x{height}", expected="2:1"
+                )
+            cube = environments.from_lat_long(picture[..., :3])
+        cube = np.maximum(np.nan_to_num(cube, posinf=0.0, neginf=0.0), 0)
+        mean = _mean(cube)
+        if mean <= 0:
+            raise UserError("the environment is black", file=self.files.get(name))
+        return np.asarray(cube * (MEAN_RADIANCE / mean), np.float32)
+
+
+def with_lamp(cube: Floats) -> Floats:
+    """The environment with a round lamp far behind the sheet, as bright as to give as much light as all the rest."""
+    w = normalize(face_directions(cube.shape[1]))
+    cosine = np.cos(np.radians(LAMP_RADIUS_DEG))
+    inside = w @ normalize(np.array(LAMP_TOWARDS)) > cosine
+    radiance = LAMP_SHARE * 4 * np.pi * MEAN_RADIANCE / (2 * np.pi * (1 - cosine))
+    return np.asarray(np.where(inside[..., None], radiance, cube), np.float32)
+
+
+def preview_record(material: Material) -> SceneRecord:
+    """What the window's state knows of the preview: one object in one material."""
+    thing = ObjectRecord(name=OBJECT, material=material.name, first_face=0, face_count=0, bounds=BOUNDS)
+    return SceneRecord(
+        name=material.name, objects=(thing,), materials={material.name: material}, cameras=(CAMERA,), bounds=BOUNDS
+    )
+
+
+def _mean(cube: Floats) -> float:
+    """Luminance averaged over the sphere."""
+    omega = texel_solid_angles(cube.shape[1])
+    return float((luminance(cube) * omega).sum() / (4 * np.pi))

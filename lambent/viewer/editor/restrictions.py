@@ -1,0 +1,87 @@
+"""What the user fixed or narrowed for a fit, by the fit's names, following the lobes when some come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.parameters import SHAPE, Side, parameter
+
+Value = float | tuple[float, float, float]
+DIFFUSE = ("kd", "kt_d")
+
+
+def lobe_names(material: Material) -> list[dict[str, str]]:
+    """Per lobe, attribute -> name of its parameter in a fit: lobes are counted per side."""
+    counts: dict[Side, int] = {"reflection": 0, "transmission": 0}
+    names = []
+    for lobe in material.lobes:
+        index = counts[lobe.side]
+        counts[lobe.side] += 1
+        names.append({base: parameter(lobe.side, base, index) for base in ("k", *SHAPE)})
+    return names
+
+
+@dataclass
+class Restrictions:
+    """Names that are fixed at the material's values, and intervals of others."""
+
+    fixed: set[str] = field(default_factory=set)
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def fix(self, name: str, fixed: bool) -> None:
+        """Fix a parameter, or set it free; what is fixed has no interval."""
+        if fixed:
+            self.fixed.add(name)
+            self.ranges.pop(name, None)
+        else:
+            self.fixed.discard(name)
+
+    def narrow(self, name: str, interval: tuple[float, float] | None) -> None:
+        """Give a parameter an interval, or none; what has one is not fixed."""
+        if interval is None:
+            self.ranges.pop(name, None)
+        else:
+            self.ranges[name] = interval
+            self.fixed.discard(name)
+
+    def for_fit(
+        self, material: Material, lobes: int
+    ) -> tuple[dict[str, Value], dict[str, tuple[float, float]], list[str]]:
+        """`fix` and `ranges` of a fit with so many lobes a side, and the names that such a fit does not know."""
+        from lambent.materials.fitting.parameters import known_parameters
+
+        values = dict(_values(material))
+        known = set(known_parameters(lobes))
+        unknown = sorted((self.fixed | set(self.ranges)) - known | (self.fixed - set(values)))
+        fix = {name: values[name] for name in sorted(self.fixed) if name in known and name in values}
+        ranges = {name: interval for name, interval in sorted(self.ranges.items()) if name in known}
+        return fix, ranges, unknown
+
+    def follow(self, before: Material, after: Material, kept: list[int]) -> None:
+        """Rename after lobes came or went; `kept[i]` is the index that lobe i of `after` had in `before`, or -1."""
+        old, new = lobe_names(before), lobe_names(after)
+        renamed = {old[was][base]: new[now][base] for now, was in enumerate(kept) if was >= 0 for base in ("k", *SHAPE)}
+        renamed |= {name: name for name in DIFFUSE}
+        self.fixed = {renamed[name] for name in self.fixed if name in renamed}
+        self.ranges = {renamed[name]: interval for name, interval in self.ranges.items() if name in renamed}
+
+
+def _values(material: Material) -> Iterator[tuple[str, Value]]:
+    for name in DIFFUSE:
+        yield name, _plain(getattr(material, name))
+    for lobe, names in zip(material.lobes, lobe_names(material), strict=True):
+        for base, name in names.items():
+            yield name, _value(lobe, base)
+
+
+def _value(lobe: Lobe, base: str) -> Value:
+    value = getattr(lobe, base)
+    if base == "r0":  # a fit has one r0 for all channels
+        return float(sum(value) / 3)
+    return _plain(value) if isinstance(value, tuple) else float(value)
+
+
+def _plain(rgb: tuple[float, float, float]) -> Value:
+    return rgb[0] if rgb[0] == rgb[1] == rgb[2] else rgb

@@ -1,0 +1,85 @@
+"""Every number of a material as a control, with the range, scale and unit that its model gives it.
+
+The material panel shows them plain; the editor adds, per number, whether a fit keeps it and where a fit may seek it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+
+from imgui_bundle import imgui
+
+from lambent.materials.document import Lobe, Material
+from lambent.materials.models.kurt import Kurt
+from lambent.materials.models.model import Parameter, Value
+from lambent.viewer.panels.widgets import explain, rgb, slider
+
+LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
+DIFFUSE = {"kd": "diffuse reflectance", "kt_d": "diffuse transmittance"}
+# What surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
+Line = Callable[[int | None, str], AbstractContextManager[object]]
+
+
+def plain_line(lobe: int | None, name: str) -> AbstractContextManager[object]:
+    """Nothing around the control."""
+    return nullcontext()
+
+
+def edited(
+    material: Material,
+    linked: bool,
+    *,
+    line: Line = plain_line,
+    all_terms: bool = False,
+    heading: Callable[[int, Lobe], Lobe] | None = None,
+) -> tuple[Material, bool]:
+    """The material after this frame, and whether mx and my keep their ratio.
+
+    `all_terms`: the diffuse transmittance is there even where it is 0. `heading` draws what stands above a lobe's
+    numbers and may change the lobe.
+    """
+    changes: dict[str, object] = {}
+    for name in ("kd", "kt_d") if all_terms or any(material.kt_d) else ("kd",):
+        with line(None, name):
+            changes[name] = rgb(name, getattr(material, name), 1.0, DIFFUSE[name])
+    if material.lobes:
+        _, linked = imgui.checkbox("keep the ratio of mx and my", linked)
+    changes["lobes"] = tuple(_lobe(index, lobe, linked, line, heading) for index, lobe in enumerate(material.lobes))
+    return material.model_copy(update=changes), linked
+
+
+def _lobe(index: int, lobe: Lobe, linked: bool, line: Line, heading: Callable[[int, Lobe], Lobe] | None) -> Lobe:
+    imgui.push_id(index)
+    if heading is None:
+        imgui.separator_text(f"lobe {index + 1}: {lobe.side}, {lobe.distribution}")
+    else:
+        lobe = heading(index, lobe)
+    values = {}
+    for name, parameter in LOBE.items():
+        with line(index, name):
+            values[name] = _parameter(parameter, lobe)
+    after = lobe.model_copy(update=values)
+    imgui.pop_id()
+    return _linked(lobe, after) if linked else after
+
+
+def _parameter(parameter: Parameter, lobe: Lobe) -> Value:
+    value = getattr(lobe, parameter.name)
+    meaning = parameter.meaning if parameter.unit == "1" else f"{parameter.meaning} ({parameter.unit})"
+    if parameter.rgb:
+        return rgb(parameter.name, value, max(parameter.high, *value), meaning)
+    low, high = min(parameter.low, value), max(parameter.high, value)
+    value = slider(parameter.name, value, low, high, log=parameter.scale == "log")
+    explain(meaning)
+    return value
+
+
+def _linked(before: Lobe, after: Lobe) -> Lobe:
+    """Both roughnesses scaled as the one that was moved."""
+    if (before.mx, before.my) == (after.mx, after.my):
+        return after
+    scale = after.mx / before.mx if after.mx != before.mx else after.my / before.my
+    low, high = LOBE["mx"].low, LOBE["mx"].high
+    mx, my = (min(max(m * scale, low), high) for m in (before.mx, before.my))
+    return after.model_copy(update={"mx": mx, "my": my})
