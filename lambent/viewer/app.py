@@ -191,6 +191,7 @@ class Window:
     def _show(self) -> None:
         """Draw the picture where it is out of date, then the interface over it."""
         state = self.state
+        state.answering = self._extra_frames > 0
         self._input.picture = self._layout.picture_rect(state, *self.canvas.get_logical_size())
         self._picture.update(state, self._input.picture, self.canvas.get_pixel_ratio())
         self._register()

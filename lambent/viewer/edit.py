@@ -54,7 +54,14 @@ def run(
     ball = sphere(1.0)
     geometry = Geometry(ball.positions, ball.faces, ())
     editor = state.editor
-    Window(state, geometry, Stage(open_device()), size=size, frames=frames).run()
+    window = Window(state, geometry, Stage(open_device()), size=size, frames=frames)
+    try:
+        window.run()
+    except Exception:
+        if editor is not None and editor.unsaved:
+            rescued = editor.rescue()
+            sys.stderr.write(f"lambent: note: the unsaved material is in {rescued}\n")
+        raise
     if editor is not None and editor.unsaved:
         sys.stderr.write(f"lambent: note: {editor.name} was changed and not saved\n")
 

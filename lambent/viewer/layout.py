@@ -45,6 +45,7 @@ COLOURS = {
     imgui.Col_.frame_bg_active: (0.30, 0.34, 0.40, 1.0),
 }
 PLOT_COLOURS = {
+    implot.Col_.frame_bg: (0.11, 0.115, 0.125, 1.0),
     implot.Col_.plot_bg: (0.085, 0.09, 0.10, 1.0),
     implot.Col_.plot_border: (0.25, 0.26, 0.28, 1.0),
     implot.Col_.axis_grid: (0.5, 0.52, 0.56, 0.25),

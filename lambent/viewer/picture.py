@@ -64,7 +64,7 @@ class Picture:
             wanted = replace(wanted, materials=dict(materials))
         now_s = state.clock()
         plan = self._pacer.plan(wanted, now_s, refine=state.refine, adaptive=state.adaptive_resolution)
-        if plan is None:
+        if plan is None or (plan.accumulate is not None and state.answering):
             return
         frame = self._planned(wanted, plan)
         self._fit(frame.width, frame.height)

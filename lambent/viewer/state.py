@@ -153,6 +153,7 @@ class ViewerState:
     path: PathPlay | None = None
     missing: tuple[str, ...] = ()  # what the store lacks
     refine: bool = True  # accumulate while nothing moves
+    answering: bool = False  # an event was just seen: the interface answers before the picture is refined further
     adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
     panels_shown: bool = True
     screenshot_wanted: bool = False

@@ -14,7 +14,7 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components, evaluate
 from lambent.materials.document import Material
 from lambent.materials.fitting.incidence import Incidence, incidences
-from lambent.materials.fitting.metrics import METRICS, Metric
+from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -81,7 +81,7 @@ def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
     UserError
         As `lambent.materials.measured.load`.
     """
-    from lambent.materials.fitting.account import best_lambertian
+    from lambent.materials.fitting.account import lambertian_errors
 
     progress(0, 4, "reading")
     samples = load(path).samples()
@@ -90,12 +90,7 @@ def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
     progress(2, 4, "gathering incident directions")
     gathered = tuple(incidences(samples))
     progress(3, 4, "the best Lambertian surface")
-    return Measurement(path, samples, few, gathered, {n: _best(few, m, best_lambertian) for n, m in METRICS.items()})
-
-
-def _best(samples: MeasuredSamples, metric: Metric, best_lambertian: object) -> float:
-    f = best_lambertian(samples, metric)  # type: ignore[operator]
-    return metric.error(samples, f)
+    return Measurement(path, samples, few, gathered, lambertian_errors(few))
 
 
 def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:

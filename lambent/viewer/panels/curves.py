@@ -93,7 +93,7 @@ def _in_plane(editor: Editor, size: tuple[float, float]) -> None:
     editor.fit_axes = False
     implot.setup_legend(implot.Location_.north_west)
     implot.setup_finish()
-    incident = shown.incidents[editor.chosen]
+    incident, a = shown.incidents[editor.chosen], "model A" if editor.compared else "model"
     implot.plot_inf_lines("##source", np.array([-incident.theta_deg]), spec=_spec(SOURCE, 1.0))
     for far in (False, True) if shown.transmits else (False,):
         word = ", transmitted" if far else ""
@@ -101,7 +101,7 @@ def _in_plane(editor: Editor, size: tuple[float, float]) -> None:
             x, p = shown.measured_curve[far]
             if len(x):
                 _dots(editor, f"measured{word}", x, p, far)
-        for name, title, colour in (("B", "model B", OTHER), ("A", "model", MODEL)):
+        for name, title, colour in (("B", "model B", OTHER), ("A", a, MODEL)):
             if (name, far) in shown.curves:
                 _line(editor, f"{title}{word}", THETA_O_DEG, shown.curves[name, far], colour, far)
     implot.end_plot()
@@ -158,12 +158,13 @@ def _albedo(editor: Editor, size: tuple[float, float]) -> None:
             np.array([1.0]),
             spec=implot.Spec(line_color=(0.6, 0.6, 0.6, 0.6), flags=implot.InfLinesFlags_.horizontal),
         )
+    a = "model A" if editor.compared else "model"
     for far in (False, True) if shown.transmits else (False,):
         word = "transmitted" if far else "reflected"
         if far in shown.measured_albedo and editor.measurement is not None:
             theta, albedo = shown.measured_albedo[far]
             _dots(editor, f"measured, {word}", theta, albedo, far, scale=False)
-        for name, title, colour in (("B", "B", OTHER), ("A", "model", MODEL)):
+        for name, title, colour in (("B", "model B", OTHER), ("A", a, MODEL)):
             if (name, far) in shown.albedos:
                 _line(editor, f"{title}, {word}", ALBEDO_THETA_DEG, shown.albedos[name, far], colour, far, scale=False)
     implot.end_plot()

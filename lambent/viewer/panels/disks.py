@@ -18,6 +18,9 @@ TITLES = {"measured": "measured", "A": "model", "B": "model B"}
 def draw(editor: Editor, textures: Mapping[str, imgui.ImTextureRef]) -> None:
     shown = editor.shown
     kinds = [kind for kind in TITLES if kind in shown.layout and kind in textures]
+    titles = [TITLES[kind] for kind in kinds]
+    if "B" in kinds:
+        titles[kinds.index("A")] = "model A"
     imgui.text_disabled("cube root of p = f cos theta_o")
     explain(
         "p is the transfer probability in 1/sr; theta_o runs from the centre to the rim, light comes from the top;\n"
@@ -35,7 +38,7 @@ def draw(editor: Editor, textures: Mapping[str, imgui.ImTextureRef]) -> None:
     if room.x < 80 or room.y < 40:
         return
     laid = matrix(shown.incidents, len(kinds), 2 if shown.transmits else 1, room.x, room.y)
-    _titles(laid, kinds, (origin.x, origin.y))
+    _titles(laid, titles, (origin.x, origin.y))
     for (kind, index, side), (x, y) in laid.tiles.items():
         disks = shown.layout[kinds[kind]]
         tile = disks.tiles.index((index, bool(side))) if (index, bool(side)) in disks.tiles else None
@@ -70,7 +73,7 @@ def _titles(laid: Matrix, kinds: list[str], origin: tuple[float, float]) -> None
     lines = imgui.get_window_draw_list()
     for x, y, text in laid.titles:
         of_kind = text.startswith("kind ")
-        words = TITLES[kinds[int(text[5:])]] if of_kind else text
+        words = kinds[int(text[5:])] if of_kind else text
         if not of_kind and laid.step < imgui.calc_text_size(words).x * 0.8:
             continue
         lines.add_text((origin[0] + x, origin[1] + y), imgui.get_color_u32(TEXT if of_kind else DIM), words)

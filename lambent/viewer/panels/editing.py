@@ -85,11 +85,11 @@ def _error(editor: Editor) -> None:
     explain(
         "error of the material; its share of the error of the best Lambertian surface; ~: of a choice of the tuples"
     )
-    if shown.compared_error is not None:
-        imgui.push_style_color(imgui.Col_.text, DIM)
+    if shown.compared_error is None:
+        imgui.text_disabled("B: nothing to compare with" if editor.compared is None else "B")
+    else:
         share = 100 * shown.compared_error / flat
-        imgui.text_unformatted(f"B ({editor.reference}): {shown.compared_error:.4g}   {share:.1f} % of Lambertian")
-        imgui.pop_style_color()
+        imgui.text_disabled(f"B ({editor.reference}): {shown.compared_error:.4g}   {share:.1f} % of Lambertian")
 
 
 def _history(editor: Editor) -> None:
