@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.materials.fitting.metrics import METRICS, Metric
+from lambent.materials.fitting.least_squares import Bounds, minimise
+from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
-from lambent.materials.fitting.problem import Candidate, Mixture
-from lambent.materials.fitting.scale import Channel, solve_scale
+from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of, replace_metric
+from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.measured.protocol import MeasuredSamples
 
 Floats = NDArray[np.floating]
@@ -22,28 +23,30 @@ AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
 ENERGY_TOLERANCE = 0.01
 PEAK_SHARE = 0.001  # of the tuples, the brightest
-LAMBERTIAN_STEPS = 12  # Gauss-Newton for one coefficient: the last ones change it by less than 1e-6
-CHUNK = 1 << 17  # tuples evaluated at once
+LAMBERTIAN_STEPS = 30
+CHUNK = 1 << 14  # tuples evaluated at once
 SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach for r0 and ks to be told apart
 
 
 def lambertian_errors(samples: MeasuredSamples) -> dict[str, float]:
     """E of the best Lambertian surface under each metric, each with its own coefficient per side and channel."""
-    return {name: metric.error(samples, best_lambertian(samples, metric)) for name, metric in METRICS.items()}
+    sides: tuple[Side, ...] = ("reflection", "transmission")
+    present = [side for side in sides if (samples.transmitted == (side == "transmission")).any()]
+    totals = dict.fromkeys(METRICS, 0.0)
+    for side in present:
+        problem = problem_of(samples, side, METRICS["l1"], "beckmann", False)
+        for name, metric in METRICS.items():
+            totals[name] += _lambertian_rest(replace_metric(problem, samples, metric))
+    return {name: total ** (1 / METRICS[name].power) for name, total in totals.items()}
 
 
-def best_lambertian(samples: MeasuredSamples, metric: Metric) -> Floats:
-    """f (N, C) of the Lambertian surface that minimises the metric."""
-    w, c = metric.terms(samples)
-    model = np.zeros_like(samples.f)
-    for here in (samples.transmitted, ~samples.transmitted):
-        if here.any():
-            basis = np.full((1, int(here.sum())), 1 / np.pi)
-            for channel in range(samples.f.shape[1]):
-                part = Channel(samples.f[here, channel], np.zeros(basis.shape[1]), w[here], c[here])
-                k, _ = solve_scale(metric, part, basis, steps=LAMBERTIAN_STEPS)
-                model[here, channel] = k[0] / np.pi
-    return model
+def _lambertian_rest(problem: Problem) -> float:
+    """What the best diffuse term alone leaves: the weighted median is exact for L1, least squares for the others."""
+    if problem.metric.power == 1:
+        best = np.pi * weighted_median(problem.measured, np.broadcast_to(problem.w * problem.c, problem.measured.shape))
+        return problem.remaining(Mixture(best))
+    mean = np.pi * problem.measured @ problem.w / problem.w.sum()
+    return minimise(problem, Bounds((), True), Mixture(np.maximum(mean, 1e-12)), LAMBERTIAN_STEPS, 1e-6)[1]
 
 
 def evaluate(material: Material, samples: MeasuredSamples) -> Floats:

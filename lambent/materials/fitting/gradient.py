@@ -23,10 +23,10 @@ from lambent.materials.fitting.scale import solve_scale
 
 Floats = NDArray[np.floating]
 
-VALUES = (12_000, 60_000, 600_000)  # measured values (tuples times channels) that the three stages look at
+VALUES = (12_000, 60_000, 300_000)  # measured values (tuples times channels) that the three stages look at
 KEPT = (3, 1)  # starts that go on to the second and to the third stage
-STEPS = (30, 15, 40)
-STOP_SHARE = (1e-4, 1e-4, 1e-7)
+STEPS = (30, 15, 30)
+STOP_SHARE = (1e-3, 1e-4, 1e-6)
 WIDTHS = (0.008, 0.03, 0.1, 0.3, 0.9)
 MODES = ((0.015, 0.05), (0.9, 0.85))  # (r0, alpha) of the two kinds of optimum
 STRETCHED = ((0.03, 3.0), (0.03, 1 / 3), (0.12, 3.0), (0.12, 1 / 3))  # mean width and my/mx of anisotropic starts
@@ -55,12 +55,12 @@ def fit_lobes(
         Is what is finished when `progress` raises.
     """
     channels = len(problem.measured)
-    stages = problem.thinned([v // channels for v in VALUES], seed, (np.float32, np.float32, np.float64))
+    stages = problem.thinned([v // channels for v in VALUES], seed, (np.float32,) * 3)
     model = Mixture(np.maximum(diffuse, LEAST_START) if bounds.diffuse_free else diffuse)
     error = np.inf
     for count in range(1, len(bounds.boxes) + 1):
         candidates = list(_starts(stages[0], bounds, model))
-        ranked = _descend(stages, bounds, candidates, progress, count, len(bounds.boxes))
+        ranked = _descend(stages, bounds, candidates, progress, count, found)
         reached = problem.remaining(ranked)
         if reached >= error * (1 - gain) ** problem.metric.power:
             return
@@ -69,28 +69,38 @@ def fit_lobes(
 
 
 def _descend(
-    stages: Sequence[Problem], bounds: Bounds, starts: Sequence[Mixture], progress: Progress, lobe: int, lobes: int
+    stages: Sequence[Problem],
+    bounds: Bounds,
+    starts: Sequence[Mixture],
+    progress: Progress,
+    lobe: int,
+    found: list[Mixture],
 ) -> Mixture:
-    """The best end of all starts."""
-    rounds = len(starts) + sum(KEPT)
+    """The best end of all starts; where `progress` raises and nothing is in `found` yet, the best so far goes there."""
+    rounds, lobes = len(starts) + sum(KEPT), len(bounds.boxes)
     done = 0
     alive = list(starts)
-    for depth, stage in enumerate(stages):
-        ends = []
-        for start in alive[: ([len(starts), *KEPT])[depth]]:
-            progress((lobe - 1) * rounds + done, lobes * rounds, f"lobe {lobe}, {len(stage)} tuples")
-            ends.append(minimise(stage, bounds, start, STEPS[depth], STOP_SHARE[depth]))
-            done += 1
-        ends.sort(key=lambda end: end[1])
-        alive = _distinct(ends)
-    progress(lobe * rounds, lobes * rounds, f"lobe {lobe}")
+    ends: list[tuple[Mixture, float]] = []
+    try:
+        for stage, kept, steps, stop in zip(stages, (len(starts), *KEPT), STEPS, STOP_SHARE, strict=True):
+            ends = []
+            for start in alive[:kept]:
+                progress((lobe - 1) * rounds + done, lobes * rounds, f"lobe {lobe}, {len(stage)} tuples")
+                ends.append(minimise(stage, bounds, start, steps, stop))
+                done += 1
+            alive = _distinct(ends)
+        progress(lobe * rounds, lobes * rounds, f"lobe {lobe}")
+    except BaseException:
+        if not found and done:
+            found.append((_distinct(ends) or alive)[0])
+        raise
     return alive[0]
 
 
 def _distinct(ends: Sequence[tuple[Mixture, float]]) -> list[Mixture]:
-    """The models in their order, without those that are the same optimum again."""
+    """The models, best first, without those that are the same optimum again."""
     kept: list[tuple[Mixture, float]] = []
-    for model, error in ends:
+    for model, error in sorted(ends, key=lambda end: end[1]):
         if all(abs(error - other) > 1e-3 * other for _, other in kept):
             kept.append((model, error))
     return [model for model, _ in kept]

@@ -1,15 +1,15 @@
 """The hierarchical search of one lobe (thesis 3.4.1), in the logarithms of mx, my and r0 and in alpha.
 
 n equidistant values per free parameter; the best combination is kept; every interval shrinks to 1/(n - 1) of its
-extent around it; repeated a given number of times. The coefficient of each candidate is solved, not searched. The
-first levels look at a small, importance-sampled share of the tuples, later ones at more.
+extent around it; repeated a given number of times. The coefficient of each candidate is solved, not searched. Of
+a table with more than `VALUES` measured values an importance-sampled share is looked at.
 
 Nothing keeps the global optimum in the box (the thesis says so): `gradient` is never worse and far quicker.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -24,15 +24,7 @@ from lambent.materials.fitting.scale import Channel, solve_scale
 Floats = NDArray[np.floating]
 
 NEGLIGIBLE = 1e-9  # f in 1/sr: tuples where no candidate reaches this are left to the background alone
-VALUES = (
-    4_500,
-    4_500,
-    9_000,
-    20_000,
-    40_000,
-    80_000,
-)  # measured values that the levels look at; the last for all after
-LEVELS_N = (9, 6)  # the default n of the first level and number of levels
+VALUES = 40_000  # measured values (tuples times channels)
 FULL_STEPS = 40  # Gauss-Newton steps for the coefficients on all tuples
 
 
@@ -40,8 +32,8 @@ FULL_STEPS = 40  # Gauss-Newton steps for the coefficients on all tuples
 class Schedule:
     """n values per parameter at each of so many levels."""
 
-    n: int = LEVELS_N[0]
-    levels: int = LEVELS_N[1]
+    n: int = 9
+    levels: int = 5
 
 
 class Best:
@@ -55,11 +47,14 @@ def search(
     problem: Problem, others: Mixture, box: Box, progress: Progress, best: Best, seed: int, schedule: Schedule
 ) -> Candidate:
     """Best lobe in `box` for what `others` leave; `best` follows the search and survives what `progress` raises."""
-    counts = [VALUES[min(level, len(VALUES) - 1)] // len(problem.measured) for level in range(schedule.levels)]
+    (few,) = problem.thinned([VALUES // len(problem.measured)], seed, [np.float32])
     lo, hi = box.lo, box.hi
-    for level, few in enumerate(problem.thinned(counts, seed, [np.float32] * len(counts))):
-        progress(level, schedule.levels, f"level {level + 1} of {schedule.levels}")
-        candidates = _evaluate(few, few.channels(others), box, *_axes(lo, hi, box, schedule.n), progress, level)
+    for level in range(schedule.levels):
+
+        def report(share: float, level: int = level) -> None:
+            progress(level + share, schedule.levels, f"level {level + 1} of {schedule.levels}")
+
+        candidates = _evaluate(few, few.channels(others), box, *_axes(lo, hi, box, schedule.n), report)
         found = min(candidates, key=lambda pair: pair[1])[0]
         best.candidate = found
         extent = (hi - lo) / (schedule.n - 1)
@@ -87,8 +82,7 @@ def _evaluate(
     pairs: list[tuple[float, float]],
     r0: Floats,
     alpha: Floats,
-    progress: Progress,
-    level: int,
+    report: Callable[[float], None],
 ) -> Iterator[tuple[Candidate, float]]:
     """Every combination of the pairs of slopes with r0 and alpha, its coefficient solved, and what it leaves."""
     combined = np.array(list(product(r0, alpha)))
@@ -97,7 +91,7 @@ def _evaluate(
     highest = rest.max(axis=0)
     unexplained = [_losses(problem, channel) for channel in channels]
     for number, (log_mx, log_my) in enumerate(pairs):
-        progress(level + number / len(pairs), level + 1, f"level {level + 1}")
+        report(number / len(pairs))
         density = problem.density(np.exp(log_mx), np.exp(log_my))
         reached = density * highest > NEGLIGIBLE
         basis = density[reached] * rest[:, reached]

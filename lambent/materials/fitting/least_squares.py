@@ -26,7 +26,7 @@ K_SPAN = 14.0  # ln k may move this far in one minimisation
 NOTHING = 1e-9  # a coefficient below this is 0
 SHAPE_AXES = range(MU, ALPHA + 1)
 COEFFICIENT = 4  # "axis" of an unknown that is ln k of a channel
-DIFFUSE = -1  # "lobe" of a diffuse coefficient
+DIFFUSE = -1  # "lobe" of a diffuse coefficient: the terms of a model are this one, then the lobes
 
 
 @dataclass(frozen=True)
@@ -98,35 +98,42 @@ def _normal_equations(
     problem: Problem, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown]
 ) -> tuple[Floats, Floats]:
     """J^T W J (U, U) and J^T W r (U,), with r the transformed residual and J the model's derivative."""
-    metric, c = problem.metric, problem.c
-    bases = [c * problem.basis(lobe.shape) for lobe in mixture.lobes]
-    slopes = [
-        problem.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
-    ]
-    diffuse = c * problem.diffuse
     matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
-    for channel, measured in enumerate(problem.measured):
-        parts = [float(lobe.k[channel]) * basis for lobe, basis in zip(mixture.lobes, bases, strict=True)]
-        parts.append(float(mixture.diffuse[channel]) * diffuse)  # the last one: index DIFFUSE
-        model = np.sum(parts, axis=0, dtype=c.dtype)
-        target = metric.transform(c * measured)
+    for block in problem.blocks:
+        _add_block(block, bounds, mixture, unknowns, matrix, gradient)
+    return matrix, gradient
+
+
+def _add_block(
+    block: Problem, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown], matrix: Floats, gradient: Floats
+) -> None:
+    metric, c = block.metric, block.c
+    terms = np.stack([c * block.diffuse, *(c * block.basis(lobe.shape) for lobe in mixture.lobes)])
+    slopes = [
+        block.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
+    ]
+    for channel, target in enumerate(block.target):
+        k = np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=c.dtype)
+        parts = k[:, None] * terms
+        model = parts.sum(axis=0)
         residual = target - metric.transform(model)
-        w = problem.w
+        w = block.w
         if metric.power == 1:
             size = np.abs(target)
             w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
-        slope = metric.slope(model)
+        if not metric.linear:
+            parts *= metric.slope(model)
         here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
         rows = np.empty((len(here), len(c)), dtype=c.dtype)
         for row, i in zip(rows, here, strict=True):
             u = unknowns[i]
-            np.multiply(slope, parts[u.lobe], out=row)
-            if u.axis != COEFFICIENT:
-                row *= slopes[u.lobe][u.axis]
+            if u.axis == COEFFICIENT:
+                row[:] = parts[u.lobe + 1]
+            else:
+                np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
         weighted = rows * w
         matrix[np.ix_(here, here)] += weighted @ rows.T
         gradient[here] += weighted @ residual
-    return matrix, gradient
 
 
 def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:

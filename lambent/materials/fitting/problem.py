@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.materials.fitting.metrics import Metric
+from lambent.materials.fitting.metrics import BLOCK, Metric
 from lambent.materials.fitting.parameters import Side, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -112,16 +113,29 @@ class Problem:
 
     def evaluate(self, mixture: Mixture) -> Floats:
         """(C, N) f in 1/sr."""
-        total = mixture.diffuse[:, None].astype(self.diffuse.dtype) * self.diffuse
-        for lobe in mixture.lobes:
-            total += lobe.k[:, None].astype(self.diffuse.dtype) * self.basis(lobe.shape)
-        return total
+        k = np.stack([mixture.diffuse, *(lobe.k for lobe in mixture.lobes)], axis=1).astype(self.diffuse.dtype)
+        return np.asarray(k @ np.stack([self.diffuse, *(self.basis(lobe.shape) for lobe in mixture.lobes)]))
+
+    @cached_property
+    def blocks(self) -> tuple[Problem, ...]:
+        """The tuples in pieces small enough that what is computed of each stays in the processor's cache."""
+        return tuple(
+            replace(self, **{name: getattr(self, name)[..., i : i + BLOCK] for name in (*PER_TUPLE, "w")})
+            for i in range(0, len(self), BLOCK)
+        )
+
+    @cached_property
+    def target(self) -> Floats:
+        """(C, N) the transformed measurement."""
+        return np.asarray(self.metric.transform(self.c * self.measured))
 
     def remaining(self, mixture: Mixture) -> float:
         """The metric's sum over all tuples, averaged over channels, that the model leaves: E to the metric's power."""
-        transform = self.metric.transform
-        difference = np.abs(transform(self.c * self.measured) - transform(self.c * self.evaluate(mixture)))
-        return float(np.mean(difference**self.metric.power @ self.w))
+        return sum(block._remaining(mixture) for block in self.blocks)
+
+    def _remaining(self, mixture: Mixture) -> float:
+        difference = self.target - self.metric.transform(self.c * self.evaluate(mixture))
+        return float(np.mean((np.abs(difference) if self.metric.power == 1 else difference * difference) @ self.w))
 
     def channels(self, others: Mixture) -> tuple[Channel, ...]:
         """What one more lobe has to explain, per channel: the rest, clamped so that it is asked for nothing below 0."""
@@ -184,6 +198,13 @@ def problem_of(
         w[here],
         c[here],
     )
+
+
+def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -> Problem:
+    """The same tuples under another metric."""
+    here = samples.transmitted == (problem.side == "transmission")
+    w, c = metric.terms(samples)
+    return replace(problem, metric=metric, w=w[here], c=c[here])
 
 
 def diffuse_basis(cos_i: Floats, cos_o: Floats, coupled: bool) -> Floats:

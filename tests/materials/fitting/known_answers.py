@@ -1,16 +1,19 @@
-"""The thesis's fitted materials (tables 3.1 and 3.2), measured again in software, in grey."""
+"""Materials whose tables are synthesised, so that the answer is known: the thesis's, and small ones; in grey."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from lambent.bench.fit import ALANOD, FOIL
+from lambent.bench.known_answers import KNOWN, setup_of
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, Setup, synthesise
 
-__all__ = ["ALANOD", "ANISOTROPIC", "FEW", "FOIL", "ISOTROPIC", "PAINT", "grey"]
+__all__ = ["ANISOTROPIC", "FEW", "FOIL", "ISOTROPIC", "KNOWN", "PAINT", "TWO_LOBES", "grey", "setup_of"]
+FOIL = KNOWN["white foil"]
 PAINT = Material(name="paint", kd=0.2, lobes=(Lobe(k=0.7, mx=0.15, my=0.15, r0=0.06, alpha=0.3),))
+_SHARP = PAINT.lobes[0].model_copy(update={"mx": 0.04, "my": 0.04, "k": (0.3,) * 3})
+TWO_LOBES = PAINT.model_copy(update={"lobes": (PAINT.lobes[0], _SHARP)})
 FEW = replace(ISOTROPIC, step_deg=6.0, fine_deg=3.0)
 
 

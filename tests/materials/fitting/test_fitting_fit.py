@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +8,12 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.fit import fit
+from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.metrics import METRICS, errors_of
 from lambent.materials.measured.registry import load
-from tests.materials.fitting.known_answers import ALANOD, ANISOTROPIC, FEW, FOIL, ISOTROPIC, PAINT, grey
+from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, KNOWN, PAINT, TWO_LOBES, grey, setup_of
 
 
 @pytest.fixture(scope="module")
@@ -24,35 +25,29 @@ def true_errors(samples, material):
     return errors_of(samples, MaterialBSDF(material).eval(samples.wi, samples.wo)[:, : samples.f.shape[1]])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(5))
-def test_alanod_is_recovered_whatever_the_noise(seed):
-    samples = grey(ALANOD, replace(ANISOTROPIC, seed=seed))
-    result = fit(samples, metric="l1")
-    (found,), (true,) = result.material.lobes, ALANOD.lobes
-    assert result.material.kd[0] == pytest.approx(0.003, rel=0.05)
-    for name in ("mx", "my", "alpha"):
-        assert getattr(found, name) == pytest.approx(getattr(true, name), rel=0.005)
-    assert found.r0[0] == pytest.approx(true.r0[0], rel=0.03)
-    assert found.k[0] == pytest.approx(true.k[0], rel=0.03)
-    assert result.errors["l1"] <= 1.0005 * true_errors(samples, ALANOD)["l1"]
+SHAPES = ("mx", "my", "alpha", "r0")
 
 
 @pytest.mark.slow
-def test_white_foil_is_recovered_on_both_sides():
-    samples = grey(FOIL, replace(ISOTROPIC, symmetry="quadrant"))
-    result = fit(samples, metric="l1")
-    reflection, transmission = result.material.lobes
-    true_r, true_t = FOIL.lobes
-    assert result.material.kd[0] == pytest.approx(0.76, rel=0.02)
-    for name in ("mx", "my", "alpha"):
-        assert getattr(reflection, name) == pytest.approx(getattr(true_r, name), rel=0.05)
-        assert getattr(transmission, name) == pytest.approx(getattr(true_t, name), rel=0.05)
-    assert reflection.k[0] == pytest.approx(0.78, rel=0.05)
-    assert reflection.r0[0] == pytest.approx(0.029, rel=0.05)
-    assert transmission.k[0] * (1 - transmission.r0[0]) == pytest.approx(0.67 * 0.25, rel=0.05)
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_thesis_materials_are_recovered(name):
+    material = KNOWN[name]
+    samples = grey(material, setup_of(material))
+    result = fit(samples, lobes=len(material.reflection_lobes), metric="l1")
+    assert result.errors["l1"] <= true_errors(samples, material)["l1"]
+    assert result.material.kd[0] == pytest.approx(material.kd[0], rel=0.01)
+    tolerance = 0.1 if name.startswith("miro") else 0.05
+    for found, true in zip(result.material.lobes, material.lobes, strict=True):
+        assert found.side == true.side
+        for shape in SHAPES[: 4 if true.side == "reflection" else 3]:
+            assert np.mean(getattr(found, shape)) == pytest.approx(np.mean(getattr(true, shape)), rel=tolerance)
+        if true.side == "transmission":
+            assert found.k[0] * (1 - found.r0[0]) == pytest.approx(true.k[0] * (1 - true.r0[0]), rel=0.02)
+
+
+def test_only_the_product_of_a_transmission_is_measured():
+    result = fit(grey(FOIL, replace(ISOTROPIC, step_deg=8)))
     assert any("kt (1 - r0)" in line for line in result.warnings)
-    assert result.errors["l1"] <= 1.05 * true_errors(samples, FOIL)["l1"]
 
 
 @pytest.mark.parametrize("metric", METRICS)
@@ -122,19 +117,42 @@ def test_fit_cancelled_before_it_began_is_diffuse(paint):
     assert result.material.kd[0] == pytest.approx(0.2, rel=0.03)
 
 
-def test_gradient_is_no_worse_than_grid(paint):
-    assert fit(paint, method="gradient").errors["cuberoot"] <= fit(paint).errors["cuberoot"] * (1 + 1e-6)
+@pytest.mark.parametrize("lobes", [1, 2])
+def test_gradient_is_no_worse_than_grid(paint, lobes):
+    grid = fit(paint, lobes=lobes, method="grid", schedule=Schedule(5, 4))
+    assert fit(paint, lobes=lobes).errors["cuberoot"] <= grid.errors["cuberoot"]
 
 
-@pytest.mark.slow
+def test_the_grid_keeps_the_histograms_kd(paint):
+    result = fit(paint, method="grid", schedule=Schedule(5, 3))
+    weight = paint.weight * np.abs(paint.wo[:, 2])
+    assert result.material.kd[0] == diffuse_mode(paint.f[:, 0], weight)
+
+
+def test_the_number_of_lobes_is_found(paint):
+    assert len(fit(paint, lobes="auto").material.lobes) == 1
+    assert len(fit(grey(TWO_LOBES, FEW), lobes="auto").material.lobes) == 2
+
+
+def test_lobes_that_explain_nothing_are_not_added():
+    flat = fit(grey(PAINT.model_copy(update={"lobes": ()}), replace(FEW, noise=0, floor=0)), lobes=4)
+    assert len(flat.material.lobes) < 4
+    assert any("explains nothing more" in line for line in flat.warnings)
+    assert flat.errors["cuberoot"] < 1e-3
+
+
+def test_the_better_distribution_is_found():
+    ggx = PAINT.model_copy(update={"lobes": (PAINT.lobes[0].model_copy(update={"distribution": "ggx"}),)})
+    for material, name in ((PAINT, "beckmann"), (ggx, "ggx")):
+        result = fit(grey(material, FEW), distribution="best")
+        assert [lobe.distribution for lobe in result.material.lobes] == [name]
+
+
 def test_two_lobes_are_told_apart():
-    sharp = PAINT.lobes[0].model_copy(update={"mx": 0.04, "my": 0.04, "k": (0.3,) * 3})
-    two = PAINT.model_copy(update={"lobes": (PAINT.lobes[0], sharp)})
-    samples = grey(two, FEW)
-    one = fit(samples, method="gradient")
-    both = fit(samples, lobes=2, method="gradient")
+    samples = grey(TWO_LOBES, FEW)
+    one, both = (fit(samples, lobes=lobes) for lobes in (1, 2))
     assert both.errors["cuberoot"] < 0.5 * one.errors["cuberoot"]
-    assert sorted(lobe.mx for lobe in both.material.lobes) == pytest.approx([0.04, 0.15], rel=0.1)
+    assert [lobe.mx for lobe in both.material.lobes] == pytest.approx([0.04, 0.15], rel=0.1)
 
 
 @pytest.mark.parametrize("metric", ["l1", "cuberoot"])
@@ -154,7 +172,9 @@ def test_degenerate_tables_give_a_finite_material(paint, metric, count, value):
 
 
 def test_impossible_requests(paint):
-    for options in ({"method": "gird"}, {"metric": "l3"}, {"lobes": 0}, {"fix": {"mxx": 1.0}}, {"fix": {"t_mx": 0.1}}):
+    impossible = [{"method": "gird"}, {"metric": "l3"}, {"distribution": "ggxx"}, {"lobes": 0}, {"lobes": 5}]
+    impossible += [{"gain": 0.0}, {"gain": 1.0}, {"fix": {"mxx": 1.0}}, {"fix": {"t_mx": 0.1}}]
+    for options in impossible:
         with pytest.raises(UserError):
             fit(paint, **options)
 
@@ -168,9 +188,7 @@ def test_impossible_requests(paint):
     ],
 )
 def test_one_lobe_explains_most_of_a_real_table(shared_data, file, shares):
-    began = time.perf_counter()
     result = fit(load(shared_data / "measured" / file))
-    assert time.perf_counter() - began < 60
     for metric, share in shares.items():
         assert result.errors[metric] < share * result.lambertian_errors[metric]
     assert all(np.isfinite(list(result.errors.values())))

@@ -1,24 +1,107 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from lambent.materials.fitting.gradient import polish
-from lambent.materials.fitting.grid import Candidate
+from lambent.core.progress import silent
+from lambent.materials.fitting import gradient
+from lambent.materials.fitting.least_squares import Bounds, _normal_equations, _unknowns, minimise
 from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import box_of, to_search
-from lambent.materials.fitting.problem import problem_of
-from tests.materials.fitting.known_answers import FEW, PAINT, grey
+from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
+from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, PAINT, grey
+
+TWO = Mixture(
+    np.array([0.2]),
+    (
+        Candidate(to_search(np.array([0.12, 0.2, 0.09, 0.3])), np.array([0.5])),
+        Candidate(to_search(np.array([0.4, 0.3, 0.5, 0.7])), np.array([0.2])),
+    ),
+)
+
+
+def free_boxes(side, lobes):
+    return [box_of(side, i, False, 1, {}, {"t_r0": (0.1, 0.9)} if side == "transmission" else {}) for i in range(lobes)]
 
 
 @pytest.mark.parametrize("metric", METRICS)
-def test_polish_walks_to_the_known_lobe(metric):
-    samples = grey(PAINT, FEW)
-    problem = problem_of(samples, "reflection", METRICS[metric], np.full_like(samples.f, 0.2 / np.pi))
-    box = box_of("reflection", 0, True, 1, {"alpha": 0.3}, {})
-    start = Candidate(to_search(np.array([0.12, 0.12, 0.09, 0.3])), np.array([0.5]), 0.0)
-    (found,) = polish(problem, [box], [start], seed=0)
-    mx, my, r0, alpha = found.shape
+@pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
+def test_minimise_walks_to_the_known_lobe(metric, distribution):
+    lobe = PAINT.lobes[0].model_copy(update={"distribution": distribution})
+    samples = grey(PAINT.model_copy(update={"lobes": (lobe,)}), FEW)
+    problem = problem_of(samples, "reflection", METRICS[metric], distribution, False)
+    bounds = Bounds([box_of("reflection", 0, True, 1, {"alpha": 0.3}, {})], True)
+    start = Mixture(np.array([0.1]), (Candidate(to_search(np.array([0.12, 0.12, 0.09, 0.3])), np.array([0.5])),))
+    found, error = minimise(problem, bounds, start, 60, 1e-9)
+    mx, my, r0, alpha = found.lobes[0].shape
     assert mx == my == pytest.approx(0.15, rel=0.01)
-    assert r0 * found.k[0] == pytest.approx(0.042, rel=0.02)
+    assert r0 * found.lobes[0].k[0] == pytest.approx(0.042, rel=0.02)
+    assert found.diffuse[0] == pytest.approx(0.2, rel=0.01)
     assert alpha == 0.3
+    assert error == pytest.approx(problem.remaining(found))
+
+
+@pytest.mark.parametrize("metric", ["cuberoot", "log", "l2_ngan"])
+@pytest.mark.parametrize("distribution", ["beckmann", "ggx"])
+@pytest.mark.parametrize("side", ["reflection", "transmission"])
+def test_gradient_is_the_derivative_of_the_error(metric, distribution, side):
+    problem = problem_of(grey(FOIL, replace(ISOTROPIC, step_deg=8)), side, METRICS[metric], distribution, False)
+    bounds = Bounds(free_boxes(side, 2), True)
+    unknowns = _unknowns(bounds, TWO)
+    _, gradient_ = _normal_equations(problem, bounds, TWO, unknowns)
+    step = 1e-5
+    for unknown, slope in zip(unknowns, gradient_, strict=True):
+        moved = [problem.remaining(_shifted(unknown, sign * step)) for sign in (1, -1)]
+        assert -2 * slope == pytest.approx((moved[0] - moved[1]) / (2 * step), rel=1e-4, abs=1e-9)
+
+
+def _shifted(unknown, by):
+    if unknown.lobe < 0:
+        return replace(TWO, diffuse=TWO.diffuse * np.exp(by))
+    lobes = list(TWO.lobes)
+    lobe = lobes[unknown.lobe]
+    if unknown.axis == 4:
+        lobes[unknown.lobe] = replace(lobe, k=lobe.k * np.exp(by))
+    else:
+        coordinates = lobe.coordinates.copy()
+        coordinates[unknown.axis] += by
+        lobes[unknown.lobe] = replace(lobe, coordinates=coordinates)
+    return replace(TWO, lobes=tuple(lobes))
+
+
+@pytest.mark.parametrize("number", range(10))
+def test_every_start_finds_the_same_optimum(number):
+    problem = problem_of(grey(PAINT, FEW), "reflection", METRICS["cuberoot"], "beckmann", False)
+    bounds = Bounds([box_of("reflection", 0, True, 1, {}, {})], True)
+    (few,) = problem.thinned([4000], 0, [np.float32])
+    starts = list(gradient._starts(few, bounds, Mixture(np.array([0.2]))))
+    assert len(starts) == 10
+    found, error = minimise(problem, bounds, starts[number], 200, 1e-7)
+    assert found.lobes[0].shape[0] == pytest.approx(0.15, rel=0.02)
+    assert error == pytest.approx(_noise_floor(problem), rel=0.05)
+
+
+def _noise_floor(problem):
+    (lobe,) = PAINT.lobes
+    shape = np.array([lobe.mx, lobe.my, lobe.r0[0], lobe.alpha])
+    return problem.remaining(Mixture(np.array([0.2]), (Candidate(to_search(shape), np.array([lobe.k[0]])),)))
+
+
+def test_more_lobes_never_explain_less():
+    problem = problem_of(grey(PAINT, FEW), "reflection", METRICS["cuberoot"], "ggx", False)
+    bounds = Bounds([box_of("reflection", i, True, 1, {}, {}) for i in range(3)], True)
+    found: list[Mixture] = []
+    gradient.fit_lobes(problem, bounds, np.array([0.2]), silent, 0, 0.0, found)
+    errors = [problem.remaining(model) for model in found]
+    assert len(errors) > 1
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_thinned_tuples_estimate_the_metric():
+    problem = problem_of(grey(PAINT), "reflection", METRICS["l1"], "beckmann", False)
+    model = Mixture(np.array([0.25]))
+    (few,) = problem.thinned([3000], 1, [np.float32])
+    assert len(few) <= 3000 < len(problem)
+    assert few.remaining(model) == pytest.approx(problem.remaining(model), rel=0.02)
