@@ -168,8 +168,10 @@ class GonioTable(IntegratedTable):
 
 
 def _tuples(sheet: AnySheet, wi: Floats, side: float) -> tuple[Floats, Floats, Floats, Floats]:
-    wo = sheet.directions
-    return np.broadcast_to(wi, wo.shape), wo * (1, 1, side), sheet.values, sheet.solid_angles()
+    """wi, wo, f and weight of what was measured."""
+    measured = sheet.measured
+    wo = sheet.directions[measured]
+    return np.broadcast_to(wi, wo.shape), wo * (1, 1, side), sheet.values[measured], sheet.weights()[measured]
 
 
 def _groups(key: Indices, chosen: Flags) -> list[tuple[int, Indices]]:

@@ -5,6 +5,7 @@ Incident directions form a grid. The outgoing directions of each may form one of
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -19,6 +20,11 @@ from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, sp
 
 Quantity = Literal["f", "f_cos", "p"]
 QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
+_WORDS: dict[str, Quantity] = {
+    **dict.fromkeys(("f", "fr", "ft", "fs", "brdf", "btdf", "bsdf", "integrated"), "f"),
+    **dict.fromkeys(("fcos", "ccbrdf", "ccbtdf", "ccbsdf", "brdfcos", "btdfcos", "bsdfcos"), "f_cos"),
+    **dict.fromkeys(("p", "transfer", "transferprobability"), "p"),
+}
 DECIMALS = 5  # of the angles in degrees: closer directions are the same
 _LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
 _PLANE_DEG = 0.1  # so close to the plane of incidence a scan is in it
@@ -66,6 +72,11 @@ def check_angles(angles_deg: Floats, path: Path) -> None:
         raise UserError("an angle is outside its range", file=path, field=field, got=got, expected=expected)
 
 
+def quantity_of(word: str) -> Quantity | None:
+    """What a column of this name holds; None where the name does not say."""
+    return _WORDS.get(re.sub(r"\(.*?\)|\[.*?\]|[^a-z]", "", word.lower()))
+
+
 def to_f(values: Floats, quantity: Quantity, theta_o_deg: Floats) -> Floats:
     """f (N, C) of stored values: f_cos and p are divided by |cos theta_o|; where that is 0 nothing was measured."""
     if quantity == "f":
@@ -86,19 +97,19 @@ def table_of(rows: Rows) -> GonioTable:
     angles = np.round(rows.angles_deg, DECIMALS)
     theta_i, phi_i = np.unique(angles[:, 0]), np.unique(angles[:, 1])
     symmetry, notes = _symmetry(rows, phi_i)
-    f = rows.f
+    f, images = rows.f, np.zeros(len(angles), dtype=bool)
     if symmetry == "isotropic":
         angles[:, 3] -= angles[:, 1]
         angles[:, 1], phi_i = 0, np.zeros(1)
-        angles, f = _mirrored(angles, f)
+        angles, f, images = _mirrored(angles, f)
     far = angles[:, 2] > 90
     angles[far, 2] = np.round(180 - angles[far, 2], DECIMALS)
     angles[:, 3] = np.round(angles[:, 3] % 360, DECIMALS) % 360
     angles[angles[:, 2] == 0, 3] = np.where(_pole_repeats(angles), angles[angles[:, 2] == 0, 3], 0)
-    angles, f, far, repeated = _averaged(angles, f, far)
+    (angles, far, images), f, repeated = _averaged((angles, far, images), f)
     if repeated:
         notes += (f"{repeated} measurements repeat a direction; their mean was taken",)
-    sides = tuple(_side(angles[side], f[side], theta_i, phi_i, rows.path) for side in (~far, far))
+    sides = tuple(_side(angles[side], f[side], images[side], (theta_i, phi_i), rows.path) for side in (~far, far))
     return GonioTable(
         name=rows.name,
         file=Path(rows.path).name,
@@ -132,14 +143,16 @@ def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]
     return symmetry, ()
 
 
-def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """Rows of an isotropic specimen that cover one side of the plane of incidence alone, and their mirror images."""
+def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
+    """Rows of an isotropic specimen, with mirror images where they cover one side of the plane of incidence alone.
+
+    Returns the rows, their f, and which of them are images.
+    """
     phi = np.round(angles_deg[:, 3] % 360, DECIMALS) % 360
     left, right = (phi > 0) & (phi < 180), phi > 180
-    if left.any() == right.any():
-        return angles_deg, f
-    inner = left | right
-    return np.concatenate([angles_deg, angles_deg[inner] * (1, 1, 1, -1)]), np.concatenate([f, f[inner]])
+    inner = left | right if left.any() != right.any() else np.zeros(len(f), dtype=bool)
+    images = np.concatenate([np.zeros(len(f), dtype=bool), np.ones(int(inner.sum()), dtype=bool)])
+    return np.concatenate([angles_deg, angles_deg[inner] * (1, 1, 1, -1)]), np.concatenate([f, f[inner]]), images
 
 
 def _pole_repeats(angles_deg: Floats) -> bool:
@@ -147,31 +160,32 @@ def _pole_repeats(angles_deg: Floats) -> bool:
     return len(np.unique(angles_deg[angles_deg[:, 2] == 0, 3])) > 1
 
 
-def _averaged(angles_deg: Floats, f: Floats, far: Flags) -> tuple[Floats, Floats, Flags, int]:
-    """The rows sorted by incident and outgoing direction, repeated ones averaged, and how many those were."""
-    order = np.lexsort((angles_deg[:, 3], angles_deg[:, 2], angles_deg[:, 1], angles_deg[:, 0], far))
-    angles_deg, f, far = angles_deg[order], f[order], far[order]
-    same = (angles_deg[1:] == angles_deg[:-1]).all(axis=1) & (far[1:] == far[:-1])
-    if not same.any():
-        return angles_deg, f, far, 0
+def _averaged(rows: tuple[Floats, Flags, Flags], f: Floats) -> tuple[tuple[Floats, Flags, Flags], Floats, int]:
+    """Angles, side and image of the rows sorted by direction, their f with repeats averaged, and how many repeats."""
+    angles, far, images = rows
+    order = np.lexsort((angles[:, 3], angles[:, 2], angles[:, 1], angles[:, 0], far))
+    angles, f, far, images = angles[order], f[order], far[order], images[order]
+    same = (angles[1:] == angles[:-1]).all(axis=1) & (far[1:] == far[:-1])
     first = np.flatnonzero(np.concatenate([[True], ~same]))
-    usable = np.isfinite(f)
-    total = np.add.reduceat(np.where(usable, f, 0), first, axis=0)
-    count = np.add.reduceat(usable, first, axis=0, dtype=np.int64)
-    mean = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
-    return angles_deg[first], mean, far[first], int(same.sum())
+    if same.any():
+        usable = np.isfinite(f)
+        total = np.add.reduceat(np.where(usable, f, 0), first, axis=0)
+        count = np.add.reduceat(usable, first, axis=0, dtype=np.int64)
+        f = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
+    return (angles[first], far[first], images[first]), f, int(same.sum())
 
 
-def _side(angles_deg: Floats, f: Floats, theta_i: Floats, phi_i: Floats, path: Path) -> Sheets:
+def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floats, Floats], path: Path) -> Sheets:
     """The sheets of one side, by theta_i then phi_i; one measured at theta_i = 0 stands for every phi_i."""
+    theta_i, phi_i = incident_deg
     if len(angles_deg) == 0:
         return ()
     incident: Indices = np.searchsorted(theta_i, angles_deg[:, 0]) * len(phi_i)
     incident += np.searchsorted(phi_i, angles_deg[:, 1])
     found, starts = np.unique(incident, return_index=True)
-    parts = zip(np.split(angles_deg, starts[1:]), np.split(f, starts[1:]), strict=True)
+    parts = [np.split(array, starts[1:]) for array in (angles_deg, f, images)]
     sheets: dict[int, AnySheet] = {
-        int(k): sheet_of(part, values, path) for k, (part, values) in zip(found, parts, strict=True)
+        int(k): sheet_of(part, values, same, path) for k, part, values, same in zip(found, *parts, strict=True)
     }
     if theta_i[0] == 0:
         at_normal = [sheets[k] for k in range(len(phi_i)) if k in sheets]
@@ -184,7 +198,7 @@ def _side(angles_deg: Floats, f: Floats, theta_i: Floats, phi_i: Floats, path: P
     return tuple(tuple(whole[k : k + len(phi_i)]) for k in range(0, len(whole), len(phi_i)))
 
 
-def sheet_of(angles_deg: Floats, f: Floats, path: Path) -> AnySheet:
+def sheet_of(angles_deg: Floats, f: Floats, images: Flags, path: Path) -> AnySheet:
     """The rows (N, 4) of one incident direction and side, sorted by theta_o then phi_o, without repeats."""
     theta_i, phi_i = angles_deg[0, :2]
     if not np.isfinite(f).all(axis=-1).any():
@@ -195,11 +209,13 @@ def sheet_of(angles_deg: Floats, f: Floats, path: Path) -> AnySheet:
     theta, phi = np.unique(angles_deg[:, 2]), np.unique(angles_deg[angles_deg[:, 2] > 0, 3])
     in_plane = float(np.abs(wo @ frame[1]).max()) < np.sin(np.radians(_PLANE_DEG))
     if in_plane or len(phi) < 3 or len(angles_deg) < _LEAST_FILLED * len(theta) * len(phi):
-        return ScatteredSheet(wo, f, frame)
+        return ScatteredSheet(wo, f, frame, images)
     phi = np.union1d(phi, angles_deg[:, 3])
     row, column = np.searchsorted(theta, angles_deg[:, 2]), np.searchsorted(phi, angles_deg[:, 3])
     grid = np.full((len(theta), len(phi), f.shape[1]), np.nan)
     grid[row, column] = f
+    repeats = np.zeros(grid.shape[:2], dtype=bool)
+    repeats[:, np.setdiff1d(column[images], column[~images])] = True
     if theta[0] == 0 and (row == 0).sum() == 1:
-        grid[0] = f[0]  # one reading along the normal is that of every phi_o
-    return Sheet(theta, phi, grid)
+        grid[0], repeats[0] = f[0], np.arange(len(phi)) != column[0]  # a reading along n is that of every phi_o
+    return Sheet(theta, phi, grid, images=repeats)

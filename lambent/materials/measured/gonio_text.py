@@ -20,20 +20,24 @@ from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
 from lambent.core.frames import Floats, angles
 from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
-from lambent.materials.measured.gonio_rows import QUANTITIES, Quantity, Rows, check_angles, table_of, to_f
+from lambent.materials.measured.gonio_rows import QUANTITIES, Quantity, Rows, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.sheets import Sheet
 from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text
 
 NAME = FORMAT
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
+_VALUE_COLUMNS = [[q] for q in QUANTITIES] + [[f"{q}_{channel}" for channel in "rgb"] for q in QUANTITIES]
 _HEADER_BYTES = 1 << 16
 _NOT_MEASURED = -1.0
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line that is no comment names the four angles."""
+    """Whether the first line that is no comment names the four angles, and no quantity in other words (BRDF)."""
     names = _names(head)
-    return names is not None and tuple(names[:4]) == ANGLES
+    if names is None or tuple(names[:4]) != ANGLES:
+        return False
+    values = names[4:]
+    return values in _VALUE_COLUMNS or len(values) not in (1, 3) or quantity_of(values[0]) is None
 
 
 def _names(head: bytes) -> list[str] | None:
@@ -75,12 +79,11 @@ def read(path: Path) -> GonioTable:
 
 
 def _quantity(columns: list[str], path: Path) -> Quantity:
-    for quantity in QUANTITIES:
-        if columns in ([quantity], [f"{quantity}_{c}" for c in "rgb"]):
-            return quantity
-    known = [*QUANTITIES, *(f"{quantity}_r {quantity}_g {quantity}_b" for quantity in QUANTITIES)]
-    got = " ".join(columns) or "none"
-    raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
+    if columns not in _VALUE_COLUMNS:
+        known = [" ".join(names) for names in _VALUE_COLUMNS]
+        got = " ".join(columns) or "none"
+        raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
+    return QUANTITIES[_VALUE_COLUMNS.index(columns) % len(QUANTITIES)]
 
 
 def _rows(content: bytes, columns: int, path: Path) -> Floats:
@@ -138,9 +141,10 @@ def _columns(theta_i_deg: float, phi_i_deg: float, sheet: AnySheet, far: bool, q
         theta, phi = (grid.ravel() for grid in np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij"))
         values = sheet.values
     else:
-        above = sheet.directions[:, 2] >= 0
-        theta, phi = (np.degrees(angle) for angle in angles(sheet.directions[above]))
-        values = sheet.values[above]
+        theta, phi = (np.degrees(angle) for angle in angles(sheet.directions))
+        values = sheet.values
+    kept = sheet.measured & (theta <= 90)
+    theta, phi, values = theta[kept], phi[kept], values[kept]
     if quantity != "f":
         values = values * np.cos(np.radians(theta))[:, None]
     fixed = np.broadcast_to((theta_i_deg, phi_i_deg), (len(theta), 2))

@@ -40,12 +40,20 @@ class Sheet:
         1/sr; NaN where it was not measured; negative as the sensor said. Nodes below the horizon are never used.
     frame : (3, 3), optional
         Rows: the directions that phi = 0 and phi = 90 run to from the pole, and the pole; orthonormal.
+    images : (T, P) bool, optional
+        Nodes that repeat another: across the plane of incidence, where only one side was measured, or along the pole.
     """
 
     theta_deg: Floats
     phi_deg: Floats
     f: Floats
     frame: Floats | None = None
+    images: Flags | None = None
+
+    @property
+    def measured(self) -> Flags:
+        """(T P,) the nodes that stand for a reading of their own."""
+        return np.ones(self.f.shape[:2], dtype=bool).ravel() if self.images is None else ~self.images.ravel()
 
     @cached_property
     def directions(self) -> Floats:
@@ -88,6 +96,21 @@ class Sheet:
         widths = np.diff(turn)
         return np.outer(rings, (widths + np.roll(widths, 1)) / 2).ravel()
 
+    def weights(self) -> Floats:
+        """(T P,) solid angles, those of images given to what they repeat."""
+        weight = self.solid_angles().reshape(self.f.shape[:2])
+        if self.images is None or not self.images.any():
+            return weight.ravel()
+        moved = np.where(self.images, weight, 0)
+        weight = weight - moved
+        if (~self.images[0]).sum() == 1:
+            weight[0, ~self.images[0]] += moved[0].sum()
+            moved[0] = 0
+        mirrored = np.argmin(np.abs((360 - self.phi_deg[:, None]) % 360 - self.phi_deg), axis=1)
+        for column in np.flatnonzero(moved.any(axis=0)):
+            weight[:, mirrored[column]] += moved[:, column]
+        return weight.ravel()
+
 
 @dataclass(frozen=True)
 class ScatteredSheet:
@@ -100,11 +123,19 @@ class ScatteredSheet:
         1/sr; NaN where it was not measured; negative as the sensor said.
     specular : (3, 3)
         `specular_frame` of the incident direction.
+    images : (N,) bool
+        Directions that mirror the plane of incidence's other side, where only one was measured.
     """
 
     directions: Floats
     values: Floats
     specular: Floats
+    images: Flags
+
+    @property
+    def measured(self) -> Flags:
+        """(N,) the directions that are no mirror images."""
+        return ~self.images
 
     @cached_property
     def _usable(self) -> Flags:
@@ -136,7 +167,12 @@ class ScatteredSheet:
         u = r2(count)
         nearest = cKDTree(self.directions).query(direction(np.arccos(u[:, 0]), 2 * np.pi * u[:, 1]))[1]
         share = np.bincount(nearest, minlength=len(self.directions)) * (2 * np.pi / count)
-        return np.asarray(share.clip(2 * np.pi / count / 2, max(_HEAVIEST * float(np.median(share)), 1e-6)))
+        return np.asarray(share.clip(np.pi / count, max(_HEAVIEST * float(np.median(share)), 1e-6)))
+
+    def weights(self) -> Floats:
+        """(N,) solid angles; a direction with a mirror image stands for both."""
+        aside = np.abs(self.directions @ self.specular[1]) > _IN_PLANE
+        return self.solid_angles() * np.where(aside & self.images.any(), 2.0, 1.0)
 
 
 class _PlaneScan:

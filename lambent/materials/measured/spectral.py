@@ -1,11 +1,12 @@
-"""Spectra of reflectance to linear RGB."""
+"""Measured spectra and tristimulus values to linear RGB."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.colour import XYZ_TO_RGB
+from lambent.core.colour import XYZ_TO_RGB, xyz_to_rgb
 from lambent.core.frames import Floats
+from lambent.materials.measured.protocol import Flags
 
 
 def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
@@ -29,3 +30,29 @@ def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
     xyz = (cmf * power) @ hats.T / (cmf[1] * power).sum()
     rgb = XYZ_TO_RGB @ xyz
     return np.asarray(rgb / rgb.sum(axis=1, keepdims=True))  # observer and primaries round the white differently
+
+
+def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """(N, 3) linear RGB of spectra (N, K), and what has to be said: NaN stays NaN, a negative spectrum becomes -1."""
+    rgb = np.full((len(spectra), 3), np.nan)
+    rgb[usable] = spectra[usable] @ rgb_of_spectra(wavelengths_nm).T
+    outside = int((rgb[usable] < 0).any(axis=1).sum())
+    rgb[usable] = np.maximum(rgb[usable], 0)
+    with np.errstate(invalid="ignore"):
+        rgb[(spectra < 0).any(axis=1)] = -1
+    notes: tuple[str, ...] = ("spectra became linear RGB under D65",)
+    if outside:
+        notes += (f"{outside} spectra are more saturated than Rec.709; the negative channel became 0",)
+    return rgb, notes
+
+
+def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """(..., 3) linear RGB of tristimulus values whose white is D65, and what has to be said; negative ones stay so."""
+    rgb = xyz_to_rgb(values)
+    with np.errstate(invalid="ignore"):
+        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(values >= 0, axis=-1, keepdims=True)
+    rgb = np.where(outside, np.maximum(rgb, 0), rgb)
+    notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
+    if outside.any():
+        notes += (f"{int(outside.sum())} values are more saturated than Rec.709; the negative channel became 0",)
+    return rgb, notes

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.frames import Floats, direction
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheets, Symmetry
-from lambent.materials.measured.protocol import LARGEST_F
+from lambent.materials.measured.protocol import LARGEST_F, Flags
 from lambent.materials.measured.sheets import Sheet, specular_frame
+from lambent.materials.measured.spectral import rgb_of_xyz
 from lambent.materials.measured.text_numbers import head_text, numbers, read_text, without_comments
 
 NAME = "Zemax BSDF text"
@@ -126,11 +126,12 @@ def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, F
 def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[str, str], path: Path) -> GonioTable:
     values, notes = _measured(values)
     if values.shape[-1] == 3:
-        values, said = _rgb(values)
+        values, said = rgb_of_xyz(values)
         notes += said
     azimuth = lists["ScatterAzimuth"]
+    images = None
     if words["Symmetry"] == "PlaneSymmetrical":
-        azimuth, values = _mirrored(azimuth, values)
+        azimuth, values, images = _mirrored(azimuth, values)
     elif azimuth[-1] - azimuth[0] >= 360:
         azimuth, values = azimuth[:-1], values[:, :, :-1]
     phi_i, order = np.unique(lists["SampleRotation"] % 360, return_index=True)
@@ -143,7 +144,11 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
     theta_i = lists["AngleOfIncidence"]
     sheets = tuple(
         tuple(
-            _sheet(values[k, i], azimuth, lists["ScatterRadial"], theta, phi, path)
+            _sheet(
+                Sheet(lists["ScatterRadial"], azimuth, values[k, i].swapaxes(0, 1), specular_frame(theta, phi), images),
+                (theta, phi),
+                path,
+            )
             for k, phi in zip(order, phi_i, strict=True)
         )
         for i, theta in enumerate(theta_i)
@@ -172,36 +177,26 @@ def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     return values, ("a BSDF of exactly 0 counts as not measured",) if empty.any() else ()
 
 
-def _rgb(values: Floats) -> tuple[Floats, tuple[str, ...]]:
-    rgb = xyz_to_rgb(values)
-    with np.errstate(invalid="ignore"):
-        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(values >= 0, axis=-1, keepdims=True)
-    rgb = np.where(outside, np.maximum(rgb, 0), rgb)
-    notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
-    if outside.any():
-        notes += (f"{int(outside.sum())} values are more saturated than Rec.709; the negative channel became 0",)
-    return rgb, notes
-
-
-def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """The other half of the turn: azimuth a has what -a has."""
+def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats, Flags]:
+    """The whole turn, in which azimuth a has what -a has, and which nodes (radials, azimuths) are such images."""
     half = azimuth <= 180
     inner = (azimuth > 0) & (azimuth < 180)
     whole = np.concatenate([azimuth[half], 360 - azimuth[inner][::-1]])
-    return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2)
+    images = np.broadcast_to(whole > 180, (values.shape[3], len(whole)))
+    return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2), images
 
 
-def _sheet(values: Floats, azimuth: Floats, radial: Floats, theta_i: float, phi_i: float, path: Path) -> Sheet:
-    sheet = Sheet(radial, azimuth, np.swapaxes(values, 0, 1), specular_frame(theta_i, phi_i))
+def _sheet(sheet: Sheet, incident_deg: tuple[float, float], path: Path) -> Sheet:
+    """The sheet, or a `UserError` where none of its nodes was measured."""
     if not np.isfinite(sheet.values).all(axis=1).any():
-        field = f"angle of incidence {theta_i:g}, rotation {phi_i:g}"
+        field = "angle of incidence {:g}, rotation {:g}".format(*incident_deg)
         raise UserError("no value was measured for an incident direction", file=path, field=field)
     return sheet
 
 
 def _outside(sheets: Sheets) -> tuple[str, ...]:
-    below = sum(int((sheet.directions[:, 2] <= 0).sum()) for row in sheets for sheet in row)
-    count = sum(len(sheet.directions) for row in sheets for sheet in row)
+    nodes = np.concatenate([sheet.directions[sheet.measured] for row in sheets for sheet in row])
+    below, count = int((nodes[:, 2] <= 0).sum()), len(nodes)
     return (f"{below} of {count} directions are below the horizon and left out",) if below else ()
 
 

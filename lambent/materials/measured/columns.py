@@ -1,0 +1,259 @@
+"""Plain columns of other people's programs: angles and values, under a line that names them in one of many ways.
+
+    # measured 2025-03-04
+    theta_in, phi_in, theta_out, phi_out, BRDF
+    30, 0, 10, 180, 0.041
+
+The line of names may be a comment. Angles are in degrees unless a name says (rad). Without a name for the quantity the
+file is refused: f and f cos theta_o look alike. Lambent's own gonio text is the strict case of this, see gonio_text.py.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, direction
+from lambent.materials.measured import gonio_text
+from lambent.materials.measured.gonio_rows import Quantity, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.scattered import ScatteredTable
+from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
+from lambent.materials.measured.table import isotropic_brdf, require_values
+from lambent.materials.measured.text_numbers import (
+    HINT_DECIMAL_COMMA,
+    has_decimal_commas,
+    head_text,
+    numbers,
+    read_text,
+    without_comments,
+)
+
+NAME = "plain columns"
+HINT_QUANTITY = "name the columns in the first line: theta_i phi_i theta_o phi_o, then f, f_cos or p"
+_OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")
+_IN = ("i", "in", "inc", "l", "light", "incident")
+_WAVELENGTH = re.compile(r"(\d+(?:\.\d+)?)_?nm$", re.IGNORECASE)
+_SEPARATORS = re.compile(r"[\s,;]+")
+_LEAST_NUMBERS = 5
+_SCATTERED = 4  # fewer outgoing directions than this per incident one: no grid of incident directions
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which column holds what.
+
+    Attributes
+    ----------
+    angles : dict of int
+        theta_i, phi_i, theta_o, phi_o or dphi -> column.
+    values : tuple of int
+        The value columns.
+    quantity : {"f", "f_cos", "p"}, optional
+        None where no name says it.
+    kind : str
+        grey, rgb, xyz or spectra.
+    wavelengths_nm : tuple of float
+        Of spectra.
+    radians : bool
+    """
+
+    angles: dict[str, int]
+    values: tuple[int, ...]
+    quantity: Quantity | None
+    kind: str
+    wavelengths_nm: tuple[float, ...] = ()
+    radians: bool = False
+
+
+def recognise(head: bytes, size: int) -> bool:
+    """Whether the first line names angles and values, or the first two hold as many numbers, five at least."""
+    text = head_text(head)
+    if text is None or gonio_text.recognise(head, size):
+        return False
+    names, body = _split(text)
+    if names is not None:
+        return True
+    first = [_SEPARATORS.split(line.strip()) for line in body[: 1 << 12].decode("utf-8", "replace").split("\n")]
+    first = [words for words in first if words != [""]][:2]
+    same = len({len(words) for words in first}) == 1 and len(first[0]) >= _LEAST_NUMBERS
+    return same and all(_is_number(word) for words in first for word in words)
+
+
+def read(path: Path) -> MeasuredTable:
+    """The table of a file of columns.
+
+    Raises
+    ------
+    UserError
+        Where no name says which quantity the values are, a row is broken, an angle is outside its range, or the
+        incident directions neither form a grid nor are scattered.
+    """
+    names, body = _split(read_text(path))
+    if names is None:
+        first = body.strip().split(b"\n")[0]
+        if has_decimal_commas(body):
+            raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
+        got = f"{len(_SEPARATORS.split(first.decode('utf-8', 'replace').strip()))} columns without names"
+        raise UserError("nothing says which quantity the columns hold", file=path, got=got, hint=HINT_QUANTITY)
+    layout = layout_of(names, path)
+    if layout.quantity is None:
+        got = ", ".join(names[column] for column in layout.values)
+        raise UserError("value columns do not say what they hold", file=path, got=got, hint=HINT_QUANTITY)
+    rows = rows_of(body, len(names), path)
+    notes = ("angles are in radians",) if layout.radians else ()
+    return assemble(rows, layout, 0.0, path, NAME, Path(path).stem, notes)
+
+
+def _split(text: bytes) -> tuple[list[str] | None, bytes]:
+    """The names of the columns, where a line gives them, and what stands below."""
+    named: list[str] | None = None
+    at = 0
+    while at < len(text):
+        end = text.find(b"\n", at)
+        end = len(text) if end < 0 else end
+        line = text[at:end].strip()
+        comment = line.startswith((b"#", b"%", b"//"))
+        if line:
+            words = _SEPARATORS.split(line.lstrip(b"#%/").decode("utf-8", "replace").strip(" \t,;"))
+            angles = {_angle(word) for word in words}
+            if {"theta_i", "theta_o"} <= angles and len(words) > 2:
+                named = words
+            if not comment:
+                is_names = named is words
+                return named, without_comments(text[end + 1 if is_names else at :])
+        at = end + 1
+    return None, b""
+
+
+def layout_of(names: list[str], path: Path) -> Layout:
+    """What the columns of these names hold.
+
+    Raises
+    ------
+    UserError
+        Where an angle is missing or named twice, or the value columns are of no known kind.
+    """
+    angles: dict[str, int] = {}
+    for column, name in enumerate(names):
+        angle = _angle(name)
+        if angle is not None and angles.setdefault(angle, column) != column:
+            raise UserError("two columns hold the same angle", file=path, field=name)
+    for needed in ("theta_i", "theta_o"):
+        if needed not in angles:
+            raise UserError("a column is missing", file=path, field=needed, got=" ".join(names))
+    radians = any("rad" in re.split(r"[^a-z]+", names[column].lower()) for column in angles.values())
+    columns = tuple(column for column in range(len(names)) if column not in angles.values())
+    words = [names[column].lower() for column in columns]
+    nm = [_WAVELENGTH.search(word) for word in words]
+    if len(words) > 1 and all(nm):
+        wavelengths = tuple(float(found[1]) for found in nm if found)
+        return Layout(angles, columns, quantity_of(_WAVELENGTH.sub("", words[0])), "spectra", wavelengths, radians)
+    for kind in ("rgb", "xyz"):
+        stems = {_stem(word, channel) for word, channel in zip(words, kind, strict=False)}
+        if len(words) == 3 and len(stems) == 1 and None not in stems:
+            return Layout(angles, columns, quantity_of(stems.pop() or ""), kind, (), radians)
+    if len(words) == 1:
+        return Layout(angles, columns, quantity_of(words[0]), "grey", (), radians)
+    expected = "one column, three (r g b or x y z), or one per wavelength (such as 550nm)"
+    raise UserError("value columns are of no known kind", file=path, got=" ".join(words) or "none", expected=expected)
+
+
+def _stem(word: str, channel: str) -> str | None:
+    """The word without its channel: brdf of brdf_r, nothing of r, None where it is another channel's."""
+    if word == channel:
+        return ""
+    return word[:-2] if word.endswith(f"_{channel}") else None
+
+
+def _angle(name: str) -> str | None:
+    """theta_i, phi_i, theta_o, phi_o or dphi, where the name is one of the usual ones for it."""
+    word = re.sub(r"\(.*?\)|\[.*?\]|_?(?:deg|rad)$", "", name.lower()).replace("-", "_").strip("_")
+    if word in ("dphi", "delta_phi", "phi_diff", "deltaphi"):
+        return "dphi"
+    found = re.fullmatch(r"(theta|phi)_?([a-z]+)", word)
+    if found is None:
+        return None
+    side = "i" if found[2] in _IN else "o" if found[2] in _OUT else None
+    return f"{found[1]}_{side}" if side else None
+
+
+def rows_of(body: bytes, columns: int, path: Path) -> Floats:
+    """(N, columns) numbers, separated by blanks, commas or semicolons."""
+    if has_decimal_commas(body):
+        raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
+    flat = numbers(re.sub(rb"[,;]", b" ", body), path)
+    lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
+    if lines == 0:
+        raise UserError("holds no rows", file=path)
+    if len(flat) != lines * columns:
+        got = f"{len(flat)} numbers in {lines} rows"
+        raise UserError("a row has another number of columns than names", file=path, got=got, expected=columns)
+    return flat.reshape(-1, columns)
+
+
+def assemble(
+    rows: Floats, layout: Layout, phi_i_deg: float, path: Path, reader: str, name: str, notes: tuple[str, ...]
+) -> MeasuredTable:
+    """A gonio table where the incident directions form a grid, else a scattered one.
+
+    Parameters
+    ----------
+    phi_i_deg : float
+        Where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
+        normal, where a mirror sends the light.
+    """
+    angles = _degrees(rows, layout, phi_i_deg)
+    check_angles(angles, path)
+    f, said = _values(rows[:, list(layout.values)], layout)
+    f = to_f(f, layout.quantity or "f", angles[:, 2])
+    usable = np.asarray((np.isfinite(f) & (f >= 0)).all(axis=1))
+    require_values(f, usable, path)
+    if "phi_i" not in layout.angles:
+        notes += (f"phi_i not stated, taken as {phi_i_deg:g}",)
+    incident = np.unique(np.round(angles[:, :2], 5), axis=0)
+    if len(incident) * _SCATTERED > len(rows) and not (angles[:, 2] > 90).any():
+        notes += ("incident directions form no grid: the material is taken as isotropic",)
+        wi, wo = (direction(*np.radians(angles[:, k : k + 2].T)) for k in (0, 2))
+        if f.shape[1] == 1:
+            f = np.repeat(f, 3, axis=1)
+        info = isotropic_brdf(path, reader, {"samples": len(rows)}, notes + said)
+        return ScatteredTable(wi, wo, f, info)
+    stored = layout.quantity or "f"
+    return table_of(Rows(angles, f, path, reader, name, stored, notes=notes + said))
+
+
+def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:
+    """(N, 4) theta_i, phi_i, theta_o, phi_o."""
+    unit = 180 / np.pi if layout.radians else 1.0
+    given = {name: rows[:, column] * unit for name, column in layout.angles.items()}
+    theta_i, theta_o = given["theta_i"], given["theta_o"]
+    phi_i = given.get("phi_i", np.full(len(rows), phi_i_deg))
+    phi_o = phi_i + given["dphi"] if "dphi" in given else given.get("phi_o", phi_i + 180)
+    behind = theta_o < 0
+    return np.stack([theta_i, phi_i, np.abs(theta_o), phi_o + np.where(behind, 180, 0)], axis=1)
+
+
+def _values(values: Floats, layout: Layout) -> tuple[Floats, tuple[str, ...]]:
+    """(N, 1 or 3) grey or linear RGB; NaN where it is not finite."""
+    values = np.where(np.isfinite(values), values, np.nan)
+    if layout.kind == "xyz":
+        return rgb_of_xyz(values)
+    if layout.kind == "spectra":
+        order = np.argsort(layout.wavelengths_nm, kind="stable")
+        with np.errstate(invalid="ignore"):
+            usable = np.asarray((values >= 0).all(axis=1))
+        return rgb_of_measured(values[:, order], usable, np.array(layout.wavelengths_nm)[order])
+    return values, ()
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

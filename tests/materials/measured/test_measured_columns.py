@@ -1,0 +1,152 @@
+"""Plain columns and ASTM E1392: names of columns, units, scattered directions, and the refusal to guess."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.frames import angles, direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.measured import load
+from tests.materials.measured.measured_files import GLOSSY
+
+GRID = np.array(
+    [(a, 0, b, c) for a in (0, 30, 60) for b in (0, 20, 40, 60) for c in (0, 60, 120, 180, 240, 300)], float
+)
+
+
+def table_text(names: str, rows: np.ndarray, separator: str = " ") -> str:
+    return names + "\n" + "\n".join(separator.join(f"{value:.9g}" for value in row) for row in rows) + "\n"
+
+
+def f_of(grid_deg: np.ndarray) -> np.ndarray:
+    wi, wo = direction(*np.radians(grid_deg[:, :2].T)), direction(*np.radians(grid_deg[:, 2:].T))
+    return MaterialBSDF(GLOSSY).eval(wi, wo)
+
+
+@pytest.mark.parametrize(
+    ("names", "separator", "scale"),
+    [
+        ("theta_i phi_i theta_o phi_o BRDF", " ", 1),
+        ("# theta_in phi_in theta_out phi_out brdf", "\t", 1),
+        ("Theta_l,Phi_l,Theta_v,Phi_v,fr", ",", 1),
+        ("theta-i (rad); phi-i (rad); theta-s (rad); phi-s (rad); BSDF [1/sr]", ";", np.pi / 180),
+    ],
+)
+def test_names_separators_and_units(tmp_path: Path, names: str, separator: str, scale: float) -> None:
+    path = tmp_path / "a"
+    names = names.replace(" (rad)", "(rad)").replace(" [1/sr]", "[1/sr]")
+    path.write_text("% made up\n" * names.startswith("#") + table_text(
+        names, np.column_stack([GRID * scale, f_of(GRID)[:, 0]]), separator))  # fmt: skip
+    table = load(path)
+    samples = table.samples()
+    assert table.info.format in ("plain columns", "gonio text") and len(samples) == len(GRID)
+    np.testing.assert_allclose(samples.f, MaterialBSDF(GLOSSY).eval(samples.wi, samples.wo)[:, :1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "power"), [("brdf_cos", 1), ("CCBRDF", 1), ("transfer", 1), ("btdf", 0)])
+def test_the_name_says_the_quantity(tmp_path: Path, name: str, power: int) -> None:
+    path = tmp_path / "a"
+    path.write_text(
+        table_text(f"theta_in phi_in theta_out phi_out {name}", np.column_stack([GRID, 0 * GRID[:, 0] + 1]))
+    )
+    samples = load(path).samples()
+    np.testing.assert_allclose(samples.f[:, 0], samples.wo[:, 2] ** -power, rtol=1e-9)
+
+
+def test_colour_and_spectra(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    rgb = f_of(GRID)
+    for names in ("brdf_r brdf_g brdf_b", "450nm 550nm 650nm"):
+        path.write_text(table_text(f"VARS theta_i,phi_i,theta_s,phi_s,{','.join(names.split())}",
+                                   np.column_stack([GRID, rgb if "r" in names else 0 * rgb + 0.25]), ","))  # fmt: skip
+        samples = load(path).samples()
+        expected = MaterialBSDF(GLOSSY).eval(samples.wi, samples.wo) if "r" in names else 0.25
+        np.testing.assert_allclose(samples.f, np.broadcast_to(expected, samples.f.shape), rtol=1e-6)
+
+
+def test_a_scan_in_the_plane_needs_no_phi(tmp_path: Path) -> None:
+    """Positive theta_o lies ahead of the normal, where a mirror sends the light."""
+    path = tmp_path / "a"
+    theta = np.arange(-75, 76, 5)
+    rows = np.column_stack([np.full(len(theta), 30), theta, np.exp(-(((theta - 30) / 20) ** 2))])
+    path.write_text(table_text("theta_i theta_o brdf", rows))
+    table = load(path)
+    wi = direction(np.radians(30), 0.0)
+    assert table.eval(wi, wi * (-1, 1, 1))[0] == pytest.approx(1, rel=1e-6)
+    assert table.eval(wi, wi)[0] == pytest.approx(np.exp(-9), rel=1e-3)
+
+
+def astm_text(rows: np.ndarray, variables: str = "theta_i,phi_i,theta_s,phi_s,R,G,B") -> str:
+    return table_text(f'LAB_NAME made up\nSAMPLE_NAME "red"\nNUM_POINTS {len(rows)}\nVARS {variables}', rows, ",")
+
+
+def test_astm_of_a_real_measurement(shared_data: Path, tmp_path: Path) -> None:
+    """The Cornell measurement written as tuples comes back whole: the raw tuples, in the same directions."""
+    source = load(shared_data / "measured" / "cornell" / "garnet_red.brdf").samples()
+    path = tmp_path / "a"
+    path.write_text(astm_text(np.column_stack([*angles(source.wi), *angles(source.wo), source.f])))
+    table = load(path)
+    samples = table.samples()
+    assert table.info.format == "ASTM E1392" and table.name == "red"
+    assert any("radians" in note for note in table.info.notes)
+    assert len(samples) == len(source) == 1439
+    np.testing.assert_allclose(np.sort(samples.f, axis=0), np.sort(source.f, axis=0), rtol=1e-6)
+    np.testing.assert_allclose(table.eval(samples.wi, samples.wo), samples.f, rtol=1e-5, atol=1e-7)
+
+
+def test_astm_degrees_and_the_standards_phi_i(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    theta = np.arange(0, 80, 5)
+    rows = np.array(
+        [(40, t, p, np.exp(-((t - 40) ** 2) / 200) * (p == 0) + 0.01) for t in theta for p in (0, 90, 180, 270)]
+    )
+    path.write_text(astm_text(rows, "theta_i,theta_s,phi_s,BRDF"))
+    table = load(path)
+    wi = direction(np.radians(40), np.pi)
+    assert table.eval(wi, wi * (-1, 1, 1))[0] == pytest.approx(1.01, rel=1e-6)
+    assert any("degrees" in note for note in table.info.notes)
+    assert any("phi_i not stated, taken as 180" in note for note in table.info.notes)
+
+
+def test_scattered_incident_directions(tmp_path: Path, hemisphere: Callable[..., np.ndarray]) -> None:
+    wi, wo = hemisphere(300, 1), hemisphere(300, 2)
+    path = tmp_path / "a"
+    path.write_text(astm_text(np.column_stack([*angles(wi), *angles(wo), MaterialBSDF(GLOSSY).eval(wi, wo)])))
+    table = load(path)
+    np.testing.assert_allclose(table.eval(wi, wo), MaterialBSDF(GLOSSY).eval(wi, wo), rtol=1e-4)
+    assert any("isotropic" in note for note in table.info.notes) and len(table.samples()) == 300
+
+
+ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (ROWS, "nothing says which quantity.*theta_i phi_i theta_o phi_o, then f"),
+        ("theta_in phi_in theta_out phi_out value\n" + ROWS, "do not say what they hold; found value"),
+        ("theta_in phi_in theta_out phi_out r g b\n0 0 0 0 1 1 1\n", "do not say what they hold"),
+        ("theta_in phi_in theta_out phi_out a b\n0 0 0 0 1 1\n", "no known kind"),
+        ("theta_in phi_in theta_out phi_out brdf\n", "no rows"),
+        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 1\n0 0 0\n", "another number of columns"),
+        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 spam\n", "found spam"),
+        ("theta_in;phi_in;theta_out;phi_out;brdf\n0,5;0;0;0;0,25\n", "decimal commas"),
+        ("0,5;0,0;0,0;0,0;0,25\n0,5;0,0;9,0;0,0;0,25\n", "decimal commas"),
+        ("0,5 0,0 0,0 0,0 0,25\n0,5 0,0 9,0 0,0 0,25\n", "decimal commas"),
+        ("theta_in theta_inc theta_out brdf\n0 0 0 1\n", "same angle"),
+        ("theta_in phi_in theta_out phi_out brdf\n99 0 0 0 1\n", "outside its range"),
+        ("theta_in phi_in theta_out phi_out brdf\n0 0 0 0 nan\n", "no measured value"),
+        ("NUM_POINTS 5\nVARS theta_i,phi_i,theta_s,phi_s,BRDF\n0,0,0,0,1\n", "NUM_POINTS: number of tuples"),
+        ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "no known kind; found none"),
+    ],
+)
+def test_refused(tmp_path: Path, text: str, expected: str) -> None:
+    path = tmp_path / "a"
+    path.write_text(text)
+    with pytest.raises(UserError, match=expected):
+        load(path)
