@@ -1,0 +1,352 @@
+"""Tensor trees of Radiance: f that is constant over cells of a disk map, finer where it varies.
+
+A direction is a place in the unit square: its projection on the sheet, a point of the unit disk, carried to the square
+by the equal-area map of Shirley & Chiu 1997, "A low distortion map between disk and square". A cell of side s therefore
+has the projected solid angle pi s^2. Rank 4 has the incident heading and the outgoing direction; rank 3 is isotropic:
+its first coordinate is (1 - sin theta_i) / 2, of which only [0, 1/2] is used, and the outgoing direction is turned so
+that the incident heading lies at phi = 0.
+
+As text a tree is nested braces. Braces in braces are the 2^rank halves of a cell; the first coordinate is the lowest
+bit of a branch's number. Numbers in braces are a grid of 2^(rank k) leaves, the last coordinate fastest.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.frames import Floats
+
+Indices = NDArray[np.int64]
+Rank = Literal[3, 4]
+
+DEEPEST = 24  # levels; a cell of that size is far below what any device or sampler resolves
+_TINY = 1e-6  # keeps the normal within the used half of rank 3, as Radiance does
+_BELOW_ONE = 1 - 2**-40
+_OPEN, _CLOSE = ord("{"), ord("}")
+_BLANKS = b" \t\r\n\f\v,"
+_BLANKED = bytes.maketrans(b",{}", b"   ")
+_IN_WORD = np.array([letter not in _BLANKS + b"{}" for letter in range(256)])
+_CHUNK = 1 << 20
+
+
+class Malformed(ValueError):
+    """The text is not what the format says; the message says why."""
+
+
+def disk_of(square: Floats) -> Floats:
+    """Points (..., 2) of the unit disk for points of [0, 1]^2."""
+    a, b = 2 * square[..., 0] - 1, 2 * square[..., 1] - 1
+    wide = np.abs(a) > np.abs(b)
+    r = np.where(wide, a, b)  # signed: the opposite quadrant is the same one turned by half a turn
+    ratio = np.divide(np.where(wide, b, a), r, out=np.zeros_like(r), where=r != 0)
+    phi = np.pi / 4 * np.where(wide, ratio, 2 - ratio)
+    return np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1)
+
+
+def square_of(disk: Floats) -> Floats:
+    """Points (..., 2) of [0, 1]^2 for points of the unit disk: the inverse of `disk_of`."""
+    r = np.hypot(disk[..., 0], disk[..., 1])
+    phi = np.arctan2(disk[..., 1], disk[..., 0])
+    phi = np.where(phi < -np.pi / 4, phi + 2 * np.pi, phi)
+    quadrant = np.floor((phi + np.pi / 4) / (np.pi / 2)).astype(np.int64).clip(0, 3)
+    along = r * (phi - quadrant * (np.pi / 2)) / (np.pi / 4)
+    a = np.choose(quadrant, [r, -along, -r, along])
+    b = np.choose(quadrant, [along, r, -along, -r])
+    return np.stack([(a + 1) / 2, (b + 1) / 2], axis=-1)
+
+
+def coordinates(rank: Rank, entering: Floats, leaving: Floats) -> Floats:
+    """Places (N, rank) in the unit cube for headings (N, 3) of light that enters and leaves."""
+    if rank == 4:
+        return np.concatenate([square_of(entering[:, :2]), square_of(leaving[:, :2])], axis=1)
+    turn = -np.arctan2(entering[:, 1], entering[:, 0])
+    cos, sin = np.cos(turn), np.sin(turn)
+    x, y = leaving[:, 0], leaving[:, 1]
+    turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return np.concatenate([_first_of_three(entering)[:, None], square_of(turned)], axis=1)
+
+
+def _first_of_three(entering: Floats) -> Floats:
+    return np.asarray(0.5 - _TINY - 0.5 * np.hypot(entering[:, 0], entering[:, 1]))
+
+
+def incident_coordinates(rank: Rank, entering: Floats) -> Floats:
+    """The first rank - 2 coordinates (N, rank - 2)."""
+    return square_of(entering[:, :2]) if rank == 4 else _first_of_three(entering)[:, None]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Leaves that a query meets, all flat: one entry per query and leaf.
+
+    Attributes
+    ----------
+    query : (M,) number of the query
+    corner : (M, D) lower corner in the coordinates that were free
+    side : (M,) length of the side
+    value : (M,)
+    """
+
+    query: Indices
+    corner: Floats
+    side: Floats
+    value: Floats
+
+    @property
+    def middle(self) -> Floats:
+        """(M, D)"""
+        return np.asarray(self.corner + self.side[:, None] / 2)
+
+    def chosen(self, index: NDArray[Any]) -> Cells:
+        """Those of an index or of flags."""
+        return Cells(self.query[index], self.corner[index], self.side[index], self.value[index])
+
+    @staticmethod
+    def joined(parts: Sequence[Cells]) -> Cells:
+        """One after the other."""
+        columns = zip(*((c.query, c.corner, c.side, c.value) for c in parts), strict=True)
+        return Cells(*(np.concatenate(column) for column in columns))
+
+
+@dataclass(frozen=True)
+class TensorTree:
+    """Piecewise constant function on the unit cube.
+
+    Attributes
+    ----------
+    rank : 3 or 4
+    children : (B, 2^rank) int32
+        Per branch and half the code of what is below: k >= 0 is branch k, -1 - k is grid k.
+    starts, logs : (K,)
+        Per grid the place of its first value, and the base-2 logarithm of its leaves per side.
+    values : (V,)
+    root : int
+        Code.
+    """
+
+    rank: Rank
+    children: NDArray[np.int32]
+    starts: Indices
+    logs: Indices
+    values: Floats
+    root: int
+
+    def look_up(self, place: Floats) -> tuple[Floats, Floats]:
+        """Value (N,) and side (N,) of the leaf at places (N, rank) in the unit cube."""
+        at = place.clip(0, _BELOW_ONE)
+        code = np.full(len(at), self.root)
+        side = np.ones(len(at))
+        bits = 1 << np.arange(self.rank)
+        active = np.flatnonzero(code >= 0)
+        while len(active):
+            doubled = 2 * at[active]
+            upper = doubled >= 1
+            at[active] = doubled - upper
+            side[active] /= 2
+            code[active] = self.children[code[active], upper @ bits]
+            active = active[code[active] >= 0]
+        grid = -1 - code
+        log = self.logs[grid]
+        cell = (at * (1 << log)[:, None]).astype(np.int64)
+        index = self.starts[grid]
+        for d in range(self.rank):
+            index = index + (cell[:, d] << log * (self.rank - 1 - d))
+        return self.values[index], side / (1 << log)
+
+    def walk(self, fixed: tuple[int, ...], place: Floats) -> Cells:
+        """The leaves met by each query, which fixes some coordinates and leaves the rest free.
+
+        Parameters
+        ----------
+        fixed : tuple of int
+            Numbers of the coordinates that are fixed.
+        place : (Q, len(fixed)) in [0, 1]
+        """
+        free = tuple(d for d in range(self.rank) if d not in fixed)
+        halves = np.array(np.meshgrid(*[(0, 1)] * len(free), indexing="ij")).reshape(len(free), -1).T
+        query, at = np.arange(len(place)), place.clip(0, _BELOW_ONE)
+        code, corner, side = np.full(len(place), self.root), np.zeros((len(place), len(free))), 1.0
+        found = []
+        while len(query):
+            leaf = code < 0
+            found.append(self._grids(fixed, free, query[leaf], at[leaf], -1 - code[leaf], corner[leaf], side))
+            query, at, code, corner, side = query[~leaf], 2 * at[~leaf], code[~leaf], corner[~leaf], side / 2
+            upper = at >= 1
+            at = at - upper
+            branch = (upper << np.array(fixed, dtype=np.int64)).sum(axis=1)[:, None] + halves @ (1 << np.array(free))
+            code = self.children[code[:, None], branch].ravel()
+            corner = (corner[:, None, :] + halves * side).reshape(-1, len(free))
+            query, at = (np.repeat(x, len(halves), axis=0) for x in (query, at))
+        return Cells.joined([cells for level in found for cells in level])
+
+    def _grids(
+        self,
+        fixed: tuple[int, ...],
+        free: tuple[int, ...],
+        query: Indices,
+        at: Floats,
+        grid: Indices,
+        corner: Floats,
+        side: float,
+    ) -> list[Cells]:
+        """The leaves of grids (Q,), which fill cells with these corners and this side."""
+        cells = [Cells(query[:0], corner[:0], np.zeros(0), np.zeros(0))]
+        for log in np.unique(self.logs[grid]):
+            here = self.logs[grid] == log
+            width = 1 << int(log)
+            index = self.starts[grid[here]]
+            for column, d in enumerate(fixed):
+                index = index + ((at[here, column] * width).astype(np.int64) << log * (self.rank - 1 - d))
+            steps = np.array(np.meshgrid(*[np.arange(width)] * len(free), indexing="ij")).reshape(len(free), -1).T
+            offset = (steps << log * (self.rank - 1 - np.array(free))).sum(axis=1)
+            value = self.values[index[:, None] + offset].ravel()
+            corners = (corner[here, None, :] + steps * (side / width)).reshape(-1, len(free))
+            queries = np.repeat(query[here], len(steps))
+            cells.append(Cells(queries, corners, np.full(len(value), side / width), value))
+        return cells
+
+    @cached_property
+    def used(self) -> Floats:
+        """The values of the cells that directions can reach: of rank 3 the half below 1/2."""
+        if self.rank == 4:
+            return self.values
+        cells = self.walk((), np.zeros((1, 0)))
+        return cells.value[cells.corner[:, 0] < 0.5]
+
+
+def parse_tree(text: bytes, rank: Rank) -> TensorTree:
+    """The tree of its text.
+
+    Raises
+    ------
+    Malformed
+        Where braces do not match, a count of branches or values is impossible, or a word is not a number.
+    """
+    nest = _Nest(rank)
+    for opens, words in _braces(text):
+        if opens:
+            nest.open(words)
+        else:
+            nest.close(words)
+    if nest.root is None:
+        raise Malformed("a brace that is not closed" if nest.begun else "no braces")
+    values = numbers_of(text)
+    logs = np.array(nest.logs, dtype=np.int64)
+    sizes = 1 << rank * logs
+    if len(values) != sizes.sum():
+        raise Malformed("a word that is not a number")
+    children = np.array(nest.children, dtype=np.int32).reshape(-1, 1 << rank)
+    return TensorTree(rank, children, np.cumsum(sizes) - sizes, logs, values, nest.root)
+
+
+class _Nest:
+    """Branches and grids of braces that come in order. It keeps its own stack, so depth costs nothing."""
+
+    def __init__(self, rank: Rank) -> None:
+        self.children = array("i")
+        self.logs = array("b")
+        self.root: int | None = None
+        self.begun = False  # a brace was opened, and what it holds is not known yet
+        self._rank, self._branches = rank, 1 << rank
+        self._log_of = {1 << rank * log: log for log in range(64 // rank)}
+        self._path: list[list[int]] = []  # open branches: number, halves filled
+
+    def open(self, words: int) -> None:
+        if words:
+            raise Malformed("a number outside the innermost braces")
+        if self.root is not None:
+            raise Malformed("text after the last brace")
+        if self.begun:
+            if len(self._path) == DEEPEST:
+                raise Malformed(f"more than {DEEPEST} levels of braces")
+            self._path.append([len(self.children) // self._branches, 0])
+            self.children.extend([0] * self._branches)
+        self.begun = True
+
+    def close(self, words: int) -> None:
+        if self.begun:
+            if words not in self._log_of:
+                raise Malformed(f"{words} values in braces, expected a power of {self._branches}")
+            self.logs.append(self._log_of[words])
+            self.begun = False
+            self._put(-len(self.logs))
+            return
+        if not self._path:
+            raise Malformed("a brace too many")
+        number, filled = self._path.pop()
+        if words or filled != self._branches:
+            got = "a number beside them" if words else str(filled)
+            raise Malformed(f"{self._branches} branches expected in braces, found {got}")
+        self._put(number)
+
+    def _put(self, code: int) -> None:
+        if not self._path:
+            self.root = code
+            return
+        number, filled = self._path[-1]
+        if filled == self._branches:
+            raise Malformed(f"more than {self._branches} branches in braces")
+        self.children[number * self._branches + filled] = code
+        self._path[-1][1] += 1
+
+
+def _braces(text: bytes) -> Iterator[tuple[bool, int]]:
+    """Per brace whether it opens, and how many words stand between it and the one before; in chunks, to save memory.
+
+    Raises
+    ------
+    Malformed
+        Where words stand after the last brace.
+    """
+    words = 0
+    for start in range(0, len(text), _CHUNK):
+        letters = np.frombuffer(text, np.uint8)[start : start + _CHUNK]
+        begins = _word_starts(letters, text[start - 1] if start else _BLANKS[0])
+        braces = np.flatnonzero((letters == _OPEN) | (letters == _CLOSE))
+        if len(braces) == 0:
+            words += int(begins.sum())
+            continue
+        between = np.add.reduceat(begins, np.concatenate([[0], braces]), dtype=np.int64)
+        between[0] += words
+        words = int(between[-1])
+        yield from zip((letters[braces] == _OPEN).tolist(), between[:-1].tolist(), strict=True)
+    if words:
+        raise Malformed("text after the last brace")
+
+
+def _word_starts(letters: NDArray[np.uint8], before: int) -> NDArray[np.bool_]:
+    """Whether a word begins at each letter; `before` is the letter that precedes them."""
+    inside = _IN_WORD[letters]
+    starts = inside.copy()
+    starts[1:] &= ~inside[:-1]
+    starts[0] &= not _IN_WORD[before]
+    return starts
+
+
+def count_words(text: bytes) -> int:
+    """How many words stand between blanks, commas and braces, without making them."""
+    return int(_word_starts(np.frombuffer(text, np.uint8), _BLANKS[0]).sum()) if text else 0
+
+
+def numbers_of(text: bytes) -> Floats:
+    """The numbers (N,) of a text, between which stand blanks, commas or braces.
+
+    Raises
+    ------
+    Malformed
+        Where a word is not a number.
+    """
+    blank = text.translate(_BLANKED)
+    if not blank.strip():
+        return np.zeros(0)
+    try:
+        return np.fromstring(blank, sep=" ")
+    except ValueError as error:
+        raise Malformed("a word that is not a number") from error
