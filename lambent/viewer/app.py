@@ -253,7 +253,9 @@ class Window:
             self._frames -= 1
             if self._frames <= 0:
                 self._loop.call_soon(self.canvas.close)
-        self._extra_frames = max(0, self._extra_frames - 1)
+        # Dear ImGui takes quick typing and clicking up one by one, a frame each.
+        unread = len(self._imgui.imgui_context.input_events_queue) > 0
+        self._extra_frames = SETTLE_FRAMES if unread else max(0, self._extra_frames - 1)
         self._moving = self._input.walking or self.state.playing
         if self._moving or self._extra_frames or self._frames is not None:
             self.canvas.request_draw()

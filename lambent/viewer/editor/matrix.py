@@ -23,7 +23,7 @@ class Matrix:
     tiles : dict of (kind, incident, side) to (x, y)
         Indices of the kind and the incident direction; side 1 is the far one.
     titles : tuple of (x, y, text)
-        What is written: of columns and rows, angles; of blocks, "kind 0", "kind 1" and so on.
+        What is written: of columns and rows, angles; of blocks, "kind 0", "kind 1" and so on; "far side" of rows.
     """
 
     step: float
@@ -56,6 +56,8 @@ def _lines(incidents: Sequence[Incident], kinds: int, sides: int, width: float, 
             top = y + HEAD_PX + kind * sides * step
             if column == 0:
                 titles.append((0.0, top + step / 2 - 8, f"kind {kind}"))
+                if sides == 2:
+                    titles.append((0.0, top + 1.5 * step - 8, "far side"))
             for side in range(sides):
                 tiles[kind, index, side] = (x, top + side * step)
     return Matrix(step, tiles, tuple(titles))

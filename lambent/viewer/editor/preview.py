@@ -23,8 +23,8 @@ from lambent.store.contract import CameraRecord, ObjectRecord, SceneRecord
 Floats = NDArray[np.floating]
 
 MEAN_RADIANCE = 0.35  # every environment is scaled to it, so that a change of light keeps the exposure
-LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.10, 0.16, -1.0), 7.0
-LAMP_SHARE = 1.0  # of the environment's light
+LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.07, -0.08, -1.0), 6.0
+LAMP_SHARE = 0.06  # of the environment's light
 OBJECT = "preview"
 BOUNDS = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
 CAMERA = CameraRecord(name="front", position=(0.0, 0.75, 4.1), target=(0.0, 0.0, 0.0), fov_y_deg=32.0)
@@ -91,12 +91,14 @@ class Preview:
 
 
 def with_lamp(cube: Floats) -> Floats:
-    """The environment with a round lamp far behind the sheet, as bright as to give as much light as all the rest."""
+    """The environment with a round lamp far behind the sheet, which adds `LAMP_SHARE` of the light."""
     w = normalize(face_directions(cube.shape[1]))
     cosine = np.cos(np.radians(LAMP_RADIUS_DEG))
-    inside = w @ normalize(np.array(LAMP_TOWARDS)) > cosine
+    edge = 2 / cube.shape[1]  # a texel's angle: the rim is as soft as the cube is coarse
+    away = np.arccos(np.clip(w @ normalize(np.array(LAMP_TOWARDS)), -1, 1))
+    inside = np.clip((np.radians(LAMP_RADIUS_DEG) - away) / edge + 0.5, 0, 1)[..., None]
     radiance = LAMP_SHARE * 4 * np.pi * MEAN_RADIANCE / (2 * np.pi * (1 - cosine))
-    return np.asarray(np.where(inside[..., None], radiance, cube), np.float32)
+    return np.asarray(cube + inside * (radiance - cube), np.float32)
 
 
 def preview_record(material: Material) -> SceneRecord:

@@ -139,10 +139,10 @@ def _spec(colour: Colour, weight: float) -> implot.Spec:
 
 def _albedo(editor: Editor, size: tuple[float, float]) -> None:
     shown = editor.shown
-    if not shown.albedos or not implot.begin_plot("##albedo", size, _PLOT):
+    if not shown.albedos or not implot.begin_plot("##albedo", size, _PLOT | implot.Flags_.no_legend):
         return
     implot.setup_axis(implot.ImAxis_.x1, "theta_i in degrees")
-    implot.setup_axis(implot.ImAxis_.y1, "albedo")
+    implot.setup_axis(implot.ImAxis_.y1, "albedo" + (" (triangles, thin: transmitted)" if shown.transmits else ""))
     ticks = [0.0, 30.0, 60.0, 90.0]
     implot.setup_axis_ticks(implot.ImAxis_.x1, ticks, [f"{t:g}" for t in ticks])
     implot.setup_axis_limits(implot.ImAxis_.x1, 0, 90)
@@ -150,7 +150,6 @@ def _albedo(editor: Editor, size: tuple[float, float]) -> None:
     values += [v for far, (_, v) in shown.measured_albedo.items() if editor.measurement is not None and len(v)]
     top = max(0.05, *(float(v.max()) for v in values))
     implot.setup_axis_limits(implot.ImAxis_.y1, 0, 1.15 * top, implot.Cond_.always)
-    implot.setup_legend(implot.Location_.north_west)
     implot.setup_finish()
     if top > 0.8:
         implot.plot_inf_lines(

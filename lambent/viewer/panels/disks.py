@@ -64,7 +64,7 @@ def _disk(
     centre, radius = (x + inside / 2, y + inside / 2), inside / 2
     chosen = index == editor.chosen
     lines.add_circle(centre, radius, imgui.get_color_u32(AMBER if chosen else RIM), 0, 2.0 if chosen else 1.0)
-    if step >= 24:
+    if step >= 40:
         source = (centre[0], centre[1] - radius * editor.shown.incidents[index].theta_deg / 90)
         lines.add_circle_filled(source, 2.5, imgui.get_color_u32(AMBER))
 
@@ -74,7 +74,7 @@ def _titles(laid: Matrix, kinds: list[str], origin: tuple[float, float]) -> None
     for x, y, text in laid.titles:
         of_kind = text.startswith("kind ")
         words = kinds[int(text[5:])] if of_kind else text
-        if not of_kind and laid.step < imgui.calc_text_size(words).x * 0.8:
+        if text.endswith("°") and laid.step < imgui.calc_text_size(words).x * 0.8:
             continue
         lines.add_text((origin[0] + x, origin[1] + y), imgui.get_color_u32(TEXT if of_kind else DIM), words)
 

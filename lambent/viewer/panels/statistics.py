@@ -20,5 +20,7 @@ def draw(state: ViewerState) -> None:
         ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
         ("draw calls", str(s.draw_calls)),
     ]
+    if state.editor is not None:
+        table.append(("disks, curves, error", f"{1e3 * state.editor.shown.moving_seconds:.1f} ms while a slider moves"))
     table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
     rows(table, "statistics")
