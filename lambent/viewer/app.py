@@ -68,14 +68,14 @@ def run(
     Window(state, geometry, picture, size=size, frames=frames).run()
 
 
-def check_display() -> None:
-    """`UserError` where no window can be opened."""
+def check_display(hint: str = "use `lambent render`, or `lambent demo --headless`") -> None:
+    """`UserError` where no window can be opened; `hint` says what to do instead."""
     import glfw
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", glfw.GLFWError)
         if not glfw.init():
-            raise UserError("no display", hint="use `lambent render`, or `lambent demo --headless`")
+            raise UserError("no display", hint=hint)
 
 
 class Drawing(Protocol):

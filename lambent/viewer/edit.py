@@ -49,7 +49,7 @@ def run(
     UserError
         Where there is no display or adapter, or a file cannot be used.
     """
-    check_display()
+    check_display("the editor needs one: use `lambent fit --plot`")
     state = editor_state(file, material, environments, folder=folder or Path.cwd())
     ball = sphere(1.0)
     geometry = Geometry(ball.positions, ball.faces, ())

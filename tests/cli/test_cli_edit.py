@@ -1,0 +1,63 @@
+"""`lambent edit` says what is wrong in one line before it opens a window."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.viewer.edit import editor_state
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_without_a_display(tmp_path):
+    Material(name="plain", kd=0.5).save(tmp_path / "plain.json")
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "lambent.cli.main", "edit", str(tmp_path / "plain.json")]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == ["lambent: error: no display; the editor needs one: use `lambent fit --plot`"]
+
+
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [
+        ("missing.bsdf", "cannot be read"),
+        ("light.hdr", "is a picture"),
+        ("junk.txt", "not a measured material"),
+        ("bad.json", "kd"),
+    ],
+)
+def test_what_cannot_be_shown(tmp_path, file, says):
+    (tmp_path / "junk.txt").write_text("hello")
+    (tmp_path / "bad.json").write_text('{"kd": -1}')
+    with pytest.raises(UserError, match=says):
+        editor_state(tmp_path / file, folder=tmp_path)
+
+
+def test_two_documents_are_compared(tmp_path):
+    for name in ("a", "b"):
+        Material(name=name, kd=0.5).save(tmp_path / f"{name}.json")
+    editor = editor_state(tmp_path / "a.json", tmp_path / "b.json", folder=tmp_path).editor
+    assert (editor.material.name, editor.compared.name, editor.measurement) == ("a", "b", None)
+
+
+def test_environments_are_named_and_found(tmp_path):
+    from lambent.bench.specular_scene import dusk
+    from lambent.core.images import write_image
+
+    Material(name="a", kd=0.5).save(tmp_path / "a.json")
+    write_image(tmp_path / "beside.hdr", dusk(4)[0])
+    other = tmp_path / "elsewhere" / "beside.exr"
+    other.parent.mkdir()
+    write_image(other, dusk(4)[0])
+    preview = editor_state(tmp_path / "a.json", None, [other], folder=tmp_path).preview
+    assert preview.environments[-2:] == ("beside", "beside'") and preview.environment == "beside'"
+    with pytest.raises(UserError, match="not a lat-long"):
+        preview.light("beside")
+    with pytest.raises(UserError, match="no such file"):
+        editor_state(tmp_path / "a.json", None, [tmp_path / "none.hdr"], folder=tmp_path)

@@ -1,0 +1,259 @@
+"""The editor without a window: steps, files, restrictions, the fit in the background."""
+
+import json
+import time
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Cancelled
+from lambent.materials.document import Lobe, Material, Provenance, load_material
+from lambent.viewer.editor.documents import same_numbers
+from lambent.viewer.editor.editor import Editor
+from lambent.viewer.editor.measurement import read_measurement
+from lambent.viewer.editor.restrictions import Restrictions, lobe_names
+from lambent.viewer.editor.start import start_material
+from lambent.viewer.editor.work import Work
+from lambent.viewer.state import MaterialEdits
+from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
+
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def brass_file(tmp_path_factory):
+    return write_measurement(tmp_path_factory.mktemp("measured") / "brass.txt", BRASS)
+
+
+@pytest.fixture
+def said():
+    return []
+
+
+@pytest.fixture
+def editor(tmp_path, said):
+    return Editor(MaterialEdits({"brass": BRASS}), "brass", tmp_path, said.append)
+
+
+def moved(material, **changes):
+    return material.model_copy(update={"lobes": (material.lobes[0].model_copy(update=changes), *material.lobes[1:])})
+
+
+def until(editor, condition):
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, "it never happened"
+        editor.tick()
+        time.sleep(0.005)
+
+
+def test_a_drag_is_one_step_and_is_shown_at_once(editor, brass_file):
+    editor.show_measurement(read_measurement(brass_file))
+    editor.tick()
+    error, image, curve = editor.shown.error, editor.shown.images["A"], editor.shown.curves["A", False]
+    assert error < 0.01 * editor.measurement.lambertian["cuberoot"]
+    for mx in (0.2, 0.3, 0.4):
+        editor.change(moved(editor.material, mx=mx, my=mx))
+        editor.tick()
+        assert editor.shown.error > error
+        error = editor.shown.error
+    assert editor.shown.images["A"] is not image
+    assert editor.shown.curves["A", False].max() < curve.max()
+    editor.edits.end_stroke()
+    editor.edits.undo()
+    assert editor.material == BRASS and not editor.edits.can_undo
+    until(editor, lambda: editor.shown.exact and editor.shown.layout["A"].pixels > 60)
+    assert editor.shown.error == pytest.approx(editor.measurement.exact_errors(BRASS)["cuberoot"])
+
+
+def test_what_is_compared_with(editor):
+    editor.reference = "as loaded"
+    editor.step(moved(BRASS, mx=0.3))
+    editor.step(moved(BRASS, mx=0.5))
+    assert editor.compared == BRASS
+    editor.reference = "before the last step"
+    assert editor.compared.lobes[0].mx == 0.3
+    editor.reference = "as saved"
+    assert editor.compared is None
+    editor.save()
+    assert editor.compared.lobes[0].mx == 0.5
+    editor.tick()
+    assert ("B", False) in editor.shown.curves
+    editor.reference = "nothing"
+    editor.tick()
+    assert ("B", False) not in editor.shown.curves and "B" not in editor.shown.images
+
+
+def test_revert_can_be_undone(editor):
+    editor.step(moved(BRASS, mx=0.3))
+    assert editor.unsaved
+    editor.revert()
+    assert editor.material == BRASS and not editor.unsaved
+    editor.edits.undo()
+    assert editor.material.lobes[0].mx == 0.3
+
+
+def test_lobes_come_and_go_and_restrictions_follow(editor):
+    editor.add_lobe("reflection")
+    editor.add_lobe("transmission")
+    assert [names["mx"] for names in lobe_names(editor.material)] == ["mx", "mx_2", "t_mx"]
+    editor.restrictions.fix("mx_2", True)
+    editor.restrictions.fix("kd", True)
+    editor.restrictions.narrow("mx", (0.1, 0.2))
+    editor.remove_lobe(0)
+    assert editor.restrictions.fixed == {"mx", "kd"} and editor.restrictions.ranges == {}
+    editor.turn_lobe(0, "transmission")
+    assert [lobe.side for lobe in editor.material.lobes] == ["transmission", "transmission"]
+    assert editor.restrictions.fixed == {"kd"}
+    for _ in range(4):
+        editor.edits.undo()
+    assert editor.material == BRASS
+
+
+def test_restrictions_of_a_fit():
+    restrictions = Restrictions()
+    material = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.1, my=0.2, r0=(0.2, 0.3, 0.4), k=0.5),))
+    for name in ("kd", "ks", "r0", "my_2"):
+        restrictions.fix(name, True)
+    restrictions.narrow("mx", (0.05, 0.3))
+    fix, ranges, unknown = restrictions.for_fit(material, 1)
+    assert fix == {"kd": (0.1, 0.2, 0.3), "ks": 0.5, "r0": pytest.approx(0.3)}
+    assert ranges == {"mx": (0.05, 0.3)} and unknown == ["my_2"]
+    restrictions.fix("mx", True)
+    assert restrictions.ranges == {}, "what is fixed has no interval"
+
+
+def test_a_fit_comes_as_one_step_and_keeps_what_is_fixed(editor, brass_file, said):
+    editor.show_measurement(read_measurement(brass_file))
+    editor.step(moved(BRASS, mx=0.5, my=0.5, alpha=0.0))
+    editor.restrictions.fix("alpha", True)
+    editor.options.distribution = "beckmann"
+    editor.start_fit()
+    until(editor, lambda: editor.fitting is None)
+    found = editor.material
+    assert found.lobes[0].mx == pytest.approx(0.15, rel=0.05) and found.lobes[0].alpha == 0
+    assert found.name == "brass" and found.provenance.source == "brass.txt"
+    assert said[-1].startswith("fitted in")
+    editor.edits.undo()
+    assert editor.material.lobes[0].mx == 0.5
+
+
+def test_a_cancelled_fit_leaves_the_material(editor, brass_file, said):
+    editor.show_measurement(read_measurement(brass_file))
+    editor.options.lobes, editor.options.method = "3", "grid"
+    editor.start_fit()
+    editor.stop_fit(keep=False)
+    until(editor, lambda: editor.fitting is None)
+    assert editor.material == BRASS and not editor.edits.can_undo
+    assert "cancelled" in said[-1]
+
+
+def test_a_fit_that_cannot_be_is_said(editor, brass_file, said):
+    editor.show_measurement(read_measurement(brass_file))
+    editor.add_lobe("transmission")
+    editor.restrictions.fix("t_mx", True)
+    editor.start_fit()
+    until(editor, lambda: editor.fitting is None)
+    assert "not fitted" in said[-1] and "does not transmit" in said[-1]
+
+
+def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
+    fitted = BRASS.model_copy(
+        update={"provenance": Provenance(source="brass.txt", method="gradient", errors={"l1": 9.0})}
+    )
+    editor.origin = fitted
+    editor.show_measurement(read_measurement(brass_file))
+    editor.step(moved(BRASS, mx=0.3))
+    editor.file_name = "mine.json"
+    editor.save()
+    saved = load_material(tmp_path / "mine.json")
+    assert same_numbers(saved, editor.material) and not editor.unsaved
+    assert saved.provenance.method == "gradient" and "edited by hand after the fit" in saved.provenance.notes[-1]
+    assert saved.provenance.errors == pytest.approx(editor.measurement.exact_errors(saved))
+    editor.step(fitted)
+    editor.save()
+    assert load_material(tmp_path / "mine.json").provenance == fitted.provenance, "as fitted, so no note"
+
+
+def test_another_file_is_replaced_at_the_second_try(editor, tmp_path, said):
+    FROSTED.save(tmp_path / "brass.json")
+    editor.save()
+    assert load_material(tmp_path / "brass.json").name == "frosted" and "save again" in said[-1]
+    editor.save()
+    assert load_material(tmp_path / "brass.json").name == "brass"
+
+
+@pytest.mark.parametrize("name", ["", ".json", "brass.txt", "nowhere/brass.json"])
+def test_a_bad_file_name_is_said_and_nothing_lost(editor, said, name):
+    editor.step(moved(BRASS, mx=0.3))
+    editor.file_name = name
+    editor.save()
+    assert said[-1].startswith("not saved") and editor.unsaved and editor.material.lobes[0].mx == 0.3
+
+
+def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, said):
+    editor.show_measurement(before := read_measurement(brass_file))
+    junk, broken = tmp_path / "junk.bsdf", tmp_path / "broken.json"
+    junk.write_bytes(b"\x00junk" * 50)
+    broken.write_text(json.dumps({"kd": -1}))
+    for text in ("", "/no/such/file", str(junk), str(broken), str(tmp_path / "light.hdr"), str(tmp_path)):
+        count = len(said)
+        editor.open(text)
+        until(editor, lambda count=count: len(said) > count)
+        assert said[-1].startswith("not loaded"), text
+    assert editor.measurement is before and editor.material == BRASS
+    editor.open_compared(str(broken))
+    assert editor.document is None and said[-1].startswith("not loaded")
+
+
+def test_files_are_taken_for_what_they_hold(editor, brass_file, tmp_path):
+    FROSTED.save(tmp_path / "frosted.json")
+    editor.open(f" '{tmp_path / 'frosted.json'}' ")
+    assert same_numbers(editor.material, FROSTED)
+    editor.edits.undo()
+    assert editor.material == BRASS
+    editor.open(f"file://{brass_file}")
+    until(editor, lambda: editor.measurement is not None)
+    assert editor.measurement.path == brass_file
+
+
+def test_start_material(tmp_path):
+    start = start_material(read_measurement(write_measurement(tmp_path / "frosted.txt", FROSTED)))
+    assert [lobe.side for lobe in start.lobes] == ["reflection", "transmission"]
+    assert start.kt_d == pytest.approx(FROSTED.kt_d, rel=0.25)
+
+
+def test_work_reports_its_end():
+    ends = []
+    work = Work(lambda progress: 6 * 7, ends.append)
+    work.wait()
+    assert work.poll() and ends == [42]
+
+    def refused(progress):
+        raise UserError("no")
+
+    work = Work(refused, ends.append, lambda error: ends.append(error.message))
+    work.wait()
+    assert work.poll() and ends[-1] == "no"
+
+    def broken(progress):
+        raise ZeroDivisionError
+
+    work = Work(broken, ends.append)
+    work.wait()
+    with pytest.raises(ZeroDivisionError):
+        work.poll()
+
+
+def test_work_is_cancelled_through_its_progress():
+    def long(progress):
+        for step in range(10**9):
+            progress(step, 10**9, "steps")
+            time.sleep(0.001)
+
+    ends = []
+    work = Work(long, ends.append)
+    work.cancel()
+    work.wait()
+    assert work.poll() and ends == []
+    assert isinstance(work._error, Cancelled)
