@@ -1,16 +1,16 @@
 """Opens the window and writes its state after every frame, for a test that looks on from another process.
 
-python -m tests.viewer.watched_window STORE OUT WIDTHxHEIGHT [MODE]
+python -m tests.viewer.watched_window STORE OUT WIDTHxHEIGHT [walk | view]
+python -m tests.viewer.watched_window MEASUREMENT OUT WIDTHxHEIGHT edit:MATERIAL
 """
 
-import functools
 import json
 import sys
 from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.viewer import app
+from lambent.viewer import app, edit
 from tests.viewer.panel_driver import recording
 
 store, out, size = Path(sys.argv[1]), Path(sys.argv[2]), tuple(map(int, sys.argv[3].split("x")))
@@ -42,12 +42,30 @@ class WatchedWindow(app.Window):
             "file_names": state.file_names,
             "picture": [self._input.picture.width, self._input.picture.height],
             "rects": self.rects,
+            "editor": editor_seen(state.editor),
         }
         write_text(out / "state.json", json.dumps(seen))
 
 
-app.Window = WatchedWindow
+def editor_seen(editor):
+    if editor is None:
+        return None
+    shown = editor.shown
+    return {
+        "error": shown.error,
+        "exact": shown.exact,
+        "typed": editor.typed,
+        "measured": editor.measurement is not None,
+        "fitting": editor.fitting is not None,
+    }
+
+
+app.Window = edit.Window = WatchedWindow
+mode = sys.argv[4] if len(sys.argv) > 4 else "walk"
 try:
-    functools.partial(app.run, store, *sys.argv[4:5], size=size, folder=out)()
+    if mode.startswith("edit:"):
+        edit.run(store, Path(mode.removeprefix("edit:")), size=size, folder=out)
+    else:
+        app.run(store, mode, size=size, folder=out)
 except UserError as error:
     sys.exit(f"error: {error}")

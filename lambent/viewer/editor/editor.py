@@ -88,6 +88,7 @@ class Editor:
     open_environment: Callable[[Path], None] | None = None  # what to do with an environment that was dropped
     fit_axes: bool = True  # the axes have yet to take the extent of what they show
     _queue: list[Callable[[], None]] = field(default_factory=list)
+    _closed: bool = False
     _keep: bool = False  # what a fit that was stopped has found
     _may_replace: set[Path] = field(default_factory=set)
 
@@ -313,6 +314,8 @@ class Editor:
         queue, self._queue = self._queue, []
         for act in queue:
             act()
+        if self._closed:
+            return
         if self.fitting is not None and self.fitting.poll():
             self.fitting = None
         if self.loading is not None and self.loading.poll():
@@ -323,7 +326,8 @@ class Editor:
         self.shown.seconds = time.perf_counter() - began
 
     def close(self) -> None:
-        """Stop what goes on in the background."""
+        """Stop what goes on in the background; nothing is shown any more."""
+        self._closed = True
         for work in (self.fitting, self.loading, self.shown.exact_work):
             if work is not None:
                 work.cancel()

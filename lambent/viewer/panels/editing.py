@@ -59,7 +59,7 @@ def _names(editor: Editor) -> None:
     if editor.leave is not None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
         if imgui.button("close##editor", (-1, 0)):
-            editor.leave()
+            editor.queue(editor.leave)
     text = "no measurement" if info is None else f"{info.file}: {info.format}, {len(measurement.samples)} tuples"  # type: ignore[union-attr]
     imgui.push_style_color(imgui.Col_.text, DIM)
     imgui.text_unformatted(text if editor.loading is None else f"reading: {editor.loading.what}")
