@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 
 from lambent.viewer import cameras, pacing, picking
-from lambent.viewer.input import SHORTCUTS
+from lambent.viewer.editor import measurement
+from lambent.viewer.input import PREVIEW_SHORTCUTS, SHORTCUTS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("shortcut", SHORTCUTS, ids=lambda s: s[0])
+@pytest.mark.parametrize("shortcut", (*SHORTCUTS, *PREVIEW_SHORTCUTS), ids=lambda s: s[0])
 def test_every_shortcut_is_documented(shortcut):
     assert f"| {shortcut[0]} | {shortcut[1]} |" in TEXT
 
@@ -18,5 +19,6 @@ def test_every_shortcut_is_documented(shortcut):
 def test_the_numbers_are_those_of_the_code():
     assert f"{cameras.WALK_M_S} m/s" in TEXT
     assert f"{cameras.EYE_HEIGHT_M} m above" in TEXT
+    assert f"{measurement.FEW:,} tuples".replace(",", " ") in TEXT
     assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
     assert f"{100 * picking.STEP_M:.0f} cm" in TEXT

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lambent.viewer.input import SHORTCUTS
+from lambent.viewer.input import PREVIEW_SHORTCUTS, SHORTCUTS
 from lambent.viewer.panels.widgets import rows
 from lambent.viewer.state import ViewerState
 
@@ -10,4 +10,4 @@ TITLE = "Help"
 
 
 def draw(state: ViewerState) -> None:
-    rows(SHORTCUTS, "shortcuts")
+    rows(SHORTCUTS if state.preview is None else PREVIEW_SHORTCUTS, "shortcuts")
