@@ -19,7 +19,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 # A room may import rooms of a lower floor, and itself.
 FLOOR = {
     "core": 0, "materials": 1, "scenes": 2, "store": 3, "bake": 4, "realtime": 4, "editing": 4, "viewer": 5,
-    "bench": 6, "demo": 6, "cli": 7,
+    "report": 6, "bench": 6, "demo": 6, "cli": 7,
 }  # fmt: skip
 # Libraries that only some rooms may import.
 ONLY_IN = {

@@ -1,0 +1,363 @@
+"""The report of a fit: what was measured, what was found, how far to trust it, how it looks."""
+
+from __future__ import annotations
+
+import io
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.files import sha256_of, write_text
+from lambent.core.images import to_bytes
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting import plot
+from lambent.materials.fitting.account import PEAK_SHARE, evaluate
+from lambent.materials.fitting.fit import FitResult
+from lambent.materials.fitting.incidence import Incidence, incidences
+from lambent.materials.fitting.metrics import METRICS, Metric
+from lambent.materials.fitting.slices import slices
+from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
+from lambent.report import page
+from lambent.scenes.scene import Environment
+
+Floats = NDArray[np.floating]
+
+DPI, DENSITY = 150, 1.5  # plots are drawn finer than they are shown, for print and fine displays
+STORED = {
+    "f": "f, the BSDF without a cosine, 1/sr",
+    "f_cos": "f |cos theta_o|, 1/sr",
+    "p": "the transfer probability p = f |cos theta_o|, 1/sr",
+}
+REASONS = {
+    "shadowed": "marked as not measured, or hidden by the device",
+    "not_finite": "not a number, infinite, or absurdly large",
+    "negative": "below zero in a channel",
+    "grazing": "theta_i or theta_o beyond 84°, where devices see their own errors",
+}
+MEANINGS = (
+    ("k", "coefficient", "1, linear RGB"),
+    ("mx", "roughness along the brushing direction", "slope"),
+    ("my", "roughness across it", "slope"),
+    ("r0", "Fresnel reflectance at normal incidence", "1"),
+    ("alpha", "exponent of the cosines: how much grazing light gains", "1"),
+)
+EYE_LIKE = ("cuberoot", "log")
+
+
+def write_report(
+    path: Path,
+    table: MeasuredTable,
+    samples: MeasuredSamples,
+    result: FitResult,
+    *,
+    source: Path | None = None,
+    environment: Environment | None = None,
+    progress: Progress = silent,
+) -> None:
+    """Write one self-contained HTML file.
+
+    Parameters
+    ----------
+    table, samples, result
+        What was measured, its tuples, and what `fit` made of them.
+    source : Path, optional
+        The measured file, for its hash.
+    environment : Environment, optional
+        What the previews stand in; daylight by default.
+
+    Raises
+    ------
+    UserError
+        Where the environment cannot be read or the file not be written. A machine without a working path tracer is
+        no error: the report then says that it has no previews, and why.
+    """
+    write_text(path, report(table, samples, result, source=source, environment=environment, progress=progress))
+
+
+def report(
+    table: MeasuredTable,
+    samples: MeasuredSamples,
+    result: FitResult,
+    *,
+    source: Path | None = None,
+    environment: Environment | None = None,
+    progress: Progress = silent,
+) -> str:
+    """The page; see `write_report`."""
+    material = result.material
+    gathered = incidences(samples)
+    body = [page.heading(samples.info.file, 1), page.paragraph(_lead(material, result), "lead")]
+    if result.warnings:
+        body.append(page.note("Before trusting the numbers", result.warnings))
+    body += _previews(table, material, environment, progress)
+    body += _measurement(table, samples, source)
+    body += _parameters(material)
+    body += _errors(samples, result)
+    body += _plots(samples, material, gathered, _metric(material), progress)
+    body.append(page.footer(_colophon(material, result)))
+    return page.page(f"{samples.info.file}: fit", body)
+
+
+def _metric(material: Material) -> Metric:
+    chosen = material.provenance.metric if material.provenance is not None else None
+    return METRICS[chosen] if chosen in METRICS else METRICS["cuberoot"]
+
+
+def _lead(material: Material, result: FitResult) -> str:
+    parts = [_counted(lobes, side) for side, lobes in _by_side(material)]
+    parts += [
+        f"diffuse {side}" for side, rgb in (("reflection", material.kd), ("transmission", material.kt_d)) if any(rgb)
+    ]
+    metric = _metric(material)
+    share = result.errors[metric.name] / max(result.lambertian_errors[metric.name], 1e-300)
+    found = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts) or "nothing that scatters"
+    return (
+        f"Fitted with {found}. Its error under the {metric.name} metric is {share:.2f} of that of the best Lambertian "
+        "surface."
+    )
+
+
+def _by_side(material: Material) -> list[tuple[str, tuple[Lobe, ...]]]:
+    sides = (("reflection", material.reflection_lobes), ("transmission", material.transmission_lobes))
+    return [(side, lobes) for side, lobes in sides if lobes]
+
+
+def _counted(lobes: tuple[Lobe, ...], side: str) -> str:
+    kinds = {lobe.distribution for lobe in lobes}
+    kind = {"beckmann": "Beckmann ", "ggx": "GGX "}[kinds.pop()] if len(kinds) == 1 else ""
+    return f"one {kind}lobe of {side}" if len(lobes) == 1 else f"{len(lobes)} {kind}lobes of {side}"
+
+
+def _previews(
+    table: MeasuredTable, material: Material, environment: Environment | None, progress: Progress
+) -> list[str]:
+    """The two balls and their difference, or why there are none."""
+    try:
+        from lambent.bake.engine import engine
+
+        engine()
+    except UserError as error:
+        return [page.note("No previews", [f"The measurement and the model are not shown on a ball: {error}"])]
+    from lambent.bake.material_preview import DAYLIGHT, preview
+
+    seen = preview(table, material, environment or DAYLIGHT, progress=progress)
+    where = "under a clear sky" if environment is None else f"in {_name_of(environment)}"
+    lamp = ", a lamp inside" if seen.lamp else ""
+    brushed = ", brushed along its circles of latitude" if not table.info.isotropic else ""
+    figures = seen.figures
+    words = (
+        f"Over the ball: PSNR {figures['psnr_db']:.1f} dB, FLIP {figures['flip_mean']:.3f} on average and "
+        f"{figures['flip_worst_tile']:.3f} in the worst tile of 16 x 16 pixels (0: no difference a viewer sees, 1: the "
+        f"largest)."
+    )
+    balls = [
+        page.picture(_cut_out(seen.measured, seen.ball), "A ball that wears the measured table.", "Measured"),
+        page.picture(_cut_out(seen.model, seen.ball), "The same ball with the fitted material.", "Model"),
+        page.picture(
+            _cut_out(seen.difference, seen.ball),
+            f"FLIP difference in false colour; mean {figures['flip_mean']:.3f}.",
+            "Difference: FLIP, black none, yellow-white the largest",
+        ),
+    ]
+    about = (
+        f"A ball {where}{lamp}{brushed}; path traced, {seen.spp} samples per pixel, the same in both, not denoised, "
+        "one exposure."
+    )
+    return [page.row(balls), page.paragraph(words), page.paragraph(about, "soft")]
+
+
+def _name_of(environment: Environment) -> str:
+    file = getattr(environment, "file", None)
+    return "another sky" if file is None else Path(file).name
+
+
+def _cut_out(picture: Floats, ball: NDArray[np.bool_]) -> bytes:
+    """PNG of an encoded picture, see-through beside the ball."""
+    from PIL import Image
+
+    rgba = np.concatenate([to_bytes(picture), np.where(ball, 255, 0).astype(np.uint8)[..., None]], axis=-1)
+    stream = io.BytesIO()
+    Image.fromarray(rgba).save(stream, format="PNG", optimize=True)
+    return stream.getvalue()
+
+
+def _measurement(table: MeasuredTable, samples: MeasuredSamples, source: Path | None) -> list[str]:
+    info, left_out = samples.info, samples.left_out
+    total = len(samples) + left_out.total
+    rows = [
+        ("Specimen", getattr(table, "name", None) or Path(info.file).stem),
+        ("File", info.file),
+        ("Format", info.format),
+        ("Holds", STORED[info.stored]),
+        ("Channels", "3, linear RGB (Rec.709)" if info.channels == 3 else "1, grey"),
+        ("Symmetry", "isotropic" if info.isotropic else "anisotropic"),
+        ("Sides", "reflection and transmission" if info.transmits else "reflection"),
+        ("Dimensions", ", ".join(f"{name} {size}" for name, size in info.sizes.items()) or "not gridded"),
+        ("Measurements used", f"{len(samples):,} of {total:,} ({100 * len(samples) / total:.1f} %)"),
+    ]
+    if source is not None:
+        rows.append(("SHA-256", sha256_of(source)))
+    body = [page.heading("The measurement"), page.facts(rows)]
+    gone = [
+        (reason.replace("_", " "), f"{count:,}", f"{100 * count / total:.2f} %", REASONS[reason])
+        for reason in REASONS
+        if (count := getattr(left_out, reason))
+    ]
+    if gone:
+        head = ("Left out", "tuples", "share", "why")
+        body.append(page.table(head, gone, numbers=(1, 2), caption="Each tuple is counted once, by the first reason."))
+    else:
+        body.append(page.paragraph("Nothing was left out."))
+    return [*body, page.bullets(info.notes)] if info.notes else body
+
+
+def _parameters(material: Material) -> list[str]:
+    body = [page.heading("The material")]
+    diffuse = [("kd", "diffuse reflection", _rgb(material.kd), "1, linear RGB")]
+    if material.transmits:
+        diffuse.append(("kt_d", "diffuse transmission", _rgb(material.kt_d), "1, linear RGB"))
+    body.append(page.table(("parameter", "meaning", "value", "unit"), diffuse))
+    if material.lobes:
+        names = [f"lobe {number}" for number in range(1, len(material.lobes) + 1)]
+        rows = [
+            ("side", "", *(lobe.side for lobe in material.lobes), ""),
+            (
+                "distribution",
+                "",
+                *({"beckmann": "Beckmann", "ggx": "GGX"}[lobe.distribution] for lobe in material.lobes),
+                "",
+            ),
+        ]
+        for name, meaning, unit in MEANINGS:
+            values = [getattr(lobe, name) for lobe in material.lobes]
+            rows.append((name, meaning, *(_rgb(v) if isinstance(v, tuple) else f"{v:.4f}" for v in values), unit))
+        body.append(page.table(("parameter", "meaning", *names, "unit"), rows))
+        body.append(page.paragraph(_extents(material), "soft"))
+    return body
+
+
+def _extents(material: Material) -> str:
+    widths = [
+        f"lobe {i}: {_degrees(lobe.mx):.1f}° x {_degrees(lobe.my):.1f}°" for i, lobe in enumerate(material.lobes, 1)
+    ]
+    return f"A slope m is a facet tilted by atan m, along and across the brushing direction: {'; '.join(widths)}."
+
+
+def _degrees(slope: float) -> float:
+    return float(np.degrees(np.arctan(slope)))
+
+
+def _rgb(values: tuple[float, float, float]) -> str:
+    words = [f"{value:.4f}" for value in values]
+    return words[0] if len(set(words)) == 1 else " ".join(words)
+
+
+def _errors(samples: MeasuredSamples, result: FitResult) -> list[str]:
+    metric = _metric(result.material)
+    rows, chosen = [], None
+    for number, (name, error) in enumerate(result.errors.items()):
+        black = result.lambertian_errors[name]
+        ratio = f"{error / black:.3f}" if black > 0 else "n/a"
+        rows.append((name, f"{error:.4g}", f"{black:.4g}", ratio, METRICS[name].unit, METRICS[name].source))
+        chosen = number if name == metric.name else chosen
+    head = ("metric", "this fit", "best Lambertian", "ratio", "unit", "source")
+    caption = f"The search minimised {metric.name}; every metric has a Lambertian surface of its own to compare with."
+    table = page.table(head, rows, numbers=(1, 2, 3), chosen=chosen, caption=caption)
+    return [page.heading("Errors"), table, *(page.paragraph(line) for line in _judgement(samples, result, metric))]
+
+
+def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:
+    """What is known of fits of this kind, and how much of it shows here."""
+    peak = peak_share(samples, result.material)
+    lines = []
+    if metric.name == "cuberoot":
+        lines.append(
+            f"Fits under the cube root weigh what eyes see and undershoot peaks: here the model reaches {peak:.2f} of "
+            f"the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
+        )
+    else:
+        lines.append(
+            f"The model reaches {peak:.2f} of the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
+        )
+    if metric.name not in EYE_LIKE:
+        shares = [
+            f"{result.errors[name] / max(result.lambertian_errors[name], 1e-300):.2f} under {name}" for name in EYE_LIKE
+        ]
+        lines.append(
+            f"A fit that minimises {metric.name} follows the peaks and is often poor by metrics that weigh what eyes "
+            f"see: here it keeps {' and '.join(shares)} of the Lambertian surface's error."
+        )
+    lines.append(
+        "Compare errors, not parameters, between fits: r0, alpha and the coefficient stand in for one another."
+    )
+    return lines
+
+
+def peak_share(samples: MeasuredSamples, material: Material) -> float:
+    """Sum of p of the model over that of the measurement, over the brightest tuples."""
+    measured = samples.p.mean(axis=1)
+    fitted = (evaluate(material, samples) * np.abs(samples.wo[:, 2:])).mean(axis=1)
+    brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]
+    return float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
+
+
+def _plots(
+    samples: MeasuredSamples, material: Material, gathered: list[Incidence], metric: Metric, progress: Progress
+) -> list[str]:
+    body = []
+    if gathered:
+        body += [page.heading("By direction"), *_direction_plots(samples, material, gathered)]
+    else:
+        body.append(page.paragraph("No incident direction holds enough tuples for plots by direction."))
+    if material.lobes:
+        body.append(page.heading("How well the parameters are determined"))
+        body.append(
+            page.paragraph(
+                "The error around the fit, over two parameters of a lobe. A round pit: the measurement determines "
+                "both. A valley: it determines a combination of them, and any point along it looks much the same."
+            )
+        )
+    for index, lobe in enumerate(material.lobes):
+        drawn = slices(samples, material, index, metric, progress=progress)
+        name = f"lobe {index + 1}, {lobe.side}"
+        words = " and ".join(f"{one.across} and {one.down}" for one in drawn)
+        body.append(_figure(plot.error_slices(drawn, metric, name), f"Contours of the error of {name} over {words}."))
+    return body
+
+
+def _direction_plots(samples: MeasuredSamples, material: Material, gathered: list[Incidence]) -> list[str]:
+    return [
+        _figure(
+            plot.polar_matrix(gathered, material, samples.info.transmits),
+            "Hemispheres of scattered light for each incident direction, measured and model.",
+            "Each disk is the hemisphere seen from above: the normal in the middle, the horizon at the rim, the source "
+            "at the top.",
+        ),
+        _figure(
+            plot.in_plane(gathered, material),
+            "Curves of the transfer probability in the plane of incidence, measured and model.",
+            "Light scattered in the plane of incidence. Negative angles are on the source's side.",
+        ),
+        _figure(
+            plot.albedo(gathered, material),
+            "Albedo over the angle of incidence, measured and model.",
+            "Light returned of all that arrives. Above 1 a material would give more than it gets.",
+        ),
+    ]
+
+
+def _figure(figure: Any, description: str, caption: str = "") -> str:
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=DPI, format="png")
+    return page.picture(stream.getvalue(), description, caption, density=DENSITY, paper=True)
+
+
+def _colophon(material: Material, result: FitResult) -> str:
+    how = material.provenance.method if material.provenance is not None else None
+    parts = [f"Lambent {version('lambent')}", *([how] if how else []), f"fitted in {result.seconds:.1f} s"]
+    return ", ".join([*parts, *(["cancelled before its end"] if result.partial else [])]) + "."
