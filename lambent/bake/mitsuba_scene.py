@@ -53,7 +53,7 @@ class SceneBuilder:
             wanted = material_dict(scene.materials[o.material], diffuse=diffuse)
             if wanted["material"] not in bsdfs:
                 bsdfs[wanted["material"]] = mi.load_dict(wanted)
-            self.meshes[o.name] = _mesh(o, bsdfs[wanted["material"]], (uv2 or {}).get(o.name))
+            self.meshes[o.name] = mesh_of(o, bsdfs[wanted["material"]], (uv2 or {}).get(o.name))
         self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
         self._environment = mi.load_dict(environment_dict(scene.environment)) if scene.environment else None
 
@@ -94,7 +94,8 @@ class SceneBuilder:
         return mi.UInt32(table)
 
 
-def _mesh(o: SceneObject, bsdf: Any, uv2: Array | None) -> Any:
+def mesh_of(o: SceneObject, bsdf: Any, uv2: Array | None = None) -> Any:
+    """mi.Mesh of an object that wears `bsdf`, with its brushing direction and, if given, light map coordinates."""
     import mitsuba as mi
 
     props = mi.Properties()

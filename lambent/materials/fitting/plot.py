@@ -21,6 +21,8 @@ from lambent.materials.fitting.disks import (
     measured_disk,
 )
 from lambent.materials.fitting.incidence import Incidence, incidences
+from lambent.materials.fitting.metrics import Metric
+from lambent.materials.fitting.slices import Slice
 from lambent.materials.measured.protocol import MeasuredSamples
 
 Floats = NDArray[np.floating]
@@ -30,6 +32,7 @@ WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
 MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
 UNKNOWN = (0.66, 0.78, 0.93)  # shade of directions that were not measured
 COLUMNS = 4
+LABELS = {"m": "$m_x = m_y$", "mx": "$m_x$", "my": "$m_y$", "r0": "$r_0$", "alpha": "$\\alpha$"}
 
 
 def save_plots(samples: MeasuredSamples, material: Material, folder: Path, stem: str = "fit") -> list[Path]:
@@ -82,7 +85,7 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
     drawn = {(e.theta_deg, e.phi_deg, far): _disks(e, material, far) for e in gathered for far in sides}
     known = np.concatenate([disk[np.isfinite(disk)] for pair in drawn.values() for disk in pair])
     white = max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12)
-    size = 1.5 if upright else 1.05
+    size = min(1.5, 10 / columns) if upright else min(1.05, 5.2 / columns)
     if upright:
         figure = _figure(columns * size + 1.2, 2 * rows * size + 1.3)
         halves = figure.subfigures(2, 1)
@@ -139,11 +142,9 @@ def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Flo
 
 
 def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
-    x = np.linspace(-1, 1, DISK_PIXELS)
-    inside = np.hypot(x, x[:, None]) < 1
-    shown = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))
-    rgba = np.concatenate([shown, inside[..., None].astype(float)], axis=-1)
-    ax.imshow(rgba, extent=(-1, 1, -1, 1), interpolation="nearest")
+    shown = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))[_inside_pixels()]
+    drawn = ax.imshow(shown, extent=(-1, 1, -1, 1), interpolation="nearest")
+    drawn.set_clip_path(_circle(ax))
     rim = np.linspace(0, 2 * np.pi, 128)
     ax.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
     if brushing_deg is not None:
@@ -156,6 +157,24 @@ def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushin
     ax.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22), aspect="equal")
 
 
+def _inside_pixels() -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+    """For each pixel of a disk's square the one to show: itself, or its neighbour where it lies across the rim.
+
+    The circle then cuts the picture, not the pixels.
+    """
+    steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
+    x, y = np.meshgrid(steps, steps)
+    inwards = np.minimum(1, (1 - 2.5 / DISK_PIXELS) / np.hypot(x, y))
+    row, column = (((v * inwards + 1) / 2 * DISK_PIXELS).astype(int) for v in (y, x))
+    return row, column
+
+
+def _circle(ax: Any) -> Any:
+    from matplotlib.patches import Circle
+
+    return Circle((0, 0), 1, transform=ax.transData)
+
+
 def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
     """Figure: the plane of incidence, one panel per theta_i for phi_i nearest 0 and 90 degrees; mean over channels.
 
@@ -165,7 +184,7 @@ def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
     shown = sorted({min(phis, key=lambda p: abs(p - target)) for target in (0.0, 90.0)})
     entries = [entry for phi in shown for entry in gathered if entry.phi_deg == phi]
     rows = -(-len(entries) // COLUMNS)
-    figure = _figure(3.2 * COLUMNS, 2.3 * rows + 0.8)
+    figure = _figure(2.7 * COLUMNS, 2.1 * rows + 0.8)
     axes = figure.subplots(rows, COLUMNS, squeeze=False)
     for ax in axes.flat[len(entries) :]:
         ax.set_axis_off()
@@ -197,7 +216,7 @@ def _curve(ax: Any, entry: Incidence, material: Material, far: bool) -> None:
 
 def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
     """Figure: reflectivity (and transmissivity) over theta_i, mean over channels and phi_i."""
-    figure = _figure(6.4, 4.2)
+    figure = _figure(6.4, 3.6)
     ax = figure.subplots()
     thetas = sorted({entry.theta_deg for entry in gathered})
     x = np.linspace(0, 85, 18)
@@ -210,7 +229,10 @@ def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
         wo = direction(np.radians(x)[:, None], np.radians([0.0, 45.0, 90.0])[None])
         ax.plot(x, MaterialBSDF(one_side).albedo(wo).mean(axis=(1, 2)), line, color=MODEL, label=f"model, {word}")
     ax.axhline(1, color="0.6", lw=0.8)
-    ax.set(xlabel="$\\theta_i$, degrees", ylabel="albedo", xlim=(0, 90))
+    ax.set(xlim=(0, 90))
+    ax.set_xlabel("$\\theta_i$, degrees", fontsize=9)
+    ax.set_ylabel("albedo", fontsize=9)
+    ax.tick_params(labelsize=8)
     ax.set_ylim(bottom=0)
     figure.legend(loc="outside upper center", ncols=2, fontsize=8, frameon=False)
     return figure
@@ -220,3 +242,29 @@ def _one_side(material: Material, far: bool) -> Material:
     lobes = material.transmission_lobes if far else material.reflection_lobes
     dark = {"kd" if far else "kt_d": (0.0, 0.0, 0.0)}
     return material.model_copy(update={"lobes": lobes, **dark})
+
+
+def error_slices(drawn: Sequence[Slice], metric: Metric, name: str) -> Any:
+    """Figure: E around the optimum of the lobe called `name` (thesis figure 3.9), one panel per pair of parameters."""
+    from matplotlib.ticker import LogLocator
+
+    figure = _figure(4.6 * len(drawn), 4.0)
+    for ax, one in zip(figure.subplots(1, len(drawn), squeeze=False).flat, drawn, strict=True):
+        low = float(one.error.min())
+        levels = low * np.geomspace(1, max(float(one.error.max()) / max(low, 1e-300), 1.01), 14)
+        shades = ax.contourf(one.x, one.y, np.clip(one.error, levels[0], levels[-1]), levels=levels, cmap="cividis_r")
+        ax.contour(one.x, one.y, one.error, levels=levels[1:-1], colors="white", linewidths=0.4)
+        ax.plot(*one.best, "+", color="black", ms=11, mew=1.6, label="the fit")
+        for axis, parameter in ((ax.xaxis, one.across), (ax.yaxis, one.down)):
+            if parameter != "alpha":
+                axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+                axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+                axis.set_major_formatter("{x:g}")
+                axis.set_minor_formatter("")
+        ax.set(xlabel=LABELS[one.across], ylabel=LABELS[one.down])
+        ax.tick_params(labelsize=8)
+        bar = figure.colorbar(shades, ax=ax, format="%.3g")
+        bar.ax.tick_params(labelsize=8)
+        bar.set_label(f"E ({metric.name}), {metric.unit}", fontsize=8)
+    figure.suptitle(f"{name}; + is the fit, everything else held, its coefficient solved for again", fontsize=9)
+    return figure

@@ -1,0 +1,153 @@
+"""A ball that wears a measured table, and the same ball with the material fitted to it, side by side.
+
+The ball is brushed along its circles of latitude, its axis leaning towards the viewer and to the side, so that brushed
+highlights show. Where the table transmits, a lamp hangs inside: what passes the sheet is what is seen of it.
+Background and figures belong to the ball's pixels alone: what both pictures share would only flatter them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.material_plugin import material_dict, register_material_plugin
+from lambent.bake.mitsuba_scene import environment_dict, mesh_of
+from lambent.bake.table_plugin import table_dict
+from lambent.core.frames import normalize
+from lambent.core.metrics import display_pair, flip, psnr, tile_means
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Material
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.scenes.geometry import sphere, transformed, turn
+from lambent.scenes.scene import Environment, Mesh, SceneObject, SunSky
+
+Floats = NDArray[np.floating]
+
+DAYLIGHT = SunSky(sun_direction=tuple(normalize(np.array([-0.55, 0.62, 0.56])).tolist()))
+SIZE_PX, SPP = 320, 49
+MAX_DEPTH = {False: 2, True: 8}  # without a lamp inside light meets the ball once: it is convex
+DISTANCE, FOV_DEG = 6.0, 19.4  # of the camera; the ball has radius 1 and nearly fills the picture
+LAMP_RADIUS, LAMP_RADIANCE = 0.22, 25.0  # in multiples of the environment's mean radiance
+MEAN_SHOWN = 0.3  # of the ball that wears the table, as a display shows it
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Two pictures and how far they are apart.
+
+    Attributes
+    ----------
+    measured, model : (H, W, 3) float64
+        As a display shows them, encoded, black beside the ball: clip(e L)^(1/2.2), one e for both.
+    difference : (H, W, 3)
+        FLIP error in false colour, encoded.
+    ball : (H, W) bool
+        Pixels that see nothing but the ball.
+    figures : dict
+        Over the ball: `psnr_db`, `flip_mean`, `flip_worst_tile` (16x16 tiles that lie on it).
+    spp : int
+    lamp : bool
+        Whether a lamp hangs inside.
+    """
+
+    measured: Floats
+    model: Floats
+    difference: Floats
+    ball: NDArray[np.bool_]
+    figures: dict[str, float]
+    spp: int
+    lamp: bool
+
+
+def preview(
+    table: MeasuredTable,
+    material: Material,
+    environment: Environment = DAYLIGHT,
+    *,
+    size_px: int = SIZE_PX,
+    spp: int = SPP,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Preview:
+    """Render both balls with the same seed and compare them.
+
+    Raises
+    ------
+    UserError
+        Where no path tracing engine works, or the environment's picture cannot be read.
+    """
+    register_material_plugin()
+    lamp = table.info.transmits or material.transmits
+    bsdfs = {"measured": table_dict(table, progress=progress), "model": material_dict(material)}
+    pictures = {}
+    for i, (name, bsdf) in enumerate(bsdfs.items()):
+        progress(i, 2, "rendering the previews")
+        pictures[name], ball = _render(bsdf, environment, lamp, size_px, spp, seed)
+    progress(2, 2, "rendering the previews")
+    return _compared(pictures["measured"], pictures["model"], ball, spp, lamp)
+
+
+def _compared(measured: Floats, model: Floats, ball: NDArray[np.bool_], spp: int, lamp: bool) -> Preview:
+    seen = display_pair(measured[ball], model[ball], MEAN_SHOWN)
+    shown = [np.zeros(measured.shape), np.zeros(model.shape)]
+    for picture, pixels in zip(shown, seen, strict=True):
+        picture[ball] = pixels
+    difference = flip(shown[0], shown[1])
+    whole = tile_means(ball) == 1
+    tiles = tile_means(difference.error)[whole] if whole.any() else difference.error[ball]
+    figures = {
+        "psnr_db": psnr(*seen),
+        "flip_mean": float(difference.error[ball].mean()),
+        "flip_worst_tile": float(tiles.max()),
+    }
+    return Preview(shown[0], shown[1], difference.picture, ball, figures, spp, lamp)
+
+
+def _render(
+    bsdf: Mapping[str, Any], environment: Environment, lamp: bool, size_px: int, spp: int, seed: int
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Radiance (H, W, 3), and which pixels see the ball alone."""
+    import mitsuba as mi
+
+    light = environment_dict(environment)
+    scene: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": MAX_DEPTH[lamp], "hide_emitters": True},
+        "sensor": {
+            "type": "perspective",
+            "fov": FOV_DEG,
+            "to_world": mi.ScalarTransform4f().look_at([0, 0, DISTANCE], [0, 0, 0], [0, 1, 0]),
+            "sampler": {"type": "multijitter", "sample_count": spp},
+            "film": {
+                "type": "hdrfilm",
+                "width": size_px,
+                "height": size_px,
+                "pixel_format": "rgba",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+        },
+        "environment": light,
+        "ball": mesh_of(SceneObject("ball", ball_mesh(), "material"), mi.load_dict(dict(bsdf))),
+    }
+    if lamp:
+        mean = float(np.mean(np.array(light["bitmap"]))) * light["scale"]
+        scene["lamp"] = {
+            "type": "sphere",
+            "radius": LAMP_RADIUS,
+            "emitter": {"type": "area", "radiance": LAMP_RADIANCE * mean},
+            "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        }
+    picture = np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed), dtype=float)
+    return picture[..., :3], picture[..., 3] > 1 - 1e-4
+
+
+def ball_mesh() -> Mesh:
+    """The ball, radius 1."""
+    lean = np.eye(4)
+    lean[:3, :3] = turn("z", -28.0)[:3, :3] @ turn("x", 32.0)[:3, :3]
+    return transformed(sphere(1.0, around=192, rows=96), lean)

@@ -1,0 +1,128 @@
+"""How E runs around the optimum of a fit (thesis figure 3.9): over two parameters of a lobe, all else held.
+
+Only the lobe's own coefficient moves along: at each point it is solved for again. A narrow round pit means that the
+table determines both parameters; a valley, that it determines a combination of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.metrics import Metric
+from lambent.materials.fitting.parameters import BOUNDS
+from lambent.materials.fitting.problem import Problem, problem_of
+from lambent.materials.fitting.scale import Channel, solve_scale
+from lambent.materials.measured.protocol import MeasuredSamples
+
+Floats = NDArray[np.floating]
+
+STEPS = 33  # along each axis
+TUPLES = 6000
+REACH = 4.0  # mx and my are drawn from the optimum divided by it to the optimum times it
+PLANES = (("mx", "my"), ("r0", "alpha"))
+ISOTROPIC_PLANES = (("m", "alpha"), ("r0", "alpha"))  # m is mx and my at once
+SOLVER_STEPS = 6
+
+
+@dataclass(frozen=True)
+class Slice:
+    """E over two parameters of a lobe.
+
+    Attributes
+    ----------
+    across, down : str
+        Names of the parameters.
+    x, y : (K,)
+        Their values; logarithmic steps but of alpha.
+    error : (K, K)
+        E in the metric's unit, rows along y; estimated from some of the tuples, so compare within a slice.
+    best : (float, float)
+        The lobe's own values.
+    """
+
+    across: str
+    down: str
+    x: Floats
+    y: Floats
+    error: Floats
+    best: tuple[float, float]
+
+
+def slices(
+    samples: MeasuredSamples,
+    material: Material,
+    index: int,
+    metric: Metric,
+    *,
+    steps: int = STEPS,
+    progress: Progress = silent,
+) -> list[Slice]:
+    """The two slices of lobe `index` of `material`: (mx, my), or (m, alpha) of an isotropic table, and (r0, alpha).
+
+    An isotropic table holds one azimuth of wi, which cannot tell mx from my: there both move as one.
+    """
+    lobe = material.lobes[index]
+    problem, rest = _prepared(samples, material, index, metric)
+    tied = samples.info.isotropic and lobe.mx == lobe.my
+    return [_slice(problem, rest, lobe, plane, steps, progress) for plane in (ISOTROPIC_PLANES if tied else PLANES)]
+
+
+def _axis(name: str, best: float, steps: int) -> Floats:
+    low, high = BOUNDS["mx" if name == "m" else name]
+    if name == "alpha":
+        return np.linspace(low, high, steps)
+    if name.startswith("m"):
+        low, high = max(low, best / REACH), min(high, best * REACH)
+    return np.asarray(np.geomspace(min(low, max(best, 1e-4)), max(high, best), steps))
+
+
+def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: Metric) -> tuple[Problem, Floats]:
+    """Some tuples of the lobe's side, and f (C, N) there of everything but the lobe."""
+    lobe = material.lobes[index]
+    problem = problem_of(samples, lobe.side, metric, lobe.distribution, _coupled(material))
+    problem = problem.thinned([TUPLES], 0, [np.float64])[0]
+    channels = len(problem.measured)
+    diffuse = np.array(material.kd if lobe.side == "reflection" else material.kt_d)[:channels]
+    rest = diffuse[:, None] * problem.diffuse
+    for number, other in enumerate(material.lobes):
+        if number != index and other.side == lobe.side:
+            rest = rest + np.array(other.k)[:channels, None] * _basis(problem, other)
+    return problem, rest
+
+
+def _coupled(material: Material) -> bool:
+    return bool(getattr(material, "kd_coupled", False))
+
+
+def _basis(problem: Problem, lobe: Lobe) -> Floats:
+    """(N,) f of the lobe with coefficient 1; of an r0 per channel the mean stands for all."""
+    shape = np.array([lobe.mx, lobe.my, float(np.mean(lobe.r0)), lobe.alpha])
+    return replace(problem, distribution=lobe.distribution).basis(shape)
+
+
+def _slice(problem: Problem, rest: Floats, lobe: Lobe, plane: tuple[str, str], steps: int, progress: Progress) -> Slice:
+    across, down = plane
+    own = {"mx": lobe.mx, "my": lobe.my, "r0": float(np.mean(lobe.r0)), "alpha": lobe.alpha, "m": lobe.mx}
+    x, y = (_axis(name, own[name], steps) for name in plane)
+    error = np.empty((len(y), len(x)))
+    for row, value in enumerate(y):
+        progress(row, len(y), f"error over {across} and {down}")
+        basis = np.stack([problem.basis(_shape(own | {down: float(value), across: float(v)}, plane)) for v in x])
+        totals = np.zeros(len(x))
+        for measured, background in zip(problem.measured, rest, strict=True):
+            channel = Channel(measured, background, problem.w, problem.c)
+            totals += solve_scale(problem.metric, channel, basis, steps=SOLVER_STEPS)[1]
+        error[row] = (totals / len(rest)) ** (1 / problem.metric.power)
+    progress(len(y), len(y), f"error over {across} and {down}")
+    return Slice(across, down, x, y, error, (own[across], own[down]))
+
+
+def _shape(values: dict[str, float], plane: tuple[str, str]) -> Floats:
+    """mx, my, r0, alpha of the named values; m stands for both roughnesses."""
+    mx, my = (values["m"], values["m"]) if "m" in plane else (values["mx"], values["my"])
+    return np.array([mx, my, values["r0"], values["alpha"]])
