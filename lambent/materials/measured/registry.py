@@ -6,6 +6,7 @@ A reader is a module of this package that has `NAME` (str), `recognise(head: byt
 
 from __future__ import annotations
 
+import codecs
 import importlib
 import pkgutil
 from functools import cache
@@ -17,6 +18,7 @@ from lambent.core.errors import UserError
 from lambent.materials.measured.protocol import MeasuredTable
 
 HEAD_BYTES = 1 << 16
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 class Reader(Protocol):
@@ -50,6 +52,23 @@ def load(path: Path | str) -> MeasuredTable:
         Where the file is missing, of no known format, or broken.
     """
     path = Path(path)
+    head, size = _head(path)
+    reader = _reader_of(head, size)
+    if reader is not None:
+        return reader.read(path)
+    if head.startswith(_UTF16):
+        raise UserError("is UTF-16", file=path, expected="plain text or UTF-8", hint="save it again as UTF-8")
+    known = ", ".join(reader.NAME for reader in readers())
+    raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
+
+
+def is_known(path: Path | str) -> bool:
+    """Whether some reader takes the file, sound or not."""
+    return _reader_of(*_head(Path(path))) is not None
+
+
+def _head(path: Path) -> tuple[bytes, int]:
+    """The first bytes of a file and its size, or a `UserError`."""
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
@@ -58,8 +77,8 @@ def load(path: Path | str) -> MeasuredTable:
         raise UserError(f"cannot be read ({error.strerror})", file=path) from error
     if not size:
         raise UserError("file is empty", file=path)
-    for reader in readers():
-        if reader.recognise(head, size):
-            return reader.read(path)
-    known = ", ".join(reader.NAME for reader in readers())
-    raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
+    return head, size
+
+
+def _reader_of(head: bytes, size: int) -> Reader | None:
+    return next((reader for reader in readers() if reader.recognise(head, size)), None)

@@ -61,3 +61,20 @@ def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
             raise UserError("tensor lies outside the file", file=path, field=name, got=got, expected=expected)
         tensors[name] = np.frombuffer(content, dtype, math.prod(shape), offset).reshape(shape)
     return tensors
+
+
+def tensor_bytes(tensors: dict[str, NDArray[np.generic]]) -> bytes:
+    """The file that `read_tensors` reads as these tensors, in their order; each begins at a multiple of 8 bytes."""
+    kinds = {np.dtype(name): kind for kind, name in _TYPES.items()}
+    names = {name: name.encode("utf-8") for name in tensors}
+    offset = len(MAGIC) + 6 + sum(13 + len(names[name]) + 8 * tensor.ndim for name, tensor in tensors.items())
+    head = [MAGIC, bytes((1, 0)), struct.pack("<I", len(tensors))]
+    body: list[bytes] = []
+    for name, tensor in tensors.items():
+        padding = -offset % 8
+        body.append(bytes(padding) + np.ascontiguousarray(tensor).tobytes())
+        shape = struct.pack(f"<{tensor.ndim}Q", *tensor.shape)
+        kind = struct.pack("<HBQ", tensor.ndim, kinds[tensor.dtype], offset + padding)
+        head.append(struct.pack("<H", len(names[name])) + names[name] + kind + shape)
+        offset += padding + tensor.nbytes
+    return b"".join(head + body)

@@ -1,0 +1,61 @@
+"""`lambent convert`: what is written, what is said, and one clear line for what cannot be done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured import load
+from tests.materials.measured.measured_files import zemax_text
+
+
+@pytest.fixture
+def measured(tmp_path: Path) -> Path:
+    path = tmp_path / "vinyl.bsdf"
+    path.write_text(zemax_text(lambda wi, wo: 0.1 + 0.2 * wo[..., 2:], "PlaneSymmetrical"))
+    return path
+
+
+@pytest.fixture
+def material(tmp_path: Path) -> Path:
+    Material(name="brass", kd=0.1, lobes=(Lobe(k=0.5, mx=0.2, my=0.2),)).save(tmp_path / "brass.json")
+    return tmp_path / "brass.json"
+
+
+def test_the_ending_says_the_format(lambent, measured, tmp_path):
+    outcome = lambent("convert", measured, tmp_path / "out.txt", "--json")
+    assert outcome.code == 0 and outcome.json["format"] == "gonio text" and outcome.json["lost"] == []
+    assert set(outcome.json["errors"]) == set(outcome.json["share"]) == set(METRICS)
+    assert outcome.json["share"]["l1"] < 1e-5
+    assert load(tmp_path / "out.txt").info.format == "gonio text"
+
+
+def test_a_person_is_told_the_loss_and_the_error(lambent, material, tmp_path):
+    outcome = lambent("convert", material, tmp_path / "out.bsdf", "--as", "rgl")
+    assert outcome.code == 0 and load(tmp_path / "out.bsdf").info.format == "RGL tensor file"
+    assert "lost: nothing but what the errors say" in outcome.out and "of its size" in outcome.out
+    assert all(name in outcome.out for name in METRICS)
+
+
+def test_a_measurement_is_no_material(refused, measured, tmp_path):
+    said = refused("convert", measured, tmp_path / "out.glb")
+    assert "takes no table" in said and "lambent fit" in said and not (tmp_path / "out.glb").exists()
+
+
+def test_places_that_take_no_file(refused, measured, tmp_path):
+    before = measured.read_bytes()
+    assert "output is the input" in refused("convert", measured, measured, "--as", "gonio_text")
+    (tmp_path / "link.txt").symlink_to(measured)
+    assert "output is the input" in refused("convert", measured, tmp_path / "link.txt")
+    assert measured.read_bytes() == before
+    assert "folder does not exist" in refused("convert", measured, tmp_path / "nowhere" / "out.txt")
+    (tmp_path / "folder.txt").mkdir()
+    assert "is a folder" in refused("convert", measured, tmp_path / "folder.txt")
+    assert "unknown ending" in refused("convert", measured, tmp_path / "out.docx")
+    assert "did you mean 'merl'" in refused("convert", measured, tmp_path / "out.x", "--as", "merk")
+    assert "cannot be read" in refused("convert", tmp_path / "absent", tmp_path / "out.txt")
+    (tmp_path / "what").write_bytes(b"hello")
+    assert "known format" in refused("convert", tmp_path / "what", tmp_path / "out.txt")

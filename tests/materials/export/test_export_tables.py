@@ -1,0 +1,158 @@
+"""Writers of tables: what is written is read back as the same, by our readers and by Mitsuba; losses are said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.materials.export import gonio_text, merl, rgl
+from lambent.materials.export.registry import writers
+from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured import load
+from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+
+GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4,) * 3, mx=0.2, my=0.2, r0=(0.3,) * 3),))
+BRUSHED = Material(name="brushed", kd=(0.05,) * 3, lobes=(Lobe(mx=0.25, my=0.12, r0=(0.9,) * 3, k=(0.8, 0.7, 0.6)),))
+FOIL = Material(name="foil", kd=(0.3,) * 3, kt_d=(0.2,) * 3)
+COARSE = replace(ISOTROPIC, noise=0.0, floor=0.0, step_deg=10, fine_deg=5, sector_deg=0)
+
+
+@pytest.fixture
+def small_merl(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer bins: the same code, a fortieth of the time."""
+    monkeypatch.setattr(merl, "SHAPE", (40, 20, 30))
+    monkeypatch.setattr(merl, "TURNS", 8)
+
+
+def test_found() -> None:
+    assert {"merl", "rgl", "gonio_text"} <= set(writers())
+    assert all(writers()[name].TAKES == ("table", "material") for name in ("merl", "rgl", "gonio_text"))
+
+
+def test_merl_round_trip(tmp_path: Path, small_merl: None) -> None:
+    path = tmp_path / "a.binary"
+    cost = merl.write(GLOSSY, path)
+    table = load(path)
+    samples = table.samples()
+    np.testing.assert_allclose(samples.f, MaterialBSDF(GLOSSY).eval(samples.wi, samples.wo), rtol=1e-9)
+    assert cost.lost == () and set(cost.errors) == set(METRICS) and 0 < cost.share["cuberoot"] < 0.02
+    assert cost.share["l1"] == pytest.approx(cost.errors["l1"] / METRICS["l1"].error(*_against_black(GLOSSY)), rel=1e-6)
+    again = merl.write(table, tmp_path / "b.binary")
+    assert again.share["l1"] < 1e-9  # its own bins, written once more
+
+
+def _against_black(material: Material):
+    from lambent.materials.export.resampled import tuples_of
+
+    samples = tuples_of(material)
+    return samples, 0 * samples.f
+
+
+def test_merl_says_what_it_cannot_hold(tmp_path: Path, small_merl: None) -> None:
+    """An anisotropic material becomes the mean over its azimuths, a lopsided one the mean of both orders."""
+    cost = merl.write(BRUSHED, tmp_path / "a.binary")
+    assert any("anisotropy" in line for line in cost.lost) and cost.share["cuberoot"] > 0.05
+    table, wi = load(tmp_path / "a.binary"), direction(0.4, 0.0)
+    turns = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    wi, wo = direction(0.4, turns), direction(0.5, turns + 2.8)
+    np.testing.assert_allclose(table.eval(wi[0], wo[0]), MaterialBSDF(BRUSHED).eval(wi, wo).mean(axis=0), rtol=0.02)
+    assert any("transmission" in line for line in merl.write(FOIL, tmp_path / "a.binary").lost)
+
+    def lopsided(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        return (0.2 + wi[:, 2:]) * np.ones(1)
+
+    cost = merl.write(record(lopsided, "lopsided", COARSE), tmp_path / "a.binary")
+    assert any("order of wi and wo" in line for line in cost.lost)
+    wi, wo = direction(np.array([0.2, 1.0]), 0.0), direction(np.array([1.0, 0.2]), 2.0)
+    f = load(tmp_path / "a.binary").eval(wi, wo)[:, 0]
+    assert f == pytest.approx(0.2 + (np.cos(0.2) + np.cos(1.0)) / 2, rel=0.03)
+
+
+@pytest.mark.parametrize("material", [GLOSSY, BRUSHED], ids=["isotropic", "anisotropic"])
+def test_rgl_is_what_mitsuba_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, material: Material) -> None:
+    """The written file in our reader and in Mitsuba's `measured` plugin: the same, and close to the material."""
+    pytest.importorskip("mitsuba")
+    monkeypatch.setitem(rgl.NODES, "isotropic", 32)
+    path = tmp_path / "a.bsdf"
+    cost = rgl.write(material, path)
+    assert cost.lost == () and cost.share["l1"] < 0.03 and cost.share["cuberoot"] < 0.06
+    table = load(path)
+    assert table.info.isotropic == (material is GLOSSY) and table.info.format == "RGL tensor file"
+    u = np.random.default_rng(1).random((4000, 4))
+    wi, wo = (direction(np.arccos(1 - 0.85 * u[:, k]), 2 * np.pi * u[:, k + 1]) for k in (0, 2))
+    plugin = _plugin_eval(path, wi, wo)
+    mine = table.eval(wi, wo) * wo[:, 2:]
+    off = np.abs(mine - plugin) / (np.abs(plugin) + 1e-3)
+    assert np.quantile(off, 0.99) < 5e-3 and np.median(off) < 1e-4
+
+
+def test_mitsuba_samples_what_it_evaluates(tmp_path: Path) -> None:
+    """Chi-square of the plugin's sampler against its own density, on a written file."""
+    mi = pytest.importorskip("mitsuba")
+    path = tmp_path / "a.bsdf"
+    rgl.write(GLOSSY, path)
+    _engine()
+    import drjit as dr
+
+    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
+    n = 200_000
+    si = dr.zeros(mi.SurfaceInteraction3f, n)
+    wi = direction(0.7, 0.3)
+    si.wi = mi.Vector3f(*map(float, wi))
+    u = np.random.default_rng(0).random((n, 3)).astype(np.float32)
+    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1], u[:, 2]))
+    albedo = np.array(weight, dtype=float).T.mean(axis=0)
+    np.testing.assert_allclose(albedo, load(path).reflectivity(wi), rtol=0.02)
+    pdf, p = np.array(bs.pdf, dtype=float), np.array(bsdf.eval(mi.BSDFContext(), si, bs.wo), dtype=float).T[:, 0]
+    ratio = np.divide(p, pdf, out=np.zeros(n), where=pdf > 0)
+    assert ratio[pdf > 0].std() < 0.5 * ratio[pdf > 0].mean()  # the density follows the light
+
+
+def _engine() -> None:
+    from lambent.bake.engine import engine
+
+    engine()
+
+
+def _plugin_eval(path: Path, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    _engine()
+    import drjit as dr
+    import mitsuba as mi
+
+    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
+    si.wi = mi.Vector3f(wi.T.astype(np.float32))
+    return np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T.astype(np.float32))), dtype=float).T
+
+
+def test_rgl_keeps_a_narrow_lobe_and_says_transmission_is_lost(tmp_path: Path) -> None:
+    mirrorlike = Material(name="mirror", lobes=(Lobe(mx=0.01, my=0.01, r0=(0.9,) * 3, k=(1.0,) * 3),))
+    cost = rgl.write(mirrorlike, tmp_path / "a.bsdf")
+    wi = direction(np.radians([0.0, 33.0, 61.0]), 0.0)
+    np.testing.assert_allclose(
+        load(tmp_path / "a.bsdf").reflectivity(wi), MaterialBSDF(mirrorlike).albedo(wi), rtol=0.03
+    )
+    assert cost.share["l1"] < 0.1
+    assert any("transmission" in line for line in rgl.write(FOIL, tmp_path / "a.bsdf").lost)
+
+
+def test_gonio_text_keeps_the_tuples_of_a_gonio_table(tmp_path: Path) -> None:
+    table = synthesise(BRUSHED, replace(COARSE, symmetry="quadrant", phi_i_deg=(0.0, 45.0, 90.0)))
+    cost = gonio_text.write(table, tmp_path / "a.txt")
+    back = load(tmp_path / "a.txt")
+    assert cost.lost == () and cost.share["l1"] < 1e-4 and isinstance(back, GonioTable)
+    assert len(back.samples()) == len(table.samples()) and back.symmetry == "quadrant"
+
+
+def test_gonio_text_of_a_material(tmp_path: Path) -> None:
+    cost = gonio_text.write(GLOSSY, tmp_path / "a.txt")
+    assert "17 incident directions" in cost.lost[0] and cost.share["cuberoot"] < 0.03
+    foil = gonio_text.write(FOIL, tmp_path / "b.txt")
+    assert load(tmp_path / "b.txt").info.transmits and foil.share["l1"] < 0.02
