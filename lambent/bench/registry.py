@@ -9,6 +9,7 @@ beside them.
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,7 +31,12 @@ def benches() -> dict[str, str]:
 
 
 def run_bench(
-    name: str, *, quick: bool = False, inputs: Sequence[Path] = (), progress: Progress = silent
+    name: str,
+    *,
+    quick: bool = False,
+    inputs: Sequence[Path] = (),
+    against: Sequence[Path] = (),
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run one bench; the report holds bench, machine, inputs, rows and summary, ready for JSON.
 
@@ -39,14 +45,20 @@ def run_bench(
     UserError
         Where there is no such bench or an input cannot be read.
     """
-    for path in inputs:
+    for path in [*inputs, *against]:
         if not path.exists():
             raise UserError("input does not exist", file=path)
-    measured: Mapping[str, Any] = _module(name).run(quick, list(inputs), progress)
+    module = _module(name)
+    options = {}
+    if against:
+        if "against" not in inspect.signature(module.run).parameters:
+            raise UserError("this bench compares with nothing published", field="--against", got=name)
+        options["against"] = list(against)
+    measured: Mapping[str, Any] = module.run(quick, list(inputs), progress, **options)
     return {
         "bench": name,
         "machine": measured.get("machine") or machine(),
-        "inputs": measured.get("inputs") or inputs_of(inputs),
+        "inputs": measured.get("inputs") or inputs_of([*inputs, *against]),
         "rows": list(measured["rows"]),
         "summary": dict(measured["summary"]),
     }

@@ -14,6 +14,9 @@ def command(
     name: Annotated[str, typer.Argument(help="Which one; an unknown name lists them.")],
     quick: Annotated[bool, typer.Option("--quick", help="The same rows at a smaller size, under a minute.")] = False,
     input_: Annotated[list[Path] | None, typer.Option("--input", help="Run it on your own file. Repeatable.")] = None,
+    against: Annotated[
+        list[Path] | None, typer.Option(help="Published parameters (.fit) to compare with (fit). Repeatable.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Measure, and print the rows with the machine they were measured on.
@@ -23,7 +26,7 @@ def command(
     from lambent.bench.registry import run_bench
 
     with progress_bar() as progress:
-        report = run_bench(name, quick=quick, inputs=input_ or [], progress=progress)
+        report = run_bench(name, quick=quick, inputs=input_ or [], against=against or [], progress=progress)
     names = list(dict.fromkeys(key for row in report["rows"] for key in row))
     rows = [tuple(names), *(tuple(_word(row.get(key, "")) for key in names) for row in report["rows"])]
     summary = [(key, _word(value)) for key, value in {**report["machine"], **report["summary"]}.items()]
