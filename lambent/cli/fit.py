@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from lambent.cli.console import Json, progress_bar, say, show, table
+from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
     from lambent.materials.document import Material
@@ -18,11 +19,20 @@ UNITS = {"mx": "slope", "my": "slope", "r0": "reflectance at normal incidence", 
 
 def command(
     file: Annotated[Path, typer.Argument(help="Measured table, in any format `lambent inspect` knows.")],
-    lobes: Annotated[int, typer.Option(help="Lobes per side, 1 to 4.")] = 1,
+    lobes: Annotated[str, typer.Option(help="Lobes per side, 1 to 4, or auto: while each takes --gain off.")] = "1",
     method: Annotated[
-        Literal["grid", "gradient"], typer.Option(help="The grid search, or it and a joint polish.")
-    ] = "grid",
+        Literal["gradient", "grid"],
+        typer.Option(help="Least squares from several starts, or the hierarchical grid search (slower)."),
+    ] = "gradient",
     metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
+    distribution: Annotated[
+        Literal["beckmann", "ggx", "best"],
+        typer.Option(help="Of the microfacets: ggx has long tails; best tries both."),
+    ] = "beckmann",
+    coupled: Annotated[bool, typer.Option("--coupled", help="Diffuse reflection falls as Fresnel rises.")] = False,
+    gain: Annotated[float, typer.Option(help="Share of the error that one more lobe has to take off (auto).")] = 0.05,
+    grid_n: Annotated[int, typer.Option(min=3, max=30, help="Values per parameter and level of the grid.")] = 9,
+    grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Levels of the grid.")] = 5,
     fix: Annotated[list[str] | None, typer.Option(help="Keep a parameter: r0=.05 or kd=.1,.2,.3. Repeatable.")] = None,
     range_: Annotated[
         list[str] | None, typer.Option("--range", help="Seek a parameter within lo:hi: mx=.05:.3. Repeatable.")
@@ -34,11 +44,12 @@ def command(
 ) -> None:
     """Fit a diffuse term and lobes to a measured material.
 
-    Example: lambent fit brushed.bsdf --lobes 2 -o brushed.json --plot brushed.png
+    Example: lambent fit brushed.bsdf --lobes auto -o brushed.json --plot brushed.png
     """
     from lambent.core.images import check_writable
     from lambent.materials import measured
     from lambent.materials.fitting.fit import fit
+    from lambent.materials.fitting.grid import Schedule
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
     from lambent.materials.fitting.plot import save_plots
 
@@ -46,14 +57,18 @@ def command(
         check_writable(output, (".json",))
     if plot is not None:
         check_writable(plot, (".png",))
-    fixed, ranges = parse_fix(fix or ()), parse_ranges(range_ or ())
+    count, fixed, ranges = _count(lobes), parse_fix(fix or ()), parse_ranges(range_ or ())
     samples = measured.load(file).samples()
     with progress_bar() as progress:
         result = fit(
             samples,
-            lobes=lobes,
+            lobes=count,
             method=method,
             metric=metric,
+            distribution=distribution,
+            coupled=coupled,
+            gain=gain,
+            schedule=Schedule(grid_n, grid_levels),
             fix=fixed,
             ranges=ranges,
             seed=seed,
@@ -78,6 +93,14 @@ def command(
     show(facts, describe(result), json)
     if result.partial:
         raise typer.Exit(130)
+
+
+def _count(lobes: str) -> int | Literal["auto"]:
+    if lobes == "auto":
+        return "auto"
+    if not lobes.isdecimal():
+        raise UserError("number of lobes", field="--lobes", got=lobes, expected="1 to 4, or auto")
+    return int(lobes)
 
 
 def describe(result: FitResult) -> str:
