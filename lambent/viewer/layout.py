@@ -43,6 +43,7 @@ COLOURS = {
     imgui.Col_.frame_bg: (0.20, 0.21, 0.23, 1.0),
     imgui.Col_.frame_bg_hovered: (0.26, 0.28, 0.32, 1.0),
     imgui.Col_.frame_bg_active: (0.30, 0.34, 0.40, 1.0),
+    imgui.Col_.plot_histogram: (0.24, 0.52, 0.88, 1.0),
 }
 PLOT_COLOURS = {
     implot.Col_.frame_bg: (0.11, 0.115, 0.125, 1.0),

@@ -223,6 +223,15 @@ def test_start_material(tmp_path):
     assert start.kt_d == pytest.approx(FROSTED.kt_d, rel=0.25)
 
 
+def test_a_table_of_few_tuples_has_an_error_and_no_curves(editor, tmp_path):
+    rows = [f"{theta_i} 0 {theta_o} {phi} 0.1" for theta_i in (0, 40) for theta_o in (0, 60) for phi in (0, 180)]
+    (tmp_path / "few.txt").write_text("\n".join(["theta_i phi_i theta_o phi_o f", *rows]))
+    editor.show_measurement(measurement := read_measurement(tmp_path / "few.txt"))
+    assert measurement.gathered == ()
+    editor.tick()
+    assert editor.shown.error > 0 and editor.shown.measured_curve == {} and editor.shown.curves
+
+
 def test_work_reports_its_end():
     ends = []
     work = Work(lambda progress: 6 * 7, ends.append)

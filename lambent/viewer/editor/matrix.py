@@ -38,7 +38,7 @@ def matrix(incidents: Sequence[Incident], kinds: int, sides: int, width: float, 
     if len(phis) == 1:
         options = [_lines(incidents, kinds, sides, width, height, lines) for lines in range(1, len(incidents) + 1)]
     else:
-        options = [_blocks(incidents, kinds, sides, width, height, beside) for beside in (True, False)]
+        options = [_blocks(incidents, kinds, sides, width, height, across) for across in range(1, kinds + 1)]
     return max(options, key=lambda option: option.step)
 
 
@@ -63,16 +63,16 @@ def _lines(incidents: Sequence[Incident], kinds: int, sides: int, width: float, 
     return Matrix(step, tiles, tuple(titles))
 
 
-def _blocks(incidents: Sequence[Incident], kinds: int, sides: int, width: float, height: float, beside: bool) -> Matrix:
+def _blocks(incidents: Sequence[Incident], kinds: int, sides: int, width: float, height: float, across: int) -> Matrix:
     label = 30.0
     thetas, phis = sorted({i.theta_deg for i in incidents}), sorted({i.phi_deg for i in incidents})
-    across, down = (kinds, 1) if beside else (1, kinds)
+    down = math.ceil(kinds / across)
     step = min((width / across - label) / len(phis), (height / down - 2 * HEAD_PX) / (len(thetas) * sides), LARGEST_PX)
     step = max(step, 1.0)
     tiles, titles = {}, []
     for kind in range(kinds):
-        left = kind * (label + len(phis) * step) if beside else 0.0
-        top = 0.0 if beside else kind * (2 * HEAD_PX + len(thetas) * sides * step)
+        left = kind % across * (label + len(phis) * step)
+        top = kind // across * (2 * HEAD_PX + len(thetas) * sides * step)
         titles.append((left + label, top, f"kind {kind}"))
         titles += [(left + label + c * step + 1, top + HEAD_PX, f"{phi:g}°") for c, phi in enumerate(phis)]
         titles += [

@@ -18,6 +18,7 @@ from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import MeasuredSamples
+from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of
 
 Floats = NDArray[np.floating]
 
@@ -36,6 +37,8 @@ class Measurement:
         All tuples, and at most `FEW` of them whose weights make every metric come out as of all, within a percent.
     gathered : tuple of Incidence
         By incident direction, for disks and curves.
+    disks : (K, pixels, 3)
+        Measured brightness as `readings.Disks.measured` of `FINE_PX` gives it.
     lambertian : mapping
         Metric name -> E of the best Lambertian surface.
     """
@@ -44,6 +47,7 @@ class Measurement:
     samples: MeasuredSamples
     few: MeasuredSamples
     gathered: tuple[Incidence, ...]
+    disks: Floats
     lambertian: Mapping[str, float]
 
     @property
@@ -83,14 +87,16 @@ def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
     """
     from lambent.materials.fitting.account import lambertian_errors
 
-    progress(0, 4, "reading")
+    progress(0, 5, "reading")
     samples = load(path).samples()
-    progress(1, 4, "thinning")
+    progress(1, 5, "thinning")
     few = thinned(samples, FEW)
-    progress(2, 4, "gathering incident directions")
+    progress(2, 5, "gathering incident directions")
     gathered = tuple(incidences(samples))
-    progress(3, 4, "the best Lambertian surface")
-    return Measurement(path, samples, few, gathered, lambertian_errors(few))
+    progress(3, 5, "drawing disks")
+    disks = Disks(incidents_of(gathered), samples.info.transmits, FINE_PX).measured(gathered)
+    progress(4, 5, "the best Lambertian surface")
+    return Measurement(path, samples, few, gathered, disks, lambertian_errors(few))
 
 
 def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:

@@ -24,6 +24,7 @@ from lambent.materials.lobes import Vector
 Floats = NDArray[np.floating]
 Picture = NDArray[np.uint8]
 
+FINE_PX = 72  # of a disk at rest
 WHITE_PERCENTILE = 99.8
 UNKNOWN = (56, 68, 90)  # of directions that were not measured
 THETA_O_DEG = np.linspace(-89.5, 89.5, 359)
@@ -74,6 +75,8 @@ class Disks:
 
     def measured(self, gathered: Sequence[Incidence]) -> Floats:
         """(K, inside, 3) brightness, NaN where nothing was measured."""
+        if not gathered:
+            return np.full((len(self.tiles), int(self._inside.sum()), 3), np.nan, np.float32)
         disks = [measured_disk(gathered[index], far, self.pixels)[self._inside] for index, far in self.tiles]
         return np.stack([np.broadcast_to(disk, (len(disk), 3)) for disk in disks]).astype(np.float32)
 

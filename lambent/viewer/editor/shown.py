@@ -9,13 +9,23 @@ import numpy as np
 
 from lambent.materials.document import Material
 from lambent.materials.fitting.disks import in_plane_tuples
-from lambent.viewer.editor.readings import Disks, Floats, Incident, Picture, albedo, in_plane, incidents_of, white_of
+from lambent.viewer.editor.readings import (
+    FINE_PX,
+    Disks,
+    Floats,
+    Incident,
+    Picture,
+    albedo,
+    in_plane,
+    incidents_of,
+    white_of,
+)
 from lambent.viewer.editor.work import Work
 
 if TYPE_CHECKING:
     from lambent.viewer.editor.editor import Editor
 
-FINE_PX, COARSE_PX = 72, 40  # of a disk at rest, and while a slider moves
+COARSE_PX = 40  # of a disk while a slider moves
 MOVING_VALUES = 30_000  # pixels of disks while a slider moves; with many disks they are smaller still
 LEAST_PX = 12
 REST_S = 0.3
@@ -104,10 +114,12 @@ class Shown:
             return
         if self._new("measured disks", measurement, self.transmits):
             disks = self._laid_out(FINE_PX)
-            values = disks.measured(measurement.gathered)
+            values = measurement.disks
+            if len(values) < len(disks.tiles):  # the model transmits, the table does not
+                values = np.concatenate([values, np.full_like(values, np.nan)])
             self._white = white_of(values)
             self.images["measured"], self.layout["measured"] = disks.picture(values, self._white), disks
-        if self._new("measured curve", measurement, editor.chosen):
+        if measurement.gathered and self._new("measured curve", measurement, editor.chosen):
             entry = measurement.gathered[editor.chosen]
             self.measured_curve = {far: in_plane_tuples(entry, far) for far in (False, True)}
             near = [e for e in measurement.gathered if e.phi_deg == entry.phi_deg]
@@ -164,6 +176,8 @@ class Shown:
         b = editor.compared
         if self._new("error B", b, editor.metric):
             self.compared_error = None if b is None else measurement.error(b, editor.metric)
+        if measurement.is_small and not moving and self._exact_of != material:
+            self._exact_of, self.exact_errors = material, measurement.exact_errors(material)
         if self._exact_of == material:
             self.error, self.exact = self.exact_errors[editor.metric], True
             return

@@ -49,7 +49,10 @@ def _choices(editor: Editor) -> None:
     shown = editor.shown
     if shown.incidents:
         incident = shown.incidents[editor.chosen]
-        imgui.text_disabled(f"in the plane of incidence, theta_i {incident.theta_deg:g}°, phi_i {incident.phi_deg:g}°")
+        words = f"in the plane of incidence, theta_i {incident.theta_deg:g}°, phi_i {incident.phi_deg:g}°"
+        if editor.channel == "RGB":
+            words += "; dots measured, lines model" + (" A, thin model B" if editor.compared else "")
+        imgui.text_disabled(words)
 
 
 def _lines(editor: Editor, values: Floats) -> list[tuple[str, Floats, Colour | None]]:
@@ -69,7 +72,7 @@ def _scaled(editor: Editor, p: Floats) -> Floats:
 
 def _in_plane(editor: Editor, size: tuple[float, float]) -> None:
     shown = editor.shown
-    if not shown.incidents or not implot.begin_plot("##in plane", size, _PLOT):
+    if not shown.incidents or not implot.begin_plot("##in plane", size, _flags(editor)):
         return
     top = _top(editor)
     implot.setup_axis(implot.ImAxis_.x1, "theta_o in degrees; the light is on the left")
@@ -107,6 +110,11 @@ def _in_plane(editor: Editor, size: tuple[float, float]) -> None:
     implot.end_plot()
 
 
+def _flags(editor: Editor) -> int:
+    """Of the plot: nine colours need no legend, they say it themselves."""
+    return _PLOT | implot.Flags_.no_legend if editor.channel == "RGB" else _PLOT
+
+
 def _top(editor: Editor) -> float:
     """The largest value that the axis of p has to hold: of the measurement where there is one."""
     shown = editor.shown
@@ -129,7 +137,7 @@ def _line(
 ) -> None:
     for channel, y, colour in _lines(editor, values):
         y = _scaled(editor, y) if scale else np.ascontiguousarray(y, np.float64)
-        weight = 1.4 if far else 2.0
+        weight = (1.4 if far else 2.0) * (0.5 if colour is not None and of_kind == OTHER else 1.0)
         implot.plot_line(label + channel, np.ascontiguousarray(x), y, _spec(colour or of_kind, weight))
 
 

@@ -74,7 +74,7 @@ def _titles(laid: Matrix, kinds: list[str], origin: tuple[float, float]) -> None
     for x, y, text in laid.titles:
         of_kind = text.startswith("kind ")
         words = kinds[int(text[5:])] if of_kind else text
-        if text.endswith("°") and laid.step < imgui.calc_text_size(words).x * 0.8:
+        if text.endswith("°") and laid.step < imgui.calc_text_size(words).x + 2:
             continue
         lines.add_text((origin[0] + x, origin[1] + y), imgui.get_color_u32(TEXT if of_kind else DIM), words)
 

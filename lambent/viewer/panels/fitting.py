@@ -33,12 +33,14 @@ def draw(state: ViewerState) -> None:
         work = editor.fitting
         imgui.progress_bar(work.share, (-1, 0), f"{100 * work.share:.0f} %")
         imgui.text_disabled("stopping" if work.cancelling else work.what)
+        imgui.begin_disabled(work.cancelling)
         width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
         if imgui.button("cancel##fit", (width, 0)):
             editor.stop_fit(keep=False)
         imgui.same_line()
         if imgui.button("stop, keep the best", (width, 0)):
             editor.stop_fit(keep=True)
+        imgui.end_disabled()
     imgui.push_text_wrap_pos()
     for line in editor.warnings:
         imgui.push_style_color(imgui.Col_.text, (1.0, 0.75, 0.35, 1.0))
