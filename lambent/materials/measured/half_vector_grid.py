@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from lambent.materials.measured.protocol import MeasuredTable
 
 DIFFUSE = 0.1  # share of cosine-distributed samples
 LAST_VIEWER_DEG = 89.0  # beyond it the last viewer's f
+_DOWN = np.array([1.0, 1.0, -1.0])
 _LOWEST_COSINE = 0.02  # cells whose wi is below take f of this height, so that blending sees no edge at the horizon
 
 
@@ -100,6 +102,8 @@ class HalfVectorGrid:
         Density of the half vector in 1/sr.
     across : (faces, viewers) flat float32
         Probability of a transmitted sample.
+    albedo, peak : (faces, kinds, viewers) flat float32
+        Of f cos(theta_i), mean of the channels: its integral over the side, and its largest value in 1/sr.
     """
 
     shape: GridShape
@@ -110,20 +114,21 @@ class HalfVectorGrid:
     conditional: Any
     density: Any
     across: Any
+    albedo: Any = None
+    peak: Any = None
 
 
-def grid_of(table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> HalfVectorGrid:
-    """`table` on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table says of itself.
-
-    A table that says something of light from below (wi.z < 0) which is not the mirrored pair gets a back face.
-    """
+def grid_of(
+    table: MeasuredTable | Sheet, shape: GridShape | None = None, progress: Progress = silent
+) -> HalfVectorGrid:
+    """A table or a `Sheet` on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table says of itself."""
     shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
-    has_a_back = _has_a_back(table)
-    faces, kinds = 2 if has_a_back else 1, 2 if table.info.transmits else 1
+    sheet = table if isinstance(table, Sheet) else Sheet(table)
+    faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits else 1
     values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
-    weights = np.zeros(values.shape[:-1])
+    weights, peak = np.zeros(values.shape[:-1]), np.zeros(values.shape[:-2], np.float32)
     viewers, h = viewer_nodes(shape).reshape(shape.viewer_theta, shape.viewer_phi, 3), cell_centres(shape)
-    twins = _twins(table, shape)
+    twins = _twins(sheet, shape)
     for a, ring in enumerate(viewers):
         progress(a, len(viewers), f"resampling {table.info.file}")
         for b, viewer in enumerate(ring):
@@ -131,22 +136,27 @@ def grid_of(table: MeasuredTable, shape: GridShape | None = None, progress: Prog
             if twin != b:
                 values[..., a, b, :, :] = values[..., a, twin, cells, :]
                 weights[..., a, b, :] = weights[..., a, twin, cells]
+                peak[..., a, b] = peak[..., a, twin]
                 continue
             wo = np.broadcast_to(viewer, h.shape)
             wi = reflect(wo, h)
-            gain = np.maximum(wi[:, 2], 0) * 4 * np.maximum(np.sum(wo * h, axis=-1), 0)  # cos_i d_wi/d_h
+            cos_i = np.maximum(wi[:, 2], 0)
+            gain = 4 * np.maximum(np.sum(wo * h, axis=-1), 0)  # d_wi/d_h
             wi[:, 2] = np.maximum(wi[:, 2], _LOWEST_COSINE)
             wi = normalize(wi)
             for face, kind in np.ndindex(faces, kinds):
-                f = _asked(table, wi, wo, face, kind, has_a_back)
+                wo_there, wi_there = (w * _DOWN if below else w for w, below in ((wo, face), (wi, face != kind)))
+                f = sheet.eval(wi_there, wo_there)
                 values[face, kind, a, b] = f
-                weights[face, kind, a, b] = f.mean(axis=-1) * gain
+                p = f.mean(axis=-1) * cos_i
+                weights[face, kind, a, b] = p * gain
+                peak[face, kind, a, b] = p.max()
     progress(len(viewers), len(viewers), f"resampled {table.info.file}")
-    sheet = (faces, kinds, shape.viewers, shape.cells)
-    return _with_distributions(shape, values.reshape(*sheet, 3), weights.reshape(sheet))
+    sizes = (faces, kinds, shape.viewers, shape.cells)
+    return _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes), peak)
 
 
-def _twins(table: MeasuredTable, shape: GridShape) -> list[tuple[int, Any]]:
+def _twins(table: Sheet, shape: GridShape) -> list[tuple[int, Any]]:
     """For each viewer azimuth the one whose values it shares, and in which order of cells: tables are often symmetric.
 
     Asked of the table itself, at random pairs: mirrored at x = 0 and y = 0, or turned by half a turn.
@@ -180,25 +190,26 @@ def _twins(table: MeasuredTable, shape: GridShape) -> list[tuple[int, Any]]:
     return own
 
 
-def _has_a_back(table: MeasuredTable) -> bool:
-    rng = np.random.default_rng(0)
-    z, phi = rng.uniform(0.1, 1, (2, 64)), rng.uniform(0, 2 * np.pi, (2, 64))
-    up, other = direction(np.arccos(z), phi)
-    down = np.array([1, 1, -1])
-    front = [table.eval(up, other), table.eval(up, other * down)]
-    back = [table.eval(up * down, other * down), table.eval(up * down, other)]
-    return bool(np.any(back)) and not np.allclose(front, back, rtol=1e-3, atol=1e-6)
+class Sheet:
+    """A table that answers for both sides: where it has no back of its own, light from below is the mirrored pair.
 
-
-def _asked(table: MeasuredTable, wi: Floats, wo: Floats, face: int, kind: int, has_a_back: bool) -> Floats:
-    """f (N, C) of upper directions: the viewer on side `face` (1: below), the light beside or (kind 1) opposite to it.
-
-    A table without a back has the light above: its transmission is asked from there.
+    A table has a back if it says something of light from below (wi.z < 0) that is not the mirrored pair.
     """
-    below_o = face == 1 or (kind == 1 and not has_a_back)
-    below_i = below_o != (kind == 1)
-    down = np.array([1.0, 1.0, -1.0])
-    return np.asarray(table.eval(wi * down if below_i else wi, wo * down if below_o else wo))
+
+    def __init__(self, table: MeasuredTable) -> None:
+        self.table, self.info = table, table.info
+        z, phi = np.random.default_rng(0).uniform((0.1, 0), (1, 2 * np.pi), (2, 64, 2)).transpose(2, 0, 1)
+        up, other = direction(np.arccos(z), phi)
+        front = [table.eval(up, other), table.eval(up, other * _DOWN)]
+        back = [table.eval(up * _DOWN, other * _DOWN), table.eval(up * _DOWN, other)]
+        self.has_a_back = bool(np.any(back)) and not np.allclose(front, back, rtol=1e-3, atol=1e-6)
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., C) in 1/sr, without the cosine."""
+        if not self.has_a_back:
+            below = np.asarray(wi)[..., 2:] < 0
+            wi, wo = np.where(below, wi * _DOWN, wi), np.where(below, wo * _DOWN, wo)
+        return np.asarray(self.table.eval(wi, wo))
 
 
 def viewer_nodes(shape: GridShape) -> Floats:
@@ -216,13 +227,24 @@ def cell_centres(shape: GridShape) -> Floats:
     return direction(*np.meshgrid(theta, phi, indexing="ij")).reshape(-1, 3)
 
 
+def cell_borders(shape: GridShape, kinds: int) -> Floats:
+    """(N, 4) ranges of z and phi of the cells, sorted; those of transmission are mirrored to z < 0."""
+    z = np.cos(((np.arange(shape.theta_h, -1, -1)) / shape.theta_h) ** 2 * np.pi / 2)
+    z[0], phi = 0.0, np.linspace(0, 2 * np.pi, shape.phi_h + 1)
+    rows = [(low, high, a, b) for low, high in pairwise(z) for a, b in pairwise(phi)]
+    if kinds == 1:
+        return np.array([(-1.0, 0.0, 0.0, 2 * np.pi), *rows])
+    mirrored = [(low, high, a, b) for low, high in pairwise(-z[::-1]) for a, b in pairwise(phi)]
+    return np.array(mirrored + rows)
+
+
 def _solid_angles(shape: GridShape) -> Floats:
     """(theta_h, 1) solid angle of the cells of each row, in sr."""
     edges = (np.arange(shape.theta_h + 1) / shape.theta_h) ** 2 * np.pi / 2
     return np.diff(2 * np.sin(edges / 2) ** 2)[:, None] * (2 * np.pi / shape.phi_h)
 
 
-def _with_distributions(shape: GridShape, values: Floats, weights: Floats) -> HalfVectorGrid:
+def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak: Floats) -> HalfVectorGrid:
     """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are densities up to a factor.
 
     Cells and densities follow from the CDFs as they are stored, rounded to float32, so that both agree.
@@ -238,7 +260,7 @@ def _with_distributions(shape: GridShape, values: Floats, weights: Floats) -> Ha
     marginal, conditional = _cdf(rows), _cdf(mass)
     share = np.diff(marginal.astype(float), axis=-1, prepend=0.0)[..., None]
     density = share * np.diff(conditional.astype(float), axis=-1, prepend=0.0) / omega
-    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across))
+    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total, peak))
     return HalfVectorGrid(shape, faces, kinds, *flat)
 
 
@@ -335,8 +357,18 @@ def _seen(wi: Vector, wo: Vector, grid: HalfVectorGrid, ops: GridOps) -> Any:
     return off_horizon & ((wi[2] * wo[2] > 0) | (grid.kinds == 2))
 
 
-def _share_across(viewers: _Viewers, grid: HalfVectorGrid, ops: GridOps) -> Any:
+def viewer_places(wo: Vector, grid: HalfVectorGrid, ops: GridOps = NUMPY) -> tuple[Any, list[tuple[Any, Any]]]:
+    """Number of the face that `wo` sees, and its neighbouring viewer nodes with their blending weights."""
+    viewers = _viewers(wo, grid, ops)
+    return viewers.face, viewers.nodes
+
+
+def share_across(wo: Vector, grid: HalfVectorGrid, ops: GridOps = NUMPY) -> Any:
     """Probability of a transmitted sample."""
+    return _share_across(_viewers(wo, grid, ops), grid, ops)
+
+
+def _share_across(viewers: _Viewers, grid: HalfVectorGrid, ops: GridOps) -> Any:
     first = viewers.face * grid.shape.viewers
     parts = [weight * ops.gather(grid.across, first + node) for node, weight in viewers.nodes]
     return sum(parts[1:], parts[0])

@@ -1,0 +1,239 @@
+"""Scattering from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then a new direction.
+
+Two samplers of the new direction, to be chosen by what `docs/performance.md` measured:
+
+- `Rejection`, the thesis's 3.2: uniform low-discrepancy candidates, accepted with p / (largest p of the row). It
+  follows the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
+  for satin, 40 000 for chrome.
+- `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; its small deviation from the table is in the
+  weight, so estimates follow the table all the same.
+
+`TableBSDF` gives a table the face of a BSDF (eval, pdf, sample), for materials.check and whoever traces paths.
+
+A photon's incident direction is `wi`, its new one `wo`; p(wo|wi) = f |cos theta_o|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, angles, direction, normalize
+from lambent.core.progress import Progress, silent
+from lambent.materials.bsdf import components
+from lambent.materials.chi_square import ChiSquare, chi_square
+from lambent.materials.lobes import COS_MIN
+from lambent.materials.measured import half_vector_grid
+from lambent.materials.measured.half_vector_grid import GridShape, Sheet, grid_of
+from lambent.materials.measured.protocol import MeasuredTable
+
+ABSORBED, REFLECTED, TRANSMITTED = 0, 1, 2
+MARGIN = 1.2  # the row's maximum is tabulated at nodes and cell centres; between them p may be higher
+CANDIDATES_LIMIT = 200_000  # per sample, before rejection is given up
+_STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # the root of x^4 = x + 1
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """What became of photons.
+
+    Attributes
+    ----------
+    wo : (N, 3)
+        New directions; (0, 0, 0) where absorbed.
+    fate : (N,) int8
+        ABSORBED, REFLECTED or TRANSMITTED.
+    weight : (N, C)
+        What the survivors carry, per channel; their mean over channels is 1 of exact samplers. 0 where absorbed.
+    proposals : int
+        Candidates that were tried.
+    exceeded : int
+        Accepted candidates whose p was above the row's bound: where not 0, too few of those were drawn.
+    """
+
+    wo: Floats
+    fate: NDArray[np.int8]
+    weight: Floats
+    proposals: int
+    exceeded: int = 0
+
+
+class TableBSDF:
+    """A measured table as a BSDF: `eval` is the table's own, `pdf` and `sample` those of its grid.
+
+    It is the `Sheet` that the path tracer renders: two-sided, unless the table has a back of its own.
+    """
+
+    def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
+        self.sheet = Sheet(table)
+        self.grid = grid_of(self.sheet, shape, progress)
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr, without the cosine; grey is repeated."""
+        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+        seen = (np.abs(wi[..., 2:]) > COS_MIN) & (np.abs(wo[..., 2:]) > COS_MIN)
+        f = np.broadcast_to(self.sheet.eval(wi, wo), (*wi.shape[:-1], 3))
+        return np.asarray(np.where(seen, f, 0.0))
+
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        """Density (...) in 1/sr of `sample` given wo."""
+        return np.asarray(half_vector_grid.pdf(components(wi), components(wo), self.grid))
+
+    def sample(self, wo: Floats, u: Floats) -> Floats:
+        """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1)."""
+        u_select, u1, u2 = components(u)
+        return np.stack(half_vector_grid.sample(components(wo), u_select, u1, u2, self.grid), axis=-1)
+
+    def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare:
+        """Test of `sample` against `pdf` for one wo (3,), in half vectors: the density has steps at the grid's cells.
+
+        A transmitted direction is the half vector of its mirror image, below the surface.
+        """
+        theta, phi = (float(a) for a in angles(wo))
+        wo = direction(theta, 0.0) if self.grid.shape.viewer_phi == 1 else direction(theta, phi)
+        up, side = wo * [1, 1, np.sign(wo[2])], np.sign(wo[2])
+
+        def half_vectors(u: Floats) -> Floats:
+            wi = self.sample(np.broadcast_to(wo, u.shape), u)
+            h = normalize(wi * [1, 1, 0] + np.abs(wi) * [0, 0, 1] + up)
+            h[:, 2] *= np.sign(wi[:, 2] * side)
+            return h
+
+        def density(h: Floats) -> Floats:
+            upper = h * [1, 1, 0] + np.abs(h) * [0, 0, 1]
+            cos_d = upper @ up
+            wi = 2 * cos_d[:, None] * upper - up
+            possible = (wi[:, 2] > 0) & (cos_d > 0)
+            wi[:, 2] *= side * np.sign(h[:, 2])
+            return np.where(possible, self.pdf(wi, np.broadcast_to(wo, wi.shape)) * 4 * cos_d, 0.0)
+
+        cells = half_vector_grid.cell_borders(self.grid.shape, self.grid.kinds)
+        return chi_square(half_vectors, density, samples=samples, seed=seed, cells=cells)
+
+
+class _Reversed(Sheet):
+    """The sheet with light and viewer exchanged: its grid samples wo for a given wi."""
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        return super().eval(wo, wi)
+
+
+class _Photons:
+    """What both samplers share: the fate of photons by r and t, tabulated over the incident directions."""
+
+    def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
+        self.sheet = Sheet(table)
+        self.grid = grid_of(_Reversed(table), shape, progress)
+
+    def albedo(self, wi: Floats) -> tuple[Floats, Floats]:
+        """r and t (N,), means over the channels, of wi (N, 3), interpolated between the grid's nodes."""
+        first, nodes = self._nodes(wi)
+        viewers = self.grid.shape.viewers
+        r = np.sum([weight * self.grid.albedo[first + node] for node, weight in nodes], axis=0)
+        if self.grid.kinds == 1:
+            return r, np.zeros_like(r)
+        return r, np.sum([weight * self.grid.albedo[first + viewers + node] for node, weight in nodes], axis=0)
+
+    def _nodes(self, wi: Floats) -> tuple[NDArray[np.int64], list[tuple[NDArray[np.int64], Floats]]]:
+        """Where each photon's face begins in the per-viewer arrays, and its neighbouring nodes with weights."""
+        face, nodes = half_vector_grid.viewer_places(components(wi), self.grid)
+        return face * self.grid.kinds * self.grid.shape.viewers, nodes
+
+    def _fates(self, wi: Floats, u: Floats) -> tuple[NDArray[np.int8], Floats, Floats]:
+        """What 3.1 makes of u (N,) uniform in [0, 1), and the probability of either side; over 1 none is absorbed."""
+        r, t = self.albedo(wi)
+        whole = np.maximum(r + t, 1.0)
+        r, t = r / whole, t / whole
+        return np.where(u < r, REFLECTED, np.where(u < r + t, TRANSMITTED, ABSORBED)).astype(np.int8), r, t
+
+
+class Rejection(_Photons):
+    """Rejection sampling of the table (thesis M, 3.2).
+
+    The candidates of all photons of a call are one low-discrepancy sequence, dealt out in random order: evenly spread
+    as a whole, independent for each photon. A photon that walked along the sequence by itself would be biased, because
+    where it comes next depends on where it was rejected.
+    """
+
+    def scatter(self, wi: Floats, seed: int = 0, progress: Progress = silent) -> Scattered:
+        """Fates and directions of photons from wi (N, 3).
+
+        Raises
+        ------
+        UserError
+            Where a lobe is so narrow that CANDIDATES_LIMIT candidates per photon do not find it.
+        """
+        rng = np.random.default_rng(seed)
+        fate, _, _ = self._fates(wi, rng.random(len(wi)))
+        bound = self._bound(wi, fate)
+        offset = rng.random(3)
+        found, weight = np.zeros((len(wi), 3)), np.zeros((len(wi), self.sheet.info.channels))
+        waiting = np.flatnonzero((fate != ABSORBED) & (bound > 0))
+        count, exceeded, proposals, rounds = len(waiting), 0, 0, 0
+        while len(waiting):
+            progress(count - len(waiting), count, "rejection sampling")
+            if rounds > CANDIDATES_LIMIT:
+                hint = "use the tabulated sampler, or fit lobes"
+                raise UserError("lobe too narrow for rejection sampling", file=self.sheet.info.file, hint=hint)
+            many = max(1, min(64, 4096 // len(waiting)))  # of the last photons, several candidates at once
+            asked = rng.permutation(np.repeat(waiting, many))
+            wo, x = self._candidates(_even(proposals, len(asked), offset), wi[asked], fate[asked])
+            f = self.sheet.eval(wi[asked], wo)
+            p = f.mean(axis=1) * np.abs(wo[:, 2])
+            accepted = np.flatnonzero(x * bound[asked] < p)
+            photons, first = np.unique(asked[accepted], return_index=True)  # the first that was accepted
+            chosen = accepted[first]
+            found[photons] = wo[chosen]
+            weight[photons] = f[chosen] / f[chosen].mean(axis=1, keepdims=True)
+            exceeded += int((p[chosen] > bound[photons]).sum())
+            left = np.setdiff1d(waiting, photons, assume_unique=True)
+            proposals += len(asked)
+            rounds += many
+            waiting = left
+        progress(count, count, "rejection sampling")
+        excess = np.maximum(np.sum(self.albedo(wi), axis=0), 1.0)[:, None]
+        return Scattered(found, fate, weight * excess, proposals, exceeded)
+
+    @staticmethod
+    def _candidates(u: Floats, wi: Floats, fate: NDArray[np.int8]) -> tuple[Floats, Floats]:
+        """Uniform directions of the side of each photon's fate from u (N, 3), and the number that decides."""
+        wo = direction(np.arccos(1 - u[:, 0]), 2 * np.pi * u[:, 1])
+        wo[:, 2] *= np.where((wi[:, 2] > 0) == (fate == REFLECTED), 1.0, -1.0)
+        return wo, u[:, 2]
+
+    def _bound(self, wi: Floats, fate: NDArray[np.int8]) -> Floats:
+        first, nodes = self._nodes(wi)
+        first = first + np.where(fate == TRANSMITTED, self.grid.shape.viewers, 0)
+        return np.asarray(MARGIN * np.max([self.grid.peak[first + node] for node, _ in nodes], axis=0))
+
+
+def _even(first: int, count: int, offset: Floats) -> Floats:
+    """(count, 3) points from number `first` of the additive sequence of Roberts 2018 in three dimensions."""
+    k = np.arange(first + 1, first + count + 1)[:, None]
+    points: Floats = (offset + k * _STEP) % 1.0
+    return points
+
+
+class Tabulated(_Photons):
+    """Directions by the tabulated CDF of the table's grid; what the cells smooth away is in the weight."""
+
+    def scatter(self, wi: Floats, seed: int = 0) -> Scattered:
+        """Fates and directions of photons from wi (N, 3)."""
+        rng = np.random.default_rng(seed)
+        fate, r, t = self._fates(wi, rng.random(len(wi)))
+        u_select, u1, u2 = rng.random((3, len(wi)))
+        across = half_vector_grid.share_across(components(wi), self.grid)
+        # the sampler's own choice of the side is replaced by the fate that was drawn
+        u_select = np.where(fate == TRANSMITTED, u_select * across, across + u_select * (1 - across))
+        wo = np.stack(half_vector_grid.sample(components(wi), u_select, u1, u2, self.grid), axis=-1)
+        pdf = half_vector_grid.pdf(components(wo), components(wi), self.grid)
+        alive = (fate != ABSORBED) & (pdf > 0)
+        drawn, wanted = np.where(fate == TRANSMITTED, (across, t), (1 - across, r))
+        gain = np.divide(np.abs(wo[:, 2]) * drawn, pdf * wanted, out=np.zeros(len(wi)), where=alive)
+        wo[~alive] = 0
+        return Scattered(
+            wo, np.where(alive, fate, ABSORBED).astype(np.int8), self.sheet.eval(wi, wo) * gain[:, None], len(wi)
+        )
