@@ -174,8 +174,8 @@ class LbnlTable:
         if direct:
             shares = ", ".join(f"{100 * share:.0f} % of the {_NAMES[where]}" for where, share in direct.items())
             notes.append(
-                f"{shares} is in the patch of the mirrored or the straight direction: how much sharper than a patch that "
-                "is, the file does not say, and no fit can; a width below the patch's is a guess"
+                f"{shares} is in the patch of the mirrored or the straight direction: how much sharper than a patch "
+                "that is, the file does not say, and no fit can; a width below the patch's is a guess"
             )
         return notes
 

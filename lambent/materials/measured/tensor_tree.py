@@ -15,7 +15,6 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -33,7 +32,7 @@ _OPEN, _CLOSE = ord("{"), ord("}")
 _BLANKS = b" \t\r\n\f\v,"
 _BLANKED = bytes.maketrans(b",{}", b"   ")
 _IN_WORD = np.array([letter not in _BLANKS + b"{}" for letter in range(256)])
-_CHUNK = 1 << 20
+_CHUNK = 1 << 16  # letters of a text at a time
 
 
 class Malformed(ValueError):
@@ -124,8 +123,10 @@ class TensorTree:
     rank : 3 or 4
     children : (B, 2^rank) int32
         Per branch and half the code of what is below: k >= 0 is branch k, -1 - k is grid k.
-    starts, logs : (K,)
-        Per grid the place of its first value, and the base-2 logarithm of its leaves per side.
+    starts : (K,) int32
+        Per grid the place of its first value.
+    logs : (K,) int8
+        Per grid the base-2 logarithm of its leaves per side.
     values : (V,)
     root : int
         Code.
@@ -133,8 +134,8 @@ class TensorTree:
 
     rank: Rank
     children: NDArray[np.int32]
-    starts: Indices
-    logs: Indices
+    starts: NDArray[np.int32]
+    logs: NDArray[np.int8]
     values: Floats
     root: int
 
@@ -153,9 +154,9 @@ class TensorTree:
             code[active] = self.children[code[active], upper @ bits]
             active = active[code[active] >= 0]
         grid = -1 - code
-        log = self.logs[grid]
+        log = self.logs[grid].astype(np.int64)
         cell = (at * (1 << log)[:, None]).astype(np.int64)
-        index = self.starts[grid]
+        index = self.starts[grid].astype(np.int64)
         for d in range(self.rank):
             index = index + (cell[:, d] << log * (self.rank - 1 - d))
         return self.values[index], side / (1 << log)
@@ -198,10 +199,10 @@ class TensorTree:
     ) -> list[Cells]:
         """The leaves of grids (Q,), which fill cells with these corners and this side."""
         cells = [Cells(query[:0], corner[:0], np.zeros(0), np.zeros(0))]
-        for log in np.unique(self.logs[grid]):
+        for log in np.unique(self.logs[grid]).tolist():
             here = self.logs[grid] == log
-            width = 1 << int(log)
-            index = self.starts[grid[here]]
+            width = 1 << log
+            index = self.starts[grid[here]].astype(np.int64)
             for column, d in enumerate(fixed):
                 index = index + ((at[here, column] * width).astype(np.int64) << log * (self.rank - 1 - d))
             steps = np.array(np.meshgrid(*[np.arange(width)] * len(free), indexing="ij")).reshape(len(free), -1).T
@@ -211,14 +212,6 @@ class TensorTree:
             queries = np.repeat(query[here], len(steps))
             cells.append(Cells(queries, corners, np.full(len(value), side / width), value))
         return cells
-
-    @cached_property
-    def used(self) -> Floats:
-        """The values of the cells that directions can reach: of rank 3 the half below 1/2."""
-        if self.rank == 4:
-            return self.values
-        cells = self.walk((), np.zeros((1, 0)))
-        return cells.value[cells.corner[:, 0] < 0.5]
 
 
 def parse_tree(text: bytes, rank: Rank) -> TensorTree:
@@ -236,14 +229,14 @@ def parse_tree(text: bytes, rank: Rank) -> TensorTree:
         else:
             nest.close(words)
     if nest.root is None:
-        raise Malformed("a brace that is not closed" if nest.begun else "no braces")
+        raise Malformed("a brace that is not closed" if nest.unclosed else "no braces")
     values = numbers_of(text)
-    logs = np.array(nest.logs, dtype=np.int64)
-    sizes = 1 << rank * logs
+    logs = np.frombuffer(nest.logs, np.int8)
+    sizes = np.left_shift(1, rank * logs, dtype=np.int32)  # none is longer than the text
     if len(values) != sizes.sum():
         raise Malformed("a word that is not a number")
-    children = np.array(nest.children, dtype=np.int32).reshape(-1, 1 << rank)
-    return TensorTree(rank, children, np.cumsum(sizes) - sizes, logs, values, nest.root)
+    children = np.frombuffer(nest.children, np.int32).reshape(-1, 1 << rank)
+    return TensorTree(rank, children, np.cumsum(sizes, dtype=np.int32) - sizes, logs, values, nest.root)
 
 
 class _Nest:
@@ -253,29 +246,33 @@ class _Nest:
         self.children = array("i")
         self.logs = array("b")
         self.root: int | None = None
-        self.begun = False  # a brace was opened, and what it holds is not known yet
+        self._begun = False  # a brace was opened, and what it holds is not known yet
         self._rank, self._branches = rank, 1 << rank
         self._log_of = {1 << rank * log: log for log in range(64 // rank)}
         self._path: list[list[int]] = []  # open branches: number, halves filled
+
+    @property
+    def unclosed(self) -> bool:
+        return self._begun or bool(self._path)
 
     def open(self, words: int) -> None:
         if words:
             raise Malformed("a number outside the innermost braces")
         if self.root is not None:
             raise Malformed("text after the last brace")
-        if self.begun:
+        if self._begun:
             if len(self._path) == DEEPEST:
                 raise Malformed(f"more than {DEEPEST} levels of braces")
             self._path.append([len(self.children) // self._branches, 0])
             self.children.extend([0] * self._branches)
-        self.begun = True
+        self._begun = True
 
     def close(self, words: int) -> None:
-        if self.begun:
+        if self._begun:
             if words not in self._log_of:
                 raise Malformed(f"{words} values in braces, expected a power of {self._branches}")
             self.logs.append(self._log_of[words])
-            self.begun = False
+            self._begun = False
             self._put(-len(self.logs))
             return
         if not self._path:

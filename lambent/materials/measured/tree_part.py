@@ -6,6 +6,7 @@ Colour is a tree of luminance and two of CIE 1976 u' and v', cut each in its own
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +29,7 @@ _CHUNK = 16  # queries at a time: a fine tree has tens of thousands of leaves fo
 _RADII, _GRID = 32, 16  # incident directions of the tuples: rank 3, and per side of the square rank 4
 _COARSEST = 1 / 16  # side of the largest cell that gives one tuple
 _MOST_TUPLES = 500_000
-_REVERSED_GRID = 64
+_REVERSED_GRID = 32
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class TreePart:
     @property
     def dark(self) -> bool:
         """Whether f is zero throughout."""
-        return not bool((self.trees[0].used > 0).any())
+        return not bool((self.trees[0].values > 0).any())
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -72,7 +73,7 @@ class TreePart:
     @property
     def negative(self) -> int:
         """How many leaves are below zero."""
-        return int((self.trees[0].used < 0).sum())
+        return int((self.trees[0].values < 0).sum())
 
     def at(self, entering: Floats, leaving: Floats) -> Floats:
         """f (N, C) for headings (N, 3) with z >= 0."""
@@ -87,7 +88,8 @@ class TreePart:
         """The same for light that takes the ways of this part backwards, in at the heading by which it leaves here."""
         if self.rank == 4:
             return self._summed((2, 3), square_of(leaving[:, :2]))
-        return np.concatenate([self._summed_along(r) for r in np.hypot(leaving[:, 0], leaving[:, 1])])
+        radii = np.hypot(leaving[:, 0], leaving[:, 1])
+        return np.array([self._summed_along(r) for r in radii]).reshape(-1, self.channels)
 
     def tuples(self) -> Tuples:
         """Every leaf that light of an even choice of incident directions can leave by, large ones cut."""
@@ -158,19 +160,25 @@ class TreePart:
             kept.append(cells.chosen(keep))
         return Cells.joined(kept)
 
+    @cached_property
+    def _backwards(self) -> tuple[Floats, Floats, Floats]:
+        """Of rank 3: lower and upper corners (M, 2) of the leaves in [-1, 1]^2, and f (M, C) times their ring r dr."""
+        cells = self._cells((), np.zeros((1, 0)))
+        cells = cells.chosen(cells.corner[:, 0] < 0.5)
+        low, high = cells.corner, cells.corner + cells.side[:, None]
+        r_high, r_low = 1 - 2 * low[:, 0], (1 - 2 * high[:, 0]).clip(0, 1)
+        f = np.maximum(self._value(cells.middle), 0)
+        return 2 * low[:, 1:] - 1, 2 * high[:, 1:] - 1, f * ((r_high**2 - r_low**2) / 2)[:, None]
+
     def _summed_along(self, radius: float) -> Floats:
-        """(1, C) of rank 3 backwards.
+        """(C,) of rank 3 backwards.
 
         Light that comes in at sin(theta) = radius meets, over all it can leave by, the places of a circle of that
         radius; the disk map makes it the outline of a square and keeps the angle linear along each side. What a leaf
         gets is its part of the outline times the ring r dr of its first coordinate.
         """
-        cells = self._cells((), np.zeros((1, 0)))
-        low, high = cells.corner, cells.corner + cells.side[:, None]
-        r_high, r_low = (1 - 2 * low[:, 0]).clip(0, 1), (1 - 2 * high[:, 0]).clip(0, 1)
-        angle = _outline(2 * low[:, 1:] - 1, 2 * high[:, 1:] - 1, max(radius, 1e-9))
-        f = np.maximum(self._value(cells.middle), 0)
-        return np.asarray((angle * (r_high**2 - r_low**2) / 2) @ f)[None]
+        low, high, f_ring = self._backwards
+        return np.asarray(_outline(low, high, max(radius, 1e-9)) @ f_ring)
 
 
 def _outline(low: Floats, high: Floats, half: float) -> Floats:

@@ -1,0 +1,257 @@
+"""What BSDF files are made of, by answers known by hand: bases, disk map, trees, tuples, what is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import Floats, direction
+from lambent.core.sequences import r2
+from lambent.materials.measured.klems import BUILT_IN, KLEMS_FULL, AngleBasis, PatchMatrix
+from lambent.materials.measured.lbnl_xml import LbnlTable, read
+from lambent.materials.measured.tensor_tree import Malformed, disk_of, parse_tree, square_of
+from lambent.materials.measured.tree_part import TreePart
+from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
+
+
+def test_klems_bases() -> None:
+    assert [basis.count for basis in BUILT_IN] == [145, 77, 41]
+    for basis in BUILT_IN:
+        np.testing.assert_allclose(basis.projected_sr.sum(), np.pi)
+        np.testing.assert_array_equal(basis.index(basis.centres), np.arange(basis.count))
+        np.testing.assert_array_equal(basis.opposite[basis.opposite], np.arange(basis.count))
+    # Patch 2 of the second ring: theta 10, phi 45 degrees.
+    np.testing.assert_allclose(KLEMS_FULL.centres[2], direction(np.radians(10), np.radians(45)), atol=1e-15)
+    edges = np.radians([14.99, 15.01])
+    assert KLEMS_FULL.index(direction(edges, 0)).tolist() == [1, 9]
+    around = KLEMS_FULL.index(direction(np.radians(10), np.radians([22.4, 22.6, 337.4, 337.6])))
+    assert around.tolist() == [1, 2, 8, 1]
+
+
+@pytest.mark.parametrize("basis", [*BUILT_IN, AngleBasis("", (0, 20, 50, 80), (3, 5, 7))])
+def test_points_fill_their_patches_evenly(basis: AngleBasis) -> None:
+    """Even in projected solid angle: the mean of cos^2 over a ring is the mean of its bounds."""
+    patch, u = np.repeat(np.arange(basis.count), 64), np.tile(r2(64), (basis.count, 1))
+    w = basis.points(patch, u)
+    np.testing.assert_array_equal(basis.index(w), patch)
+    squares = np.cos(np.radians(basis.edges_deg)) ** 2
+    expected = np.repeat((squares[1:] + squares[:-1]) / 2, basis.n_phis)
+    np.testing.assert_allclose((w[:, 2] ** 2).reshape(-1, 64).mean(axis=1), expected, atol=0.01)
+
+
+def test_disk_map_is_its_own_inverse_and_keeps_areas() -> None:
+    square = r2(4096)
+    disk = disk_of(square)
+    np.testing.assert_allclose(square_of(disk), square, atol=1e-12)
+    for radius in (0.3, 0.6, 0.9):
+        inside = np.hypot(*disk.T) < radius
+        np.testing.assert_allclose(inside.mean(), radius**2, atol=2e-3)
+    corners = disk_of(np.array([[1.0, 0.5], [1.0, 1.0], [0.5, 1.0], [0.5, 0.5]]))
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(corners, [[1, 0], [half, half], [0, 1], [0, 0]], atol=1e-12)
+
+
+def test_tree_syntax_by_hand() -> None:
+    """First coordinate: lowest bit of a branch, slowest of a grid."""
+    tree = parse_tree(b"{ {1},{2} {3} {4} {5} {6} {7} {10,11 12 13 14 15 16 17} }", 3)
+    places = np.array([[0.1, 0.1, 0.1], [0.6, 0.1, 0.1], [0.1, 0.6, 0.1], [0.1, 0.1, 0.6], [0.9, 0.6, 0.6]])
+    value, side = tree.look_up(places)
+    assert value.tolist() == [1, 2, 3, 5, 14] and side.tolist() == [0.5, 0.5, 0.5, 0.5, 0.25]
+    assert tree.look_up(np.array([[0.6, 0.6, 0.9], [1.0, 1.0, 1.0]]))[0].tolist() == [11, 17]
+
+
+@pytest.mark.parametrize("rank", [3, 4])
+def test_walk_meets_every_leaf_once(rank) -> None:
+    tree = parse_tree(
+        f"{{{' '.join(random_tree(np.random.default_rng(0), rank, 2) for _ in range(1 << rank))}}}".encode(), rank
+    )
+    cells = tree.walk((), np.zeros((1, 0)))
+    np.testing.assert_allclose((cells.side**rank).sum(), 1)
+    value, side = tree.look_up(cells.middle)
+    np.testing.assert_array_equal(value, cells.value)
+    np.testing.assert_array_equal(side, cells.side)
+    place = np.random.default_rng(1).random((7, rank))
+    for fixed in ((0,), (0, 1), (rank - 2, rank - 1)):
+        cells = tree.walk(fixed, place[:, list(fixed)])
+        np.testing.assert_allclose(np.bincount(cells.query, cells.side ** (rank - len(fixed))), 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "no braces"),
+        ("1 2", "after the last"),
+        ("{ 1", "after the last"),
+        ("{ {1} {2}", "not closed"),
+        ("{ 1 } }", "too many"),
+        ("{ 1 } 2", "after the last"),
+        ("{ 1 } { 2 }", "after the last"),
+        ("{ 1 2 3 }", "power of 8"),
+        ("{ }", "power of 8"),
+        ("{ {1} {2} }", "8 branches"),
+        ("{" + "{1} " * 9 + "}", "more than 8"),
+        ("{ 1 {2} }", "outside"),
+        ("{" + "{1} " * 8 + "2 }", "beside"),
+        ("{ x }", "not a number"),
+        ("{ 1x }", "not a number"),
+        ("{" * 100000, "levels"),
+        ("{" * 30 + "1" + "}" * 30, "levels"),
+    ],
+)
+def test_broken_trees(text: str, why: str) -> None:
+    with pytest.raises(Malformed, match=why):
+        parse_tree(text.encode(), 3)
+
+
+def lambertian(structure: str, albedo: float, direction_: str = "Reflection Back") -> str:
+    if structure.startswith("Tensor"):
+        return lbnl_xml(structure, [("Visible", direction_, f"{{ {albedo / np.pi:.9g} }}")])
+    return lbnl_xml(structure, [("Visible", direction_, words(np.full((145, 145), albedo / np.pi)))])
+
+
+@pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
+def test_lambertian_sheet(tmp_path: Path, structure: str) -> None:
+    """A white wall, whose albedo is .8 from everywhere; its tuples integrate to that."""
+    path = tmp_path / "w.xml"
+    path.write_text(lambertian(structure, 0.8))
+    table = read(path)
+    wi = direction(np.radians([0, 20, 50, 85]), 1.0)
+    np.testing.assert_allclose(table.reflectivity(wi), 0.8, rtol=1e-6)
+    assert (table.transmissivity(wi) == 0).all() and not table.info.transmits
+    assert table.info.isotropic == (structure != "TensorTree4")
+    assert (table.eval(wi, wi * (1, 1, -1)) == 0).all() and (table.albedo(wi * (1, 1, -1)) == 0).all()
+    np.testing.assert_allclose(table.eval(wi, wi), 0.8 / np.pi, rtol=1e-6)
+    samples = table.samples()
+    assert samples.left_out.total == 0 and (samples.wi[:, 2] > 0).all()
+    integral = (samples.weight * samples.p[:, 0]).sum() / (samples.weight * samples.wo[:, 2]).sum()
+    np.testing.assert_allclose(integral, 0.8 / np.pi, rtol=1e-6)
+
+
+def test_a_single_lit_patch(tmp_path: Path) -> None:
+    """Light that comes from phi 225 travels towards phi 45: patch 2 of the incident basis. It leaves by patch 1."""
+    values = np.zeros((145, 145))
+    values[1, 2] = 4.0
+    path = tmp_path / "p.xml"
+    path.write_text(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))
+    table = read(path)
+    wi, wo = direction(np.radians(10), np.radians(225)), direction(np.radians(170), 0)
+    assert table.eval(wi, wo) == 4 and table.eval(wo, wi) == 4 and table.eval(wi * (-1, -1, 1), wo) == 0
+    projected = np.pi * (np.cos(np.radians(5)) ** 2 - np.cos(np.radians(15)) ** 2) / 8
+    np.testing.assert_allclose(table.transmissivity(wi), 4 * projected)
+    np.testing.assert_allclose(table.transmissivity(wo), 4 * projected)
+    assert (table.reflectivity(wi) == 0).all()
+
+
+def sums_by_direction(table: LbnlTable) -> tuple[Floats, Floats, Floats]:
+    """Incident directions of the tuples, and what their reflected and transmitted tuples sum to."""
+    samples = table.samples()
+    wi, number = np.unique(samples.wi.round(9), axis=0, return_inverse=True)
+    power = samples.weight * samples.p[:, 0]
+    far = samples.transmitted
+    return wi, np.bincount(number[~far], power[~far], len(wi)), np.bincount(number[far], power[far], len(wi))
+
+
+@pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
+@pytest.mark.parametrize("transmission", ["Front", "Back"])
+def test_tuples_sum_to_the_albedos(tmp_path: Path, structure: str, transmission: str) -> None:
+    """Front alone is used backwards. The last ring's middle is within what a fit takes."""
+    random = np.random.default_rng(8)
+    blocks = []
+    for way in (f"Transmission {transmission}", "Reflection Back"):
+        rank = int(structure[-1]) if structure.startswith("Tensor") else 0
+        tree = "{" + " ".join(random_tree(random, rank, 1) for _ in range(1 << rank)) + "}" if rank else ""
+        blocks.append(("Visible", way, tree or words(random.random((145, 145)) * 0.2)))
+    path = tmp_path / "s.xml"
+    path.write_text(lbnl_xml(structure, blocks))
+    table = read(path)
+    wi, r, t = sums_by_direction(table)
+    keep = wi[:, 2] > 0.3
+    # Of trees what a fit leaves out near the horizon is missing from the sums.
+    tolerance = 0.06 if structure.startswith("Tensor") else 1e-9
+    np.testing.assert_allclose(r[keep], table.reflectivity(wi)[keep, 0], rtol=tolerance)
+    np.testing.assert_allclose(t[keep], table.transmissivity(wi)[keep, 0], rtol=tolerance)
+    samples = table.samples(max_count=1000)
+    assert len(samples) == 1000
+    np.testing.assert_allclose(table.eval(samples.wi, samples.wo), samples.f, rtol=1e-9)
+
+
+def test_light_from_behind_alone_is_turned_over_for_a_fit(tmp_path: Path) -> None:
+    path = tmp_path / "b.xml"
+    path.write_text(lambertian("Columns", 0.5, "Reflection Front"))
+    table = read(path)
+    assert (table.reflectivity(direction(0.3, 0)) == 0).all()
+    np.testing.assert_allclose(table.reflectivity(direction(np.pi - 0.3, 0)), 0.5, rtol=1e-6)
+    samples = table.samples()
+    assert (samples.wi[:, 2] > 0).all() and (samples.wo[:, 2] > 0).all()
+    np.testing.assert_allclose(samples.f, 0.5 / np.pi, rtol=1e-6)
+    assert any("turned over" in note for note in table.info.notes)
+
+
+def test_negative_values_count_as_zero_and_are_no_tuples(tmp_path: Path) -> None:
+    values = np.full((145, 145), 0.2)
+    values[3, 4] = values[5, 6] = -0.1
+    path = tmp_path / "n.xml"
+    path.write_text(lbnl_xml("Columns", [("Visible", "Reflection Back", words(values))]))
+    table = read(path)
+    assert table.samples().left_out.negative == 2
+    assert any("2 negative" in note for note in table.info.notes)
+    back = np.array((-1, -1, 1))
+    assert table.eval(KLEMS_FULL.centres[4] * back, KLEMS_FULL.centres[3]) == 0
+
+
+def test_what_is_taken_is_said(tmp_path: Path) -> None:
+    """Solar stands in for a missing Visible; of blocks that stand there twice the later one counts."""
+    low, high = (words(np.full((145, 145), v)) for v in (0.1, 0.2))
+    path = tmp_path / "n.xml"
+    path.write_text(lbnl_xml("Columns", [("Solar", "Reflection Back", low), ("Solar", "Reflection Back", high)]))
+    table = read(path)
+    np.testing.assert_allclose(table.eval(direction(0.1, 0), direction(0.1, 0)), 0.2)
+    notes = " ".join(table.info.notes)
+    assert "no Visible" in notes and "twice" in notes and "side -z" in notes
+
+
+def test_a_usual_name_for_an_unusual_basis_is_the_file_s(tmp_path: Path) -> None:
+    """The Klems half basis of older tools had 73 patches."""
+    rings = [
+        (0, 6.5, 1),
+        (6.5, 19.5, 8),
+        (19.5, 32.5, 12),
+        (32.5, 46.5, 16),
+        (46.5, 61.5, 20),
+        (61.5, 76.5, 12),
+        (76.5, 90, 4),
+    ]
+    path = tmp_path / "h.xml"
+    blocks = [("Visible", "Reflection Back", words(np.full((73, 73), 0.1)))]
+    path.write_text(lbnl_xml("Columns", blocks, angle_basis("LBNL/Klems Half", rings), "LBNL/Klems Half"))
+    table = read(path)
+    np.testing.assert_allclose(table.reflectivity(direction(0.2, 0)), 0.1 * np.pi)
+    assert any("Klems Half" in note for note in table.info.notes)
+
+
+def test_a_pane_is_said_to_be_one(tmp_path: Path) -> None:
+    path = tmp_path / "pane.xml"
+    values = np.diag(0.9 / KLEMS_FULL.projected_sr)
+    path.write_text(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))
+    table = read(path)
+    np.testing.assert_allclose(table.transmissivity(direction(0.7, 2)), 0.9, rtol=1e-6)
+    assert any("100 %" in note and "straight" in note for note in table.info.notes)
+    assert not table.info.isotropic or table.parts[("transmission", 1)].anisotropy < 1e-6
+
+
+def test_anisotropy_of_matrices() -> None:
+    """A function of theta_i, theta_o and phi_i - phi_o does not change when the sheet is turned; one of phi_i does."""
+    i, o = KLEMS_FULL.centres[None, :], KLEMS_FULL.centres[:, None]
+    isotropic = 0.1 + 0.1 * np.sum(i * o, axis=-1)
+    assert PatchMatrix(KLEMS_FULL, KLEMS_FULL, isotropic[..., None]).anisotropy < 1e-12
+    brushed = np.broadcast_to(0.2 + 0.1 * i[..., 0], isotropic.shape)
+    assert PatchMatrix(KLEMS_FULL, KLEMS_FULL, brushed[..., None]).anisotropy > 0.05
+
+
+def test_fine_trees_give_no_more_tuples_than_a_fit_can_use() -> None:
+    text = " ".join(["1"] * 16**4)
+    part = TreePart((parse_tree(f"{{ {text} }}".encode(), 4),))
+    _, _, f, weight = part.tuples()
+    assert 50_000 < len(f) <= 500_000 and (f == 1).all() and (weight > 0).all()

@@ -1,0 +1,211 @@
+"""Hostile BSDF files: one line, in time, with memory in proportion."""
+
+from __future__ import annotations
+
+import re
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lambent.core.errors import UserError
+from lambent.materials.measured import load
+from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
+
+HANGS_S = 10.0  # far beyond what any of these takes on a busy machine
+KINDS = ("matrix", "tree3", "tree4")
+WI, WO = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
+QUICK = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def sound(kind: str) -> bytes:
+    random = np.random.default_rng(0)
+    if kind == "matrix":
+        basis = angle_basis("mine", [(0, 30, 1), (30, 60, 4), (60, 90, 4)])
+        blocks = [("Visible", d, words(random.random((9, 9)) * 0.3)) for d in ("Reflection Back", "Transmission Front")]
+        return lbnl_xml("Columns", blocks, basis, "mine").encode()
+    rank = int(kind[-1])
+    tree = "{" + " ".join(random_tree(random, rank, 1) for _ in range(1 << rank)) + "}"
+    return lbnl_xml(f"TensorTree{rank}", [("Visible", "Transmission Back", tree)]).encode()
+
+
+def attempt(path: Path, content: bytes, fixed_bytes: int = 8 << 20) -> str:
+    """What is said of `content`: a usable table ("") or a UserError of one line, in time and in proportion."""
+    path.write_bytes(content)
+    said = ""
+    start = time.perf_counter()
+    tracemalloc.start()
+    try:
+        table = load(path)
+        peak = tracemalloc.get_traced_memory()[1]
+        assert np.isfinite(table.eval(WI, WO)).all() and np.isfinite(table.albedo(WI)).all()
+        assert np.isfinite(table.samples(1000).f).all()
+    except UserError as error:
+        said = str(error)
+        peak = tracemalloc.get_traced_memory()[1]
+        assert "\n" not in said and path.name in said
+    finally:
+        tracemalloc.stop()
+    assert time.perf_counter() - start < HANGS_S
+    assert peak < 10 * len(content) + fixed_bytes
+    return said
+
+
+@pytest.fixture(scope="module")
+def target(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("broken") / "broken.xml"
+    for kind in KINDS:  # imports are warm, and the sound files are sound
+        path.write_bytes(sound(kind))
+        load(path).samples(10)
+    return path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_truncated_anywhere(target: Path, kind: str) -> None:
+    content = sound(kind)
+    complete = content.rstrip()
+    for end in range(0, len(content), max(1, len(content) // 150)):
+        target.write_bytes(content[:end])
+        if end < len(complete):
+            with pytest.raises(UserError):
+                load(target)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@QUICK
+@given(data=st.data())
+def test_bytes_overwritten(target: Path, kind: str, data: st.DataObject) -> None:
+    content = bytearray(sound(kind))
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        patch = data.draw(
+            st.one_of(st.binary(min_size=1, max_size=6), st.sampled_from([b"{", b"}", b"<", b"nan", b"-"]))
+        )
+        content[at : at + len(patch)] = patch
+    attempt(target, bytes(content))
+
+
+BOMB = '<!DOCTYPE x [<!ENTITY a "ha">' + "".join(
+    f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (
+            lambda s: s.replace("<WindowElement", BOMB + "]><WindowElement", 1).replace("made up", "&i;"),
+            "document type",
+        ),
+        (
+            lambda s: s.replace("<WindowElement", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><WindowElement', 1),
+            "document type",
+        ),
+        (lambda s: s.replace("made up", "&xxe;"), "not well-formed"),
+        (lambda s: s.replace("<nPhis>4", "<nPhis>4000000000"), "count does not fit"),
+        (lambda s: s.replace("<nPhis>4", "<nPhis>" + "9" * 6000), "not all numbers"),
+        (lambda s: s.replace("<nPhis>4", "<nPhis>-4"), "a ring of -4"),
+        (lambda s: s.replace("<nPhis>4", "<nPhis>1"), "a ring of 1"),
+        (lambda s: s.replace("<nPhis>4", "<nPhis>four"), "not all numbers"),
+        (lambda s: s.replace("<UpperTheta>60", "<UpperTheta>nan"), "theta does not rise"),
+        (lambda s: s.replace("<UpperTheta>90", "<UpperTheta>900"), "theta does not rise"),
+        (lambda s: s.replace("<LowerTheta>30", "<LowerTheta>20"), "theta does not rise"),
+        (lambda s: s.replace("<AngleBasisName>mine", "<AngleBasisName>yours"), "unknown angle basis"),
+        (lambda s: s.replace("<ColumnAngleBasis>mine</ColumnAngleBasis>", ""), "unknown angle basis"),
+        (lambda s: s.replace("Columns", "Diagonals"), "IncidentDataStructure"),
+        (lambda s: s.replace("Columns", "TensorTree3"), "unknown angle basis"),
+        (lambda s: s.replace("BTDF", "BRRF"), "ScatteringDataType"),
+        (lambda s: s.replace("Visible", "Infrared"), "Wavelength"),
+        (lambda s: s.replace("Reflection Back", "Up").replace("Transmission Front", "Down"), "no block names a side"),
+        (lambda s: s.replace("<ScatteringData>0.", "<ScatteringData>nan 0."), "count does not fit"),
+        (lambda s: s.replace("<ScatteringData>0.", "<ScatteringData>1e999"), "not finite"),
+        (lambda s: s.replace("<ScatteringData>0.", "<ScatteringData>x"), "not a number"),
+        (lambda s: s.replace("<ScatteringData>0.", "<ScatteringData>\u0661"), "not a number"),
+        (lambda s: s.replace("<ScatteringData>", "<ScatteringData><!-- 0.1 -->").replace("0.", "-0."), "above zero"),
+        (lambda s: s.replace("<WindowElement ", "<Window ").replace("/WindowElement>", "/Window>"), "known format"),
+        (lambda s: s.replace("<Optical>", "<Optics>").replace("</Optical>", "</Optics>"), "IncidentDataStructure"),
+        (lambda s: s.replace("nobody", "x" * 20000), "too long"),
+        (lambda s: s.replace("nobody", "<a>" * 100 + "</a>" * 100), "deeper"),
+        (lambda s: s.replace("nobody", "<a/>" * 100000), "more elements"),
+        (
+            lambda s: s.replace("<Material", "<Material " + " ".join(f"a{k}=''" for k in range(100000)), 1),
+            "tag of over",
+        ),
+        (lambda s: s.replace("UTF-8", "no-such-code"), "well-formed|encoding"),
+        (lambda s: s.replace("UTF-8", "utf-7"), "well-formed|encoding"),
+    ],
+)
+def test_hostile_matrices(target: Path, change, expected: str) -> None:
+    content = change(sound("matrix").decode())
+    assert content != sound("matrix").decode()
+    said = attempt(target, content.encode())
+    assert re.search(expected, said), said
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        sound("matrix").replace(b"nobody", b"caf\xe9"),
+        sound("matrix").decode().replace("UTF-8", "UTF-16").encode("utf-16"),
+        b"\xef\xbb\xbf<WindowElement>" + b"\xff" * 100,
+        b"<WindowElement>",
+        b"<WindowElement/>",
+    ],
+)
+def test_not_utf8_or_hardly_there(target: Path, content: bytes) -> None:
+    assert attempt(target, content)
+
+
+@pytest.mark.parametrize(
+    "tree", ["{" * 300_000, "}" * 300_000, "{}" * 300_000, "{1}" * 300_000, "1 " * 500_000, "," * 10**6]
+)
+def test_hostile_trees(target: Path, tree: str) -> None:
+    said = attempt(target, lbnl_xml("TensorTree4", [("Visible", "Reflection Back", tree)]).encode())
+    assert "tensor tree is broken" in said
+
+
+def test_dense_trees_stay_in_proportion(target: Path) -> None:
+    """The most that a letter can be made to cost: leaves of one digit, and branches of them."""
+    leaf = "{1}"
+    for _ in range(4):
+        leaf = "{" + leaf * 16 + "}"
+    assert attempt(target, lbnl_xml("TensorTree4", [("Visible", "Reflection Back", leaf)]).encode(), 48 << 20) == ""
+    grid = "{" + "1 " * 16**4 + "}"
+    assert attempt(target, lbnl_xml("TensorTree4", [("Visible", "Reflection Back", grid)]).encode(), 48 << 20) == ""
+    matrix = lbnl_xml("Columns", [("Visible", "Reflection Back", "1 " * 145**2)] * 8)
+    assert attempt(target, matrix.encode()) == ""
+
+
+def test_an_encoding_that_is_declared_is_read(target: Path) -> None:
+    content = sound("matrix").decode().replace("UTF-8", "ISO-8859-1").replace("nobody", "café")
+    assert attempt(target, content.encode("latin-1")) == ""
+
+
+def test_prefixes_byte_order_mark_and_order_change_nothing(target: Path) -> None:
+    plain = sound("matrix").decode()
+    target.write_text(plain)
+    expected = load(target).eval(WI, WO * (1, 1, -1))
+    prefixed = plain.replace("xmlns=", "xmlns:w=").replace("</", "</w:")
+    for tag in ("WindowElement", "Optical", "Layer", "DataDefinition", "ScatteringData", "Material"):
+        prefixed = prefixed.replace(f"<{tag}>", f"<w:{tag}>").replace(f"<{tag} ", f"<w:{tag} ")
+    prefixed = re.sub(r"<(\w+)([ >])", r"<w:\1\2", prefixed)
+    definition = re.search("<DataDefinition>.*</DataDefinition>\n", plain, re.S)[0]
+    later = plain.replace(definition, "").replace("</Layer>", definition + "</Layer>")
+    for content in (prefixed.encode(), b"\xef\xbb\xbf" + plain.encode(), later.encode()):
+        target.write_bytes(content)
+        np.testing.assert_array_equal(load(target).eval(WI, WO * (1, 1, -1)), expected)
+
+
+def test_a_second_layer_is_left_alone_and_said(target: Path) -> None:
+    plain = sound("matrix").decode()
+    start, end = plain.index("<Layer>"), plain.index("</Layer>") + 8
+    layer = plain[start:end]
+    target.write_text(plain[:end] + layer.replace("mine", "other").replace("0.", "9.") + plain[end:])
+    table = load(target)
+    assert any("first layer" in note for note in table.info.notes)
+    target.write_text(plain)
+    np.testing.assert_array_equal(table.eval(WI, WO), load(target).eval(WI, WO))
