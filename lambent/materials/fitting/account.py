@@ -12,7 +12,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting.least_squares import Bounds, minimise
 from lambent.materials.fitting.metrics import METRICS
-from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
+from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
 from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -89,8 +89,8 @@ def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> lis
             if extent == 0 or (base == "my" and box.tied):
                 continue
             for bound, word in ((box.lo, "lower"), (box.hi, "upper")):
-                if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent:
-                    value = from_search(bound)[axis]
+                value = from_search(bound)[axis]
+                if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent and value not in LEGAL[base]:
                     lines.append(f"{parameter(side, base, index)} is at its {word} bound {value:.3g}")
         if not np.any(lobe.k > 0):
             lines.append(f"{parameter(side, 'k', index)} is 0: the lobe explains nothing")

@@ -250,8 +250,21 @@ def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progre
         else:
             bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
             gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed, task.gain, one.models)
+        one.models[:] = [_narrow_first(model, boxes) for model in one.models]
         if one.problem.remaining(one.models[-1]) < found[side].problem.remaining(found[side].models[-1]):
             found[side] = one
+
+
+def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
+    """The lobes by their roughness, where the user's restrictions do not tell them apart."""
+    alike = all(np.array_equal((box.lo, box.hi), (boxes[0].lo, boxes[0].hi)) for box in boxes)
+    alike = alike and all(box.k_limits == boxes[0].k_limits for box in boxes)
+    return replace(model, lobes=tuple(sorted(model.lobes, key=_area))) if alike else model
+
+
+def _area(lobe: Candidate) -> float:
+    mx, my, _, _ = lobe.shape
+    return float(mx * my)
 
 
 def _part(progress: Progress, side: Side, number: int, parts: int) -> Progress:
@@ -302,13 +315,9 @@ def _diffuse_rgb(
 
 
 def _document_lobes(side: Side, found: Found, task: Task) -> list[Lobe]:
-    """The lobes as a document holds them, narrow ones first where the user did not number them."""
-    lobes = [
-        _lobe(side, i, candidate, found.problem.distribution, task.fix)
-        for i, candidate in enumerate(found.models[-1].lobes if found.models else ())
-    ]
-    numbered = any(name.endswith(("_2", "_3", "_4")) for name in [*task.fix, *task.ranges])
-    return lobes if numbered else sorted(lobes, key=lambda lobe: lobe.mx * lobe.my)
+    """The lobes as a document holds them."""
+    lobes = found.models[-1].lobes if found.models else ()
+    return [_lobe(side, i, lobe, found.problem.distribution, task.fix) for i, lobe in enumerate(lobes)]
 
 
 def _lobe(side: Side, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
