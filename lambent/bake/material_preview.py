@@ -1,14 +1,15 @@
 """A ball that wears a measured table, and the same ball with the material fitted to it, side by side.
 
 The ball is brushed along its circles of latitude, its axis leaning towards the viewer and to the side, so that brushed
-highlights show. Where the table transmits, a lamp hangs inside: what passes the sheet is what is seen of it.
+highlights show. Where the table transmits, only the ball's front half is there, and a lamp hangs behind it: what
+passes the sheet is what is seen of the lamp.
 Background and figures belong to the ball's pixels alone: what both pictures share would only flatter them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from lambent.core.frames import normalize
 from lambent.core.metrics import display_pair, flip, psnr, tile_means
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.materials.measured.half_vector_grid import ISOTROPIC, GridShape
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.scenes.geometry import sphere, transformed, turn
 from lambent.scenes.scene import Environment, Mesh, SceneObject, SunSky
@@ -29,9 +31,12 @@ Floats = NDArray[np.floating]
 
 DAYLIGHT = SunSky(sun_direction=tuple(normalize(np.array([-0.55, 0.62, 0.56])).tolist()))
 SIZE_PX, SPP = 320, 49
-MAX_DEPTH = {False: 2, True: 8}  # without a lamp inside light meets the ball once: it is convex
+GRIDS = {True: ISOTROPIC, False: GridShape(32, 24, 64, 64)}  # by isotropy; at this size finer ones show no more
+MAX_DEPTH = {False: 2, True: 3}  # without a lamp light meets the ball once: it is convex
 DISTANCE, FOV_DEG = 6.0, 19.4  # of the camera; the ball has radius 1 and nearly fills the picture
-LAMP_RADIUS, LAMP_RADIANCE = 0.22, 25.0  # in multiples of the environment's mean radiance
+LAMP_AT, LAMP_RADIUS = (0.25, -0.2, 0.1), 0.12
+LAMP_RADIANCE = (300.0, 230.0, 150.0)  # in multiples of the environment's mean
+OPEN_BEHIND = -0.15  # z in the camera's direction up to which the half ball reaches, a little behind its silhouette
 MEAN_SHOWN = 0.3  # of the ball that wears the table, as a display shows it
 
 
@@ -51,7 +56,7 @@ class Preview:
         Over the ball: `psnr_db`, `flip_mean`, `flip_worst_tile` (16x16 tiles that lie on it).
     spp : int
     lamp : bool
-        Whether a lamp hangs inside.
+        Whether a lamp hangs behind the front half.
     """
 
     measured: Floats
@@ -82,13 +87,14 @@ def preview(
     """
     register_material_plugin()
     lamp = table.info.transmits or material.transmits
-    bsdfs = {"measured": table_dict(table, progress=progress), "model": material_dict(material)}
+    shape = GRIDS[table.info.isotropic]
+    bsdfs = {"measured": table_dict(table, shape=shape, progress=progress), "model": material_dict(material)}
     pictures = {}
     for i, (name, bsdf) in enumerate(bsdfs.items()):
         progress(i, 2, "rendering the previews")
-        pictures[name], ball = _render(bsdf, environment, lamp, size_px, spp, seed)
+        pictures[name] = _render(bsdf, environment, lamp, size_px, spp, seed)
     progress(2, 2, "rendering the previews")
-    return _compared(pictures["measured"], pictures["model"], ball, spp, lamp)
+    return _compared(pictures["measured"], pictures["model"], _ball_pixels(size_px), spp, lamp)
 
 
 def _compared(measured: Floats, model: Floats, ball: NDArray[np.bool_], spp: int, lamp: bool) -> Preview:
@@ -107,10 +113,8 @@ def _compared(measured: Floats, model: Floats, ball: NDArray[np.bool_], spp: int
     return Preview(shown[0], shown[1], difference.picture, ball, figures, spp, lamp)
 
 
-def _render(
-    bsdf: Mapping[str, Any], environment: Environment, lamp: bool, size_px: int, spp: int, seed: int
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Radiance (H, W, 3), and which pixels see the ball alone."""
+def _render(bsdf: Mapping[str, Any], environment: Environment, lamp: bool, size_px: int, spp: int, seed: int) -> Floats:
+    """Radiance (H, W, 3)."""
     import mitsuba as mi
 
     light = environment_dict(environment)
@@ -126,28 +130,41 @@ def _render(
                 "type": "hdrfilm",
                 "width": size_px,
                 "height": size_px,
-                "pixel_format": "rgba",
+                "pixel_format": "rgb",
                 "component_format": "float32",
                 "rfilter": {"type": "box"},
             },
         },
         "environment": light,
-        "ball": mesh_of(SceneObject("ball", ball_mesh(), "material"), mi.load_dict(dict(bsdf))),
+        "ball": mesh_of(SceneObject("ball", ball_mesh(half=lamp), "material"), mi.load_dict(dict(bsdf))),
     }
     if lamp:
         mean = float(np.mean(np.array(light["bitmap"]))) * light["scale"]
         scene["lamp"] = {
             "type": "sphere",
+            "center": list(LAMP_AT),
             "radius": LAMP_RADIUS,
-            "emitter": {"type": "area", "radiance": LAMP_RADIANCE * mean},
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [mean * c for c in LAMP_RADIANCE]}},
             "bsdf": {"type": "diffuse", "reflectance": 0.0},
         }
-    picture = np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed), dtype=float)
-    return picture[..., :3], picture[..., 3] > 1 - 1e-4
+    return np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed), dtype=float)
 
 
-def ball_mesh() -> Mesh:
-    """The ball, radius 1."""
+def _ball_pixels(size_px: int) -> NDArray[np.bool_]:
+    """(H, W) pixels that see nothing but the ball: all four corners meet it, its facets a hair within radius 1."""
+    edge = (np.arange(size_px + 1) / size_px * 2 - 1) * np.tan(np.radians(FOV_DEG / 2))
+    x, y = np.meshgrid(edge, edge)
+    slope2 = x * x + y * y
+    met = DISTANCE**2 * slope2 / (1 + slope2) < 0.999**2
+    return np.asarray(met[1:, 1:] & met[1:, :-1] & met[:-1, 1:] & met[:-1, :-1])
+
+
+def ball_mesh(half: bool = False) -> Mesh:
+    """The ball, radius 1, or its half that faces the camera."""
     lean = np.eye(4)
-    lean[:3, :3] = turn("z", -28.0)[:3, :3] @ turn("x", 32.0)[:3, :3]
-    return transformed(sphere(1.0, around=192, rows=96), lean)
+    lean[:3, :3] = turn("z", -28.0) @ turn("x", 32.0)
+    ball = transformed(sphere(1.0, around=192, rows=96), lean)
+    if not half:
+        return ball
+    front = ball.positions[ball.faces, 2].mean(axis=1) > OPEN_BEHIND
+    return replace(ball, faces=ball.faces[front])

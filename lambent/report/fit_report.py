@@ -147,7 +147,7 @@ def _previews(
 
     seen = preview(table, material, environment or DAYLIGHT, progress=progress)
     where = "under a clear sky" if environment is None else f"in {_name_of(environment)}"
-    lamp = ", a lamp inside" if seen.lamp else ""
+    lamp = ", a lamp behind its front half" if seen.lamp else ""
     brushed = ", brushed along its circles of latitude" if not table.info.isotropic else ""
     figures = seen.figures
     words = (
