@@ -40,11 +40,17 @@ def command(
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same material.")] = 0,
     output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw both: X.png gives X_polar, X_in_plane, X_albedo.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write all there is to know of the fit as one page (.html), previews included.")
+    ] = None,
+    environment: Annotated[
+        Path | None, typer.Option(help="Lat-long picture (.hdr, .exr) the report's previews stand in; else daylight.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Fit a diffuse term and lobes to a measured material.
 
-    Example: lambent fit brushed.bsdf --lobes auto -o brushed.json --plot brushed.png
+    Example: lambent fit brushed.bsdf --lobes auto -o brushed.json --report brushed.html
     """
     from lambent.core.images import check_writable
     from lambent.materials import measured
@@ -53,12 +59,14 @@ def command(
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
     from lambent.materials.fitting.plot import save_plots
 
-    if output is not None:
-        check_writable(output, (".json",))
-    if plot is not None:
-        check_writable(plot, (".png",))
+    for written, suffix in ((output, ".json"), (plot, ".png"), (report, ".html")):
+        if written is not None:
+            check_writable(written, (suffix,))
+    if environment is not None:
+        _check_environment(environment, report)
     count, fixed, ranges = _count(lobes), parse_fix(fix or ()), parse_ranges(range_ or ())
-    samples = measured.load(file).samples()
+    measurement = measured.load(file)
+    samples = measurement.samples()
     with progress_bar() as progress:
         result = fit(
             samples,
@@ -78,6 +86,13 @@ def command(
     if output is not None:
         result.material.save(output)
     plots = save_plots(samples, result.material, plot.parent, plot.stem) if plot is not None else []
+    if report is not None:
+        from lambent.report.fit_report import write_report
+        from lambent.scenes.scene import ImageEnvironment
+
+        surroundings = ImageEnvironment(environment) if environment is not None else None
+        with progress_bar() as progress:
+            write_report(report, measurement, samples, result, source=file, environment=surroundings, progress=progress)
     for warning in result.warnings:
         say(f"note: {warning}")
     facts = {
@@ -89,10 +104,20 @@ def command(
         "warnings": result.warnings,
         "written": output,
         "plots": plots,
+        "report": report,
     }
     show(facts, describe(result), json)
     if result.partial:
         raise typer.Exit(130)
+
+
+def _check_environment(file: Path, report: Path | None) -> None:
+    """Find out before the fit that the picture cannot be used."""
+    from lambent.core.images import read_image
+
+    if report is None:
+        raise UserError("is for the previews of a report", field="--environment", hint="add --report PAGE.html")
+    read_image(file)
 
 
 def _count(lobes: str) -> int | Literal["auto"]:
