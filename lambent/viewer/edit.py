@@ -79,7 +79,7 @@ def editor_state(
         editor.file_name = str(home)
         editor.may_replace(home)
     if other is not None:
-        editor.document, editor.reference = other, "a document"
+        editor.compare_with(other)
     editor.show_measurement(measurement)
 
     def open_environment(path: Path) -> None:

@@ -161,9 +161,9 @@ def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
     fitted = BRASS.model_copy(
         update={"provenance": Provenance(source="brass.txt", method="gradient", errors={"l1": 9.0})}
     )
-    editor.origin = fitted
+    editor.adopt(fitted)
     editor.show_measurement(read_measurement(brass_file))
-    editor.step(moved(BRASS, mx=0.3))
+    editor.step(moved(fitted, mx=0.3))
     editor.file_name = "mine.json"
     editor.save()
     saved = load_material(tmp_path / "mine.json")
@@ -173,6 +173,9 @@ def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
     editor.step(fitted)
     editor.save()
     assert load_material(tmp_path / "mine.json").provenance == fitted.provenance, "as fitted, so no note"
+    editor.step(BRASS)
+    editor.save()
+    assert load_material(tmp_path / "mine.json").provenance is None, "as it was before the fit"
 
 
 def test_another_file_is_replaced_at_the_second_try(editor, tmp_path, said):
@@ -209,7 +212,7 @@ def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, sai
 def test_files_are_taken_for_what_they_hold(editor, brass_file, tmp_path):
     FROSTED.save(tmp_path / "frosted.json")
     editor.open(f" '{tmp_path / 'frosted.json'}' ")
-    assert same_numbers(editor.material, FROSTED)
+    assert same_numbers(editor.material, FROSTED) and editor.file_name == str(tmp_path / "frosted.json")
     editor.edits.undo()
     assert editor.material == BRASS
     editor.open(f"file://{brass_file}")

@@ -56,8 +56,8 @@ class Editor:
         Where it is saved.
     say : callable
         Shows the user a line.
-    origin : Material
-        As it was loaded or fitted: what its provenance is about.
+    origins : list of Material
+        As they were loaded or fitted: what their provenance is about.
     """
 
     edits: MaterialEdits
@@ -74,7 +74,7 @@ class Editor:
     reference: Reference = "nothing"
     document: Material | None = None  # to compare with
     saved: Material | None = None
-    origin: Material | None = None
+    origins: list[Material] = field(default_factory=list)
     file_name: str = ""
     typed: dict[str, str] = field(default_factory=dict)  # path fields, by what they are for
     fitting: Work | None = None
@@ -94,7 +94,7 @@ class Editor:
 
     def __post_init__(self) -> None:
         self.loaded = self.material
-        self.origin = self.origin or self.material
+        self.origins.append(self.loaded)
         self.file_name = self.file_name or f"{_plain(self.material.name)}.json"
         self.shown = Shown()
 
@@ -116,9 +116,16 @@ class Editor:
         return found.get(self.reference)
 
     @property
+    def origin(self) -> Material:
+        """What the material was loaded or fitted as; its provenance, which edits keep, tells."""
+        about = self.material.provenance
+        return next((found for found in reversed(self.origins) if found.provenance == about), self.loaded)
+
+    @property
     def unsaved(self) -> bool:
         """Whether there is something that saving would keep."""
-        return not same_numbers(self.material, self.saved or self.loaded)
+        kept, now = self.saved or self.loaded, self.material
+        return now.name != kept.name or not same_numbers(now, kept)
 
     def choose(self, incident: int) -> None:
         """Plot the plane of another incident direction."""
@@ -133,6 +140,11 @@ class Editor:
         self.edits.end_stroke()
         self.change(material)
         self.edits.end_stroke()
+
+    def adopt(self, material: Material) -> None:
+        """Take a material that comes with an account of its own, as a step."""
+        self.origins.append(material)
+        self.step(material)
 
     def add_lobe(self, side: Literal["reflection", "transmission"]) -> None:
         before = self.material
@@ -184,16 +196,20 @@ class Editor:
     def open_compared(self, text: str) -> None:
         """Load the document to compare with, or say why not."""
         try:
-            self.document = load_material(typed_path(text))
+            self.compare_with(load_material(typed_path(text)))
         except UserError as error:
             self.say(f"not loaded: {error}")
-        else:
-            self.reference = "a document"
+
+    def compare_with(self, document: Material) -> None:
+        """Compare with a document from now on."""
+        self.document, self.reference = document, "a document"
+        self.origins.append(document)
 
     def _take_document(self, path: Path) -> None:
         material = load_material(path)
-        self.origin = material
-        self.step(material)
+        self.adopt(material)
+        self.file_name = str(path)
+        self._may_replace = {path.resolve()}
         self.say(f"material of {path.name}; undo brings back the one before")
 
     def _read(self, path: Path) -> None:
@@ -225,7 +241,7 @@ class Editor:
                 return
             material = self.material
             errors = self.measurement.exact_errors(material) if self.measurement else {}
-            with_account(material, self.origin or self.loaded, self.measurement, errors).save(path)
+            with_account(material, self.origin, self.measurement, errors).save(path)
         except (UserError, OSError) as error:
             self.say(f"not saved: {error}")
         else:
@@ -294,8 +310,8 @@ class Editor:
             self.say("fit cancelled: the material is as it was")
             return
         found = result.material.model_copy(update={"name": self.material.name})
-        self.origin, self.warnings = found, result.warnings
-        self.step(found)
+        self.warnings = result.warnings
+        self.adopt(found)
         error, flat = result.errors[self.metric], result.lambertian_errors[self.metric]
         self.say(
             f"fitted in {result.seconds:.1f} s: {self.metric} {error:.4g}, {100 * error / flat:.0f} % of Lambertian"

@@ -54,7 +54,7 @@ def _names(editor: Editor) -> None:
     measurement = editor.measurement
     info = measurement.samples.info if measurement else None
     imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(f"{editor.name}{' *' if editor.unsaved else ''}")
+    imgui.text_unformatted(f"{editor.material.name}{' *' if editor.unsaved else ''}")
     explain("the material; * there is something to save")
     if editor.leave is not None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
