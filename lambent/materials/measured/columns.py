@@ -19,7 +19,15 @@ import numpy as np
 from lambent.core.errors import UserError
 from lambent.core.frames import Floats, direction
 from lambent.materials.measured import gonio_text
-from lambent.materials.measured.gonio_rows import Quantity, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.gonio_rows import (
+    LONGEST_NAME,
+    Quantity,
+    Rows,
+    check_angles,
+    quantity_of,
+    table_of,
+    to_f,
+)
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
@@ -172,6 +180,8 @@ def _stem(word: str, channel: str) -> str | None:
 
 def _angle(name: str) -> str | None:
     """theta_i, phi_i, theta_o, phi_o or dphi, where the name is one of the usual ones for it."""
+    if len(name) > LONGEST_NAME:
+        return None
     word = re.sub(r"\(.*?\)|\[.*?\]|_?(?:deg|rad)$", "", name.lower()).replace("-", "_").strip("_")
     if word in ("dphi", "delta_phi", "phi_diff", "deltaphi"):
         return "dphi"
@@ -230,7 +240,8 @@ def assemble(
 def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:
     """(N, 4) theta_i, phi_i, theta_o, phi_o."""
     unit = 180 / np.pi if layout.radians else 1.0
-    given = {name: rows[:, column] * unit for name, column in layout.angles.items()}
+    with np.errstate(over="ignore"):
+        given = {name: rows[:, column] * unit for name, column in layout.angles.items()}
     theta_i, theta_o = given["theta_i"], given["theta_o"]
     phi_i = given.get("phi_i", np.full(len(rows), phi_i_deg))
     phi_o = phi_i + given["dphi"] if "dphi" in given else given.get("phi_o", phi_i + 180)

@@ -17,6 +17,7 @@ from lambent.core.frames import Floats, direction
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, AnySheet, GonioTable, Sheets, Symmetry
 from lambent.materials.measured.protocol import Flags
 from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, specular_frame
+from lambent.materials.measured.table import sensible
 
 Quantity = Literal["f", "f_cos", "p"]
 QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
@@ -25,6 +26,7 @@ _WORDS: dict[str, Quantity] = {
     **dict.fromkeys(("fcos", "ccbrdf", "ccbtdf", "ccbsdf", "brdfcos", "btdfcos", "bsdfcos"), "f_cos"),
     **dict.fromkeys(("p", "transfer", "transferprobability"), "p"),
 }
+LONGEST_NAME = 64  # of a column; what is longer is no name
 DECIMALS = 5  # of the angles in degrees: closer directions are the same
 _LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
 _PLANE_DEG = 0.1  # so close to the plane of incidence a scan is in it
@@ -74,6 +76,8 @@ def check_angles(angles_deg: Floats, path: Path) -> None:
 
 def quantity_of(word: str) -> Quantity | None:
     """What a column of this name holds; None where the name does not say."""
+    if len(word) > LONGEST_NAME:
+        return None
     return _WORDS.get(re.sub(r"\(.*?\)|\[.*?\]|[^a-z]", "", word.lower()))
 
 
@@ -82,7 +86,8 @@ def to_f(values: Floats, quantity: Quantity, theta_o_deg: Floats) -> Floats:
     if quantity == "f":
         return values
     cos_o = np.abs(np.cos(np.radians(theta_o_deg)))[:, None]
-    return np.divide(values, cos_o, out=np.full_like(values, np.nan), where=cos_o > 1e-6)
+    with np.errstate(over="ignore"):
+        return np.divide(values, cos_o, out=np.full_like(values, np.nan), where=cos_o > 1e-6)
 
 
 def table_of(rows: Rows) -> GonioTable:
@@ -201,7 +206,7 @@ def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floa
 def sheet_of(angles_deg: Floats, f: Floats, images: Flags, path: Path) -> AnySheet:
     """The rows (N, 4) of one incident direction and side, sorted by theta_o then phi_o, without repeats."""
     theta_i, phi_i = angles_deg[0, :2]
-    if not np.isfinite(f).all(axis=-1).any():
+    if not sensible(f).any():
         where = f"theta_i {theta_i:g}, phi_i {phi_i:g}"
         raise UserError("no value was measured for an incident direction", file=path, field=where)
     frame = specular_frame(theta_i, phi_i)

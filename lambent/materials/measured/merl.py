@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.frames import Floats, direction, normalize, reflect
-from lambent.materials.measured.protocol import Flags, MeasuredSamples, collect
+from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, collect
 from lambent.materials.measured.table import IntegratedTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
@@ -75,7 +75,11 @@ class MerlTable(IntegratedTable):
     def __init__(self, planes: Floats, path: Path) -> None:
         self._raw = planes
         with np.errstate(invalid="ignore"):
-            self._measured = np.asarray(((planes >= 0) & np.isfinite(planes)).all(axis=0))
+            # Channel by channel: a million bins as one array of flags would take as much memory as a plane.
+            bounds = [scale * LARGEST_F for scale in 1 / SCALES]
+            self._measured = np.logical_and.reduce(
+                [(plane >= 0) & (plane <= bound) for plane, bound in zip(planes, bounds, strict=True)]
+            )
         require_values(np.moveaxis(planes, 0, -1), self._measured, path)
         sizes = dict(zip(("theta_h", "theta_d", "phi_d"), planes.shape[1:], strict=True))
         self.info = isotropic_brdf(path, NAME, sizes, ("values stand at the centres of their bins",))

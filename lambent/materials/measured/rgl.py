@@ -18,7 +18,7 @@ from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values
+from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values, sensible
 from lambent.materials.measured.tensor_file import MAGIC, read_tensors
 
 NAME = "RGL tensor file"
@@ -103,7 +103,7 @@ class RglTable(IntegratedTable):
         self._reduction = 1 if self._isotropic else round(2 * np.pi / (self._phi[-1] - self._phi[0]))
         self._with_jacobian = bool(np.any(tensors.get("jacobian", np.ones(1))))
         self._raw = values
-        finite = np.asarray(np.isfinite(values).all(axis=-1))
+        finite = sensible(values)
         usable = np.asarray(finite & (values >= 0).all(axis=-1))
         require_values(values, usable, path)
         slices = (-1, *values.shape[2:])
@@ -181,7 +181,8 @@ class RglTable(IntegratedTable):
         wi = direction(self._theta[j], self._phi[i])
         m = direction(theta_m, phi_m + (self._phi[i] if self._isotropic else 0))
         wo = reflect(wi, m)
-        value = self._raw.reshape(-1, 3) * self._factor(u_m, self._theta[j], self._phi[i])
+        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts what is not finite
+            value = self._raw.reshape(-1, 3) * self._factor(u_m, self._theta[j], self._phi[i])
         below: Flags = (wo[:, 2] <= 0) | (density <= 0)
         f = np.divide(value, wo[:, 2:], out=np.zeros_like(value, dtype=float), where=~below[:, None])
         jacobian = 2 * np.pi**2 * u_m[:, 0] * np.sin(theta_m) * 4 * np.sum(wi * m, axis=-1)

@@ -11,7 +11,7 @@ from lambent.core.frames import Floats, direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.measured.merl import half_difference_angles
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import IntegratedTable
+from lambent.materials.measured.table import IntegratedTable, sensible
 
 NEIGHBOURS = 16
 _SLOPE_PENALTY = (
@@ -20,8 +20,8 @@ _SLOPE_PENALTY = (
 _DARK = 0.05  # share of the median f that the logarithm is shifted by: what is darker counts as alike
 _BEYOND = 4.0  # times the brightest neighbour: a plane of logarithms runs away where it leaves the data
 _PEAK_RAD = 0.1  # theta_h within which distances count most
-_WEIGHT_POINTS = 1 << 17
-_QUERIES_AT_ONCE = 1 << 15
+_POINTS_PER_TUPLE, _WEIGHT_POINTS = 90, (1 << 12, 1 << 18)  # of the Monte Carlo weights, and their bounds
+_QUERIES_AT_ONCE = 1 << 11
 
 
 class ScatteredTable(IntegratedTable):
@@ -43,7 +43,7 @@ class ScatteredTable(IntegratedTable):
     def __init__(self, wi: Floats, wo: Floats, f: Floats, info: TableInfo) -> None:
         self._wi, self._wo, self._f, self.info = wi, wo, f, info
         with np.errstate(invalid="ignore"):
-            self._usable = np.asarray((np.isfinite(f) & (f >= 0)).all(axis=1))
+            self._usable = sensible(f) & (f >= 0).all(axis=1)
 
     @cached_property
     def _tree(self) -> Any:  # scipy's class is imported where it is needed
@@ -88,11 +88,12 @@ class ScatteredTable(IntegratedTable):
         """The file's tuples; the weight is the share of d_wi d_wo that lies nearest to the tuple, in sr^2."""
         from scipy.spatial import cKDTree
 
-        k = np.arange(_WEIGHT_POINTS)
+        count = int(np.clip(_POINTS_PER_TUPLE * len(self._f), *_WEIGHT_POINTS))
+        k = np.arange(count)
         u = np.stack([radical_inverse(k, base) for base in (2, 3, 5)])
         wi, wo = direction(np.arccos(u[0]), 0.0), direction(np.arccos(u[1]), 2 * np.pi * u[2])
         _, nearest = cKDTree(_place(self._wi, self._wo)).query(_place(wi, wo))
-        weight = np.bincount(nearest, minlength=len(self._f)) * ((2 * np.pi) ** 2 / _WEIGHT_POINTS)
+        weight = np.bincount(nearest, minlength=len(self._f)) * ((2 * np.pi) ** 2 / count)
         shadowed = np.zeros(len(self._f), dtype=bool)
         return collect(self._wi, self._wo, self._f, weight, self.info, shadowed, max_count)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lambent.core.frames import Floats, angles, direction
 from lambent.core.sequences import r2
 from lambent.materials.measured.protocol import Flags
-from lambent.materials.measured.table import fill_holes
+from lambent.materials.measured.table import fill_holes, sensible
 
 Indices = NDArray[np.int64]
 _IN_PLANE = 1e-3  # radians off a plane through the pole that still count as in it
@@ -72,7 +72,7 @@ class Sheet:
     def _whole(self) -> Floats:
         """(T, P + 1, C) without holes or negative values, the first column repeated at the end."""
         f = self.values.reshape(self.f.shape)
-        usable = np.asarray(np.isfinite(f).all(axis=-1))
+        usable = sensible(f)
         filled = np.maximum(fill_holes(f, usable, periodic_axis=1), 0) if usable.any() else np.zeros_like(f)
         return np.concatenate([filled, filled[:, :1]], axis=1)
 
@@ -139,7 +139,7 @@ class ScatteredSheet:
 
     @cached_property
     def _usable(self) -> Flags:
-        return np.asarray(np.isfinite(self.values).all(axis=1))
+        return sensible(self.values)
 
     @cached_property
     def _lookup(self) -> Any:

@@ -13,7 +13,7 @@ from lambent.core.frames import Floats
 from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo
+from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, TableInfo
 
 # The quadrature draws from a mixture that is nowhere much narrower or wider than a measured lobe can be.
 _WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
@@ -85,6 +85,12 @@ def isotropic_brdf(path: Path, reader: str, sizes: dict[str, int], notes: tuple[
     )
 
 
+def sensible(values: Floats) -> Flags:
+    """(...) whether all channels of values (..., C) are finite and no brighter than any surface."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.isfinite(values) & (values <= LARGEST_F)).all(axis=-1))
+
+
 def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:
     """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, in cells.
 
@@ -117,6 +123,7 @@ def require_values(values: Floats, measured: Flags, file: Path | str) -> None:
     """`UserError` where no cell of values (grid..., C) was measured; the message counts what is there instead."""
     if measured.any():
         return
-    finite = np.isfinite(values)
-    got = f"{values.size} values, {int((~finite).sum())} not finite, {int((values[finite] < 0).sum())} negative"
+    with np.errstate(invalid="ignore"):
+        finite, negative = np.isfinite(values) & (values <= LARGEST_F), int((values < 0).sum())
+    got = f"{values.size} values, {int((~finite).sum())} not finite or beyond {LARGEST_F:g} /sr, {negative} negative"
     raise UserError("holds no measured value", file=file, got=got)
