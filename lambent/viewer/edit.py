@@ -93,6 +93,8 @@ def editor_state(
 
 def _materials(file: Path, material: Path | None) -> tuple[Measurement | None, Material, Material | None, Path | None]:
     """What to show: the measurement, the material A, the material B, and the document that A came from."""
+    if material is not None and (kind_of(file), kind_of(material)) == ("material", "measurement"):
+        file, material = material, file  # the other way round is as clear
     if kind_of(file) == "environment":
         raise UserError("is a picture", file=file, expected="a measured table or a material document")
     if kind_of(file) == "material":

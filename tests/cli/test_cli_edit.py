@@ -10,6 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.viewer.edit import editor_state
+from tests.viewer.measured_specimens import BRASS, write_measurement
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,6 +45,14 @@ def test_two_documents_are_compared(tmp_path):
         Material(name=name, kd=0.5).save(tmp_path / f"{name}.json")
     editor = editor_state(tmp_path / "a.json", tmp_path / "b.json", folder=tmp_path).editor
     assert (editor.material.name, editor.compared.name, editor.measurement) == ("a", "b", None)
+
+
+def test_the_order_does_not_matter(tmp_path):
+    BRASS.save(tmp_path / "brass.json")
+    file = write_measurement(tmp_path / "brass.txt", BRASS)
+    for pair in ((file, tmp_path / "brass.json"), (tmp_path / "brass.json", file)):
+        editor = editor_state(*pair, folder=tmp_path).editor
+        assert editor.measurement.path == file and editor.material == BRASS
 
 
 def test_environments_are_named_and_found(tmp_path):

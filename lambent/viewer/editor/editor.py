@@ -17,6 +17,7 @@ from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material, load_material
 from lambent.viewer.editor.documents import kind_of, same_numbers, target_of, typed_path, with_account
 from lambent.viewer.editor.measurement import Measurement, read_measurement
+from lambent.viewer.editor.readings import incidents_of
 from lambent.viewer.editor.restrictions import Restrictions
 from lambent.viewer.editor.shown import Shown
 from lambent.viewer.editor.work import Work
@@ -223,12 +224,9 @@ class Editor:
 
     def show_measurement(self, measurement: Measurement | None) -> None:
         """Judge by this measurement from now on."""
-        self.measurement = measurement
-        self.chosen = 0
-        if measurement is not None:
-            thetas = [entry.theta_deg for entry in measurement.gathered]
-            self.chosen = min(range(len(thetas)), key=lambda i: (abs(thetas[i] - 45), i), default=0)
-            self.warnings = ()
+        self.measurement, self.warnings = measurement, ()
+        thetas = [incident.theta_deg for incident in incidents_of(measurement.gathered if measurement else ())]
+        self.chosen = min(range(len(thetas)), key=lambda i: (abs(thetas[i] - 45), i))
         self.shown, self.fit_axes = Shown(), True
 
     def save(self) -> None:

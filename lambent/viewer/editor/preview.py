@@ -43,8 +43,8 @@ def _sheet() -> Mesh:
 
 
 SHAPES: dict[str, Callable[[], Mesh]] = {
-    "sphere": lambda: sphere(0.95, around=96, rows=48),
-    "teapot": lambda: placed(teapot(2.1), (0.0, -0.5, 0.0)),
+    "sphere": lambda: sphere(0.95, around=64, rows=32),
+    "teapot": lambda: placed(teapot(2.1, steps=8), (0.0, -0.5, 0.0)),
     "sheet": _sheet,
     "sheet before a lamp": _sheet,
 }

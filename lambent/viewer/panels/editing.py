@@ -60,12 +60,12 @@ def _names(editor: Editor) -> None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
         if imgui.button("close##editor", (-1, 0)):
             editor.queue(editor.leave)
-    text = "no measurement" if info is None else f"{info.file}: {info.format}, {len(measurement.samples)} tuples"  # type: ignore[union-attr]
+    text = "no measurement" if info is None else f"{len(measurement.samples)} tuples of {info.file}"  # type: ignore[union-attr]
     imgui.push_style_color(imgui.Col_.text, DIM)
     imgui.text_unformatted(text if editor.loading is None else f"reading: {editor.loading.what}")
     imgui.pop_style_color()
-    if info is not None and info.notes:
-        explain("\n".join(info.notes))
+    if info is not None:
+        explain("\n".join((info.file, info.format, *info.notes)))
 
 
 def _error(editor: Editor) -> None:
