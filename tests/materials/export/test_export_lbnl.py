@@ -1,0 +1,187 @@
+"""BSDF XML that is written: energy, reciprocity, colour and both sides, by our reader and by Radiance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.colour import luminance
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, direction
+from lambent.core.progress import Cancelled
+from lambent.core.sequences import r2
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.materials.export import patch_mean
+from lambent.materials.export.lbnl_xml import write
+from lambent.materials.export.registry import writer_for
+from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured import load
+from lambent.materials.measured.equal_energy import xyz_of_rgb
+from lambent.materials.measured.klems import KLEMS_FULL
+from lambent.materials.measured.lbnl_xml import LbnlTable, read
+from lambent.materials.measured.merl import directions_of
+from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, words
+from tests.materials.measured.measured_files import merl_bytes
+
+GREY = (0.4, 0.4, 0.4)
+MIRROR = Material(name="mirror", lobes=(Lobe(k=(0.98,) * 3, mx=0.0068, my=0.0297, r0=0.84, alpha=0.49),))
+FOIL = Material(
+    name="a foil, red & <thin>",
+    kd=(0.3, 0.2, 0.1),
+    kt_d=(0.05, 0.1, 0.15),
+    lobes=(
+        Lobe(k=(0.5, 0.5, 0.5), mx=0.5, my=0.25, r0=0.3),
+        Lobe(side="transmission", k=(0.3, 0.3, 0.2), mx=0.6, my=0.3, r0=0.0, distribution="ggx"),
+    ),
+)
+BACK = np.array((-1, -1, 1))
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few directions, for what is exact with any number of them."""
+    monkeypatch.setattr(patch_mean, "LOBES_LOG2", 5)
+
+
+@pytest.fixture(scope="module")
+def foil(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
+    path = tmp_path_factory.mktemp("foil") / "foil.xml"
+    write(FOIL, path)
+    return path, read(path)
+
+
+@pytest.fixture(scope="module")
+def mirror(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
+    """Ten-degree patches cannot be a one-degree lobe, and the cost says so."""
+    path = tmp_path_factory.mktemp("mirror") / "mirror.xml"
+    cost = write(MIRROR, path)
+    assert any("highlight" in lost for lost in cost.lost) and cost.share["l2_ngan"] > 0.5
+    return path, read(path)
+
+
+def patch_albedo(material: Material, patch: int, n: int = 256) -> tuple[Floats, Floats]:
+    """r and t (3,) over a patch of incident light, by the material's own sampler: not the writer's way."""
+    wi = KLEMS_FULL.points(np.full(n, patch), r2(n)) * BACK
+    bsdf, u = MaterialBSDF(material), np.random.default_rng(patch).random((n, 256, 3))
+    every = np.broadcast_to(wi[:, None], u.shape)
+    wo = bsdf.sample(every, u)
+    pdf = bsdf.pdf(wo, every)
+    share = np.divide(np.abs(wo[..., 2]), pdf, out=np.zeros_like(pdf), where=pdf > 0)[..., None] * bsdf.eval(every, wo)
+    far = wo[..., 2:] < 0
+    return np.where(far, 0, share).mean(axis=(0, 1)), np.where(far, share, 0).mean(axis=(0, 1))
+
+
+@pytest.mark.parametrize("patch", [0, 4, 50, 100, 130, 140])
+def test_energy_is_kept(foil, mirror, patch: int) -> None:
+    """The mirror's lobe is a degree wide and the patches ten: values at their middles would be a hundred times off."""
+    wi = KLEMS_FULL.centres[patch] * BACK
+    r, t = patch_albedo(FOIL, patch)
+    np.testing.assert_allclose(foil[1].reflectivity(wi), r, rtol=0.015)
+    np.testing.assert_allclose(foil[1].transmissivity(wi), t, rtol=0.015)
+    r, _ = patch_albedo(MIRROR, patch)
+    np.testing.assert_allclose(mirror[1].reflectivity(wi), r[:1], rtol=0.01)
+
+
+def test_both_sides_and_the_directions_are_right(foil) -> None:
+    """Brushed, so that a turn by 90 degrees would show, and other in reflection and transmission."""
+    _, table = foil
+    i, o = (x.ravel() for x in np.meshgrid(np.arange(9, 25), np.arange(25, 45)))
+    wi, wo = KLEMS_FULL.centres[i] * BACK, KLEMS_FULL.centres[o]
+    bsdf = MaterialBSDF(FOIL)
+    for side_i in (1, -1):
+        for side_o in (1, -1):
+            pair = wi * (1, 1, side_i), wo * (1, 1, side_o)
+            expected = bsdf.eval(*pair)
+            np.testing.assert_allclose(table.eval(*pair), expected, rtol=0.1)
+            turned = bsdf.eval(*(w[:, [1, 0, 2]] for w in pair))
+            ours = np.abs(table.eval(*pair) - expected).mean()
+            assert ours < np.abs(turned - expected).mean() / 4
+
+
+def test_radiance_reads_it(foil, tmp_path: Path) -> None:
+    """Luminance and integrals as our reader has them; colour to what Radiance keeps of it."""
+    path, table = foil
+    asked = angles_away_from_borders(600)
+    answers = ask_radiance(path, tmp_path, asked, asked[:100, :2])
+    wi, wo = (direction(*np.radians(asked[:, k : k + 2].T)) for k in (0, 2))
+    f = table.eval(wi, wo)
+    np.testing.assert_allclose(luminance(f), answers["xyz"][:, 1], rtol=5e-4, atol=1e-9)
+    hemi = luminance(np.stack([table.reflectivity(wi[:100]), table.transmissivity(wi[:100])], axis=1))
+    np.testing.assert_allclose(hemi, answers["hemi"], rtol=4e-4)
+    x, _, z = np.moveaxis(xyz_of_rgb(f), -1, 0)
+    assert np.corrcoef(x - z, answers["xyz"][:, 0] - answers["xyz"][:, 2])[0, 1] > 0.99
+
+
+def test_materials_stay_reciprocal(foil, mirror) -> None:
+    random = angles_away_from_borders(2000, seed=4)
+    wi, wo = (direction(*np.radians(random[:, k : k + 2].T)) for k in (0, 2))
+    for _, table in (foil, mirror):
+        np.testing.assert_allclose(table.eval(wi, wo), table.eval(wo, wi), rtol=2e-6)
+
+
+def test_lambertian_is_exact_and_costs_nothing(tmp_path: Path, hasty: None) -> None:
+    path = tmp_path / "w.xml"
+    cost = write(Material(kd=GREY), path)
+    table = read(path)
+    assert table.info.channels == 1 and not table.info.transmits
+    np.testing.assert_allclose(table.reflectivity(direction(0.5, 0.5)), 0.4, rtol=1e-6)
+    assert max(cost.share.values()) < 1e-5 and set(cost.errors) == set(METRICS)
+
+
+def test_what_was_read_is_written_again(tmp_path: Path, hasty: None) -> None:
+    """A matrix is constant over patches, so its means are its values: both sides, with nothing mixed up."""
+    random = np.random.default_rng(1)
+    blocks = [
+        ("Visible", d, words(random.random((145, 145)) * 0.2))
+        for d in ("Transmission Front", "Transmission Back", "Reflection Front", "Reflection Back")
+    ]
+    source = tmp_path / "a.xml"
+    source.write_text(lbnl_xml("Columns", blocks))
+    table = read(source)
+    cost = write(table, tmp_path / "b.xml")
+    again = read(tmp_path / "b.xml")
+    for where, part in table.parts.items():
+        np.testing.assert_allclose(again.parts[where].values, part.values, rtol=2e-6)
+    assert max(cost.share.values()) < 1e-5
+    assert not any("behind" in lost for lost in cost.lost)
+
+
+def test_a_measured_table(tmp_path: Path) -> None:
+    """Grey and glossy, known from one side alone; its cost is said under every metric, and so is its back."""
+    glossy = Material(name="glossy", kd=GREY, lobes=(Lobe(k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=0.3),))
+    theta_h, theta_d, phi_d = np.meshgrid(*((np.arange(n) + 0.5) / n * np.pi / 2 for n in (40, 40, 40)), indexing="ij")
+    wi, wo = directions_of(theta_h**2 * 2 / np.pi, theta_d, 2 * phi_d)
+    f = np.where((wi[..., 2:] > 0) & (wo[..., 2:] > 0), MaterialBSDF(glossy).eval(wi, wo), np.nan)
+    (tmp_path / "g.binary").write_bytes(merl_bytes(f))
+    table = load(tmp_path / "g.binary")
+    cost = write(table, tmp_path / "g.xml")
+    written = read(tmp_path / "g.xml")
+    for patch in (0, 20, 80):
+        u = r2(16)
+        wi = KLEMS_FULL.points(np.full(16, patch), u) * BACK
+        np.testing.assert_allclose(written.reflectivity(wi[:1])[0], table.reflectivity(wi).mean(axis=0), rtol=0.02)
+    assert set(cost.share) == set(METRICS) and 0 < cost.share["l1"] < 0.3
+    assert any("behind" in lost for lost in cost.lost)
+
+
+def test_nothing_to_write(tmp_path: Path, hasty: None) -> None:
+    with pytest.raises(UserError, match="no light"):
+        write(Material(name="hole"), tmp_path / "h.xml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_interrupted_it_leaves_no_file(tmp_path: Path) -> None:
+    def stop(done: float, total: float, what: str) -> None:
+        if done > 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        write(FOIL, tmp_path / "f.xml", stop)
+    assert not list(tmp_path.iterdir())
+
+
+def test_it_is_found_by_name() -> None:
+    assert writer_for(Path("x"), "lbnl_xml").write is write
