@@ -92,7 +92,8 @@ def test_metadata(kind):
 
 
 def test_the_wanted_models_are_there():
-    assert {"lambert", "kurt", "kurt-ggx", "kurt-transmission", "ggx"} <= MODELS.keys()
+    assert {"lambert", "kurt", "kurt-ggx", "kurt-transmission", "ggx", "phong", "blinn-phong"} <= MODELS.keys()
+    assert {"cook-torrance", "ward", "ward-original", "ashikhmin-shirley", "schlick", "oren-nayar"} <= MODELS.keys()
     assert model_named("ggx") is MODELS["ggx"]
     with pytest.raises(UserError, match="did you mean 'lambert'"):
         model_named("lambret")

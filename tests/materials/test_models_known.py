@@ -1,0 +1,105 @@
+"""Values of the models that are known by hand, in a limit, or from another implementation of the same paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials.models import model_named
+from lambent.materials.models.cook_torrance import conductor
+from lambent.materials.models.published import MERL_CHANNELS, Published
+
+N = direction(0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    rng = np.random.default_rng(0)
+    return direction(np.arccos(rng.uniform(0.05, 1, (2, 3000))), rng.uniform(0, 2 * np.pi, (2, 3000)))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "expected"),
+    [
+        ("phong", {"ks": 0.5, "exponent": 20}, 0.5 * 22 / (2 * np.pi)),
+        ("blinn-phong", {"ks": 0.5, "exponent": 2}, 0.5 * 4 * 6 / (8 * np.pi * 2.5)),
+        ("cook-torrance", {"m": 0.1, "n": 1.5, "k": 0}, 0.04 / (4 * np.pi * 0.01)),
+        ("ward", {"ks": 0.5, "mx": 0.1, "my": 0.3}, 0.5 / (4 * np.pi * 0.03)),
+        ("ward-original", {"ks": 0.5, "mx": 0.1, "my": 0.3}, 0.5 / (4 * np.pi * 0.03)),
+        (
+            "ashikhmin-shirley",
+            {"rd": 0.3, "rs": 0.1, "ex": 8, "ey": 24},
+            15 / (8 * np.pi) * 0.1 + 28 / (23 * np.pi) * 0.3 * 0.9 * (31 / 32) ** 2,
+        ),
+        ("schlick", {"c": 0.5, "r": 0.04}, 0.5 / (4 * np.pi * 0.04)),
+        ("oren-nayar", {"rho": 0.5, "sigma": 0}, 0.5 / np.pi),
+    ],
+)
+def test_at_normal_incidence(name, values, expected):
+    np.testing.assert_allclose(model_named(name)(**values).eval(N, N), [expected] * 3, rtol=1e-9)
+
+
+def test_oren_nayar_in_the_plane_by_hand():
+    """theta_i = 30, theta_o = 60 degrees towards the light: alpha 60, beta 30, cos_phi 1; sigma 20 degrees."""
+    s2 = np.radians(20) ** 2
+    c1, c2 = 1 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09) * np.sqrt(0.75)
+    direct = 0.5 / np.pi * (c1 + c2 / np.sqrt(3))
+    twice = 0.17 * 0.25 / np.pi * s2 / (s2 + 0.13) * (1 - 1 / 9)
+    wi, wo = direction(np.pi / 6, 0.4), direction(np.pi / 3, 0.4)
+    value = model_named("oren-nayar")(rho=0.5, sigma=20).eval(wi, wo)
+    np.testing.assert_allclose(value, [direct + twice] * 3, rtol=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 30.0])
+def test_oren_nayar_brightens_towards_the_light_only(sigma, pairs):
+    model = model_named("oren-nayar")(rho=0.5, sigma=sigma)
+    back, forward = direction(1.2, 0.0), direction(1.2, np.pi)
+    difference = (model.eval(back, back) - model.eval(back, forward))[0]
+    assert difference == pytest.approx(0, abs=1e-12) if sigma == 0 else difference > 0.05
+
+
+def test_brushing_along_t_widens_the_lobe_across():
+    """mx < my, ex > ey and p < 1 all mean: rougher along b."""
+    along, across = direction(0.3, 0.0), direction(0.3, np.pi / 2)
+    for name, values in (
+        ("ward", {"mx": 0.05, "my": 0.3}),
+        ("ashikhmin-shirley", {"rd": 0, "ex": 1000, "ey": 10}),
+        ("schlick", {"p": 0.2}),
+    ):
+        model = model_named(name)(**values)
+        assert model.eval(across, N)[0] > 2 * model.eval(along, N)[0], name
+
+
+def test_ward_is_the_published_ward(pairs):
+    published = Published("x", "NganWard", (0, 0, 0), (0.3, 0.3, 0.3), 0.2)
+    model = model_named("ward-original")(ks=0.3, mx=0.2, my=0.2)
+    np.testing.assert_allclose(model.eval(*pairs) * MERL_CHANNELS, published.eval(*pairs), rtol=1e-9, atol=1e-300)
+
+
+def test_ward_is_ward_where_the_lobe_is_narrow():
+    """Both normalisations agree in the mirror direction up to cos(theta)."""
+    wi, wo = direction(0.6, 0.3), direction(0.6, 0.3 + np.pi)
+    ratio = model_named("ward")().eval(wi, wo) / model_named("ward-original")().eval(wi, wo)
+    np.testing.assert_allclose(ratio, 1 / np.cos(0.6), rtol=1e-9)
+
+
+def test_cook_torrance_is_lows_but_for_the_factor(pairs):
+    """A dielectric has the published models' Fresnel; theirs is D0 G F / (pi cos cos), ours D0 G F / (4 pi cos cos)."""
+    published = Published("x", "LowCookTorrance", (0, 0, 0), (1, 1, 1), 0.2, 1.7)
+    model = model_named("cook-torrance")(m=0.2, n=1.7, k=0)
+    np.testing.assert_allclose(4 * model.eval(*pairs), published.eval(*pairs), rtol=1e-7, atol=1e-300)
+
+
+def test_schlicks_zenith_is_ggx_of_the_squared_slope():
+    ggx, wi = model_named("ggx")(f0=1, alpha_x=0.2, alpha_y=0.2), direction(0.4, 1.0)
+    near = model_named("schlick")(c=1, r=0.04).eval(wi, N) / model_named("schlick")(c=1, r=0.04).eval(N, N)
+    np.testing.assert_allclose(near, ggx.eval(wi, N) / ggx.eval(N, N), rtol=0.05)  # but for the shadowing
+
+
+def test_conductor_by_hand():
+    n, k = 0.2, 3.9
+    assert conductor(np.array(1.0), n, k) == pytest.approx(((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k))
+    assert conductor(np.array(0.0), n, k) == pytest.approx(1)
+    brewster = np.cos(np.arctan(1.5))  # the reflected light is polarised: half of the perpendicular share is left
+    assert conductor(np.array(brewster), 1.5, 0.0) == pytest.approx(0.5 * ((1.5**2 - 1) / (1.5**2 + 1)) ** 2)
