@@ -87,7 +87,9 @@ class MerlTable(IntegratedTable):
     @cached_property
     def _filled(self) -> Floats:
         """(bins, 3) f in 1/sr without holes, phi_d fastest."""
-        return fill_holes(np.moveaxis(self._raw, 0, -1) * SCALES, self._measured).reshape(-1, 3)
+        with np.errstate(invalid="ignore", over="ignore"):  # in cells that are filled from their neighbours
+            f = np.moveaxis(self._raw, 0, -1) * SCALES
+        return fill_holes(f, self._measured).reshape(-1, 3)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3), trilinear between bin centres; 0 where wi or wo is below the surface."""
@@ -128,8 +130,9 @@ class MerlTable(IntegratedTable):
         cell_d = (np.pi / 2 / shape[1]) * (np.pi / shape[2]) * np.sin(theta_d)
         weight = 4 * np.cos(theta_d) * np.sin(theta_h) * cell_h * cell_d * turns
         f = np.empty((len(wi), 3))
-        for channel, (plane, scale) in enumerate(zip(self._raw, SCALES, strict=True)):
-            np.multiply(plane[exists], scale, out=f[:, channel])
+        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts what is not finite
+            for channel, (plane, scale) in enumerate(zip(self._raw, SCALES, strict=True)):
+                np.multiply(plane[exists], scale, out=f[:, channel])
         shadowed = np.asarray((f < 0).any(axis=1))
         return collect(wi, wo, f, np.broadcast_to(weight, shape)[exists], self.info, shadowed, max_count)
 

@@ -202,7 +202,8 @@ def _outside(sheets: Sheets) -> tuple[str, ...]:
 
 def _with_tis(table: GonioTable, tis: Floats, far: bool, notes: tuple[str, ...]) -> GonioTable:
     """The table with a note that compares the total integrated scatter of its file with its own integral."""
-    stated = tis[:_MOST_CHECKED].mean(axis=-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        stated = tis[:_MOST_CHECKED].mean(axis=-1)
     wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))
     ours = (table.transmissivity(wi) if far else table.reflectivity(wi)).mean(axis=-1)
     pairs = ", ".join(

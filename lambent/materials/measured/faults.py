@@ -1,0 +1,247 @@
+"""What can be wrong with a measured table, each as a number, and in words where it matters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from lambent.core.frames import Floats, angles, direction, normalize
+from lambent.core.sequences import r2
+from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
+
+Symmetry = Literal["isotropic", "quadrant", "half", "none"]
+_PAIRS = 4096
+_REACH_DEG = 60  # of the pairs that are swapped: both are then inside the usual incident grids
+_CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
+
+NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is said
+ASYMMETRIC = 0.05
+RETRO_RATIO = 1.5  # f around the light over f beside it, from which on it is a peak
+UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
+_RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last two are what is beside it
+_NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
+_MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
+_LEAST_TUPLES = 12
+
+
+@dataclass(frozen=True)
+class Retro:
+    """How much brighter the light's own direction is than what lies 18 to 24 degrees beside it."""
+
+    ratio: float
+    theta_i_deg: float
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A lobe narrower than the steps it was measured in.
+
+    Attributes
+    ----------
+    theta_i_deg, phi_i_deg : float
+    value, beside : float
+        f in 1/sr of the brightest tuple, and the mean of its neighbours'.
+    step_deg : float
+        Mean distance to those.
+    """
+
+    theta_i_deg: float
+    phi_i_deg: float
+    value: float
+    beside: float
+    step_deg: float
+
+
+def non_reciprocity(table: MeasuredTable) -> float:
+    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f: evenly spread pairs, and pairs near the mirror direction."""
+    u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
+    wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
+    near = direction(*_mirrored(wi, u[:, 2:]))
+    pairs = (np.concatenate([wi, wi]), np.concatenate([wo, near]))
+    return _difference(table.eval(*pairs), table.eval(*pairs[::-1]))
+
+
+def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> float:
+    """How far a table is from the symmetry it claims: mean |f - f of the mirrored pair| over the mean of f.
+
+    An isotropic material looks the same on both sides of any plane of incidence, a quadrant one of x = 0 and y = 0; one
+    of which half a turn was measured has only light along the normal to be tested by.
+    """
+    if symmetry == "none":
+        return 0.0
+    wo = _within_reach(r2(_PAIRS))
+    theta_i = np.radians(np.linspace(0, _REACH_DEG, _PAIRS))
+    if symmetry == "half":
+        wi = np.broadcast_to(np.array([0.0, 0.0, 1.0]), wo.shape)
+        return _difference(table.eval(wi, wo), table.eval(wi, wo * (-1, -1, 1)))
+    pairs = [(direction(theta_i, 0.0), np.array([1.0, -1.0, 1.0]))]
+    if symmetry == "quadrant":
+        pairs.append((direction(theta_i, np.pi / 2), np.array([-1.0, 1.0, 1.0])))
+    return max(_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs)
+
+
+def retro(table: MeasuredTable, samples: MeasuredSamples) -> Retro | None:
+    """The peak towards the light, where there is one: on rings about it, f falls from each to the next.
+
+    Asked at the table's own incident directions where it has a grid of them, so that no look-up between them makes or
+    hides a peak. A ring's median over its azimuths is taken, so that neither a lobe elsewhere nor one wrong reading
+    counts, the peak has to stand at most incident directions, not at one, and tuples near the light must have been
+    measured that show it too: the lamp often hides them, and what `eval` says there is a guess.
+    """
+    if not _brighter_near_light(samples):
+        return None
+    found = []
+    for theta_deg, phi_deg in _asked(table):
+        rings = _rings(table, direction(np.radians(theta_deg), np.radians(phi_deg)))
+        falling = bool((np.diff(rings[:-1]) <= 0).all()) and rings[1] > rings[-2]
+        beside = max(float(rings[-2:].mean()), 1e-9)
+        found.append((float(rings[0]) / beside if falling else 1.0, theta_deg))
+    if not found:
+        return None
+    ratio, theta_i = max(found)
+    often = float(np.median([ratio for ratio, _ in found]))
+    return Retro(ratio, theta_i) if often >= RETRO_RATIO else None
+
+
+def under_sampled(samples: MeasuredSamples) -> list[Peak]:
+    """The incident directions whose brightest tuple stands alone: its four neighbours reach less than half of it."""
+    from scipy.spatial import cKDTree
+
+    key = np.round(samples.wi, 5)
+    if len(np.unique(key[:, 2])) > _MOST_INCIDENT:
+        return []
+    incident, which = np.unique(key, axis=0, return_inverse=True)
+    if len(incident) > _MOST_INCIDENT:
+        return []
+    peaks = []
+    order = np.argsort(which, kind="stable")
+    for rows in np.split(order, np.cumsum(np.bincount(which))[:-1]):
+        points, first = np.unique(np.round(samples.wo[rows], 6), axis=0, return_index=True)
+        if len(points) < _LEAST_TUPLES:
+            continue
+        f = samples.f[rows][first].mean(axis=1)
+        top = int(np.argmax(f))
+        distance, near = cKDTree(points).query(points[top], k=5)
+        beside = float(f[near[1:]].mean())
+        if beside < UNDER_SAMPLED * f[top]:
+            theta, phi = angles(samples.wi[rows[0]])
+            step = float(np.degrees(distance[1:].mean()))
+            peaks.append(Peak(float(np.degrees(theta)), float(np.degrees(phi)), float(f[top]), beside, step))
+    return peaks
+
+
+def in_words(
+    *,
+    counts: dict[str, float],
+    albedo: tuple[Floats, Floats],
+    non_reciprocal: float,
+    claimed: tuple[Symmetry, float],
+    towards_light: Retro | None,
+    peaks: Sequence[Peak],
+) -> list[str]:
+    """A sentence for every fault that matters, each with its number.
+
+    Parameters
+    ----------
+    counts : dict
+        What the tuples are that were left out -> their share in percent.
+    albedo : ((A,), (A, C))
+        theta_i in degrees and the light returned.
+    non_reciprocal : float
+    claimed : (symmetry, asymmetry)
+    towards_light : Retro, optional
+    peaks : list of Peak
+    """
+    said = [f"{_percent(share)} of the tuples are {what}, and left out" for what, share in counts.items() if share > 0]
+    said += _too_bright(*albedo)
+    if non_reciprocal > NON_RECIPROCAL:
+        said.append(
+            f"swapping light and viewer changes f by {_percent(100 * non_reciprocal)} on the mean: "
+            "a reciprocal model cannot fit closer than that"
+        )
+    symmetry, off = claimed
+    if off > ASYMMETRIC:
+        said.append(f"is taken as {symmetry}, but mirrored directions differ by {_percent(100 * off)} of the mean")
+    if towards_light is not None:
+        said.append(
+            f"is retro-reflective: at theta_i = {towards_light.theta_i_deg:.3g} degrees f towards the light is "
+            f"{towards_light.ratio:.3g} times what it is 20 degrees beside it; look it up with "
+            'reconstruction="quadrilinear", as aligning on the half vector moves that peak'
+        )
+    if peaks:
+        worst = min(peaks, key=lambda peak: peak.beside / peak.value)
+        where = f"theta_i = {worst.theta_i_deg:.3g}, phi_i = {worst.phi_i_deg:.3g} degrees"
+        said.append(
+            f"the peak is under-sampled at {len(peaks)} incident directions: at {where} f falls from {worst.value:.3g} "
+            f"to {worst.beside:.3g} /sr within one step of {worst.step_deg:.2g} degrees"
+        )
+    return said
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
+
+
+def _too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
+    """More light than arrives, and where."""
+    if not (albedo > 1).any():
+        return []
+    row, channel = np.unravel_index(int(np.argmax(albedo)), albedo.shape)
+    name = _CHANNELS[albedo.shape[1]][int(channel)]
+    at = ", ".join(f"{angle:g}" for angle in theta_i_deg[(albedo > 1).any(axis=1)])
+    return [
+        f"returns {albedo[row, channel]:.3g} of the light{name} at theta_i = {theta_i_deg[row]:g} degrees, "
+        f"more than arrives; over 1 at {at} degrees"
+    ]
+
+
+def _difference(one: Floats, other: Floats) -> float:
+    mean = (one.mean() + other.mean()) / 2
+    return float(np.abs(one - other).mean() / mean) if mean > 0 else 0.0
+
+
+def _within_reach(u: Floats) -> Floats:
+    return direction(np.arccos(1 - u[:, 0] * (1 - np.cos(np.radians(_REACH_DEG)))), 2 * np.pi * u[:, 1])
+
+
+def _mirrored(wi: Floats, u: Floats) -> tuple[Floats, Floats]:
+    """(theta, phi) up to 10 degrees around the mirror direction of wi."""
+    theta = np.arccos(wi[:, 2]) + np.radians(20) * (u[:, 0] - 0.5)
+    phi = np.arctan2(wi[:, 1], wi[:, 0]) + np.pi + np.radians(20) * (u[:, 1] - 0.5)
+    return theta.clip(0, np.radians(_REACH_DEG)), phi
+
+
+def _asked(table: MeasuredTable) -> list[tuple[float, float]]:
+    """Incident directions, in degrees, at which the way to the light and the mirror direction are well apart."""
+    if not isinstance(table, GonioTable):
+        return [(theta, 0.0) for theta in (30.0, 45.0, 60.0)]
+    theta_i = [float(theta) for theta in table.theta_i_deg if 25 <= theta <= 65]
+    return [(theta, float(phi)) for theta in theta_i for phi in table.phi_i_deg[:: max(1, len(table.phi_i_deg) // 4)]]
+
+
+def _brighter_near_light(samples: MeasuredSamples) -> bool:
+    """Whether the tuples themselves are brighter near the light than beside it."""
+    theta_i = np.degrees(angles(samples.wi)[0])
+    apart = np.degrees(np.arccos(np.sum(samples.wi * samples.wo, axis=1).clip(-1, 1)))
+    apart_from_lobe = (theta_i > 20) & (theta_i < 70)
+    near, beside = (apart_from_lobe & (low <= apart) & (apart < high) for low, high in (_NEAR_DEG, _BESIDE_DEG))
+    if near.sum() < _LEAST_NEAR or beside.sum() < _LEAST_NEAR:
+        return False
+    medians = [float(np.median(samples.f[part].mean(axis=1))) for part in (near, beside)]
+    return medians[0] > (1 + RETRO_RATIO) / 2 * medians[1]
+
+
+def _rings(table: MeasuredTable, wi: Floats) -> Floats:
+    """(R,) median of f, mean over channels, on rings about wi."""
+    x = normalize(np.cross(wi, np.array([0.0, 1.0, 0.0])))
+    y = np.cross(wi, x)
+    around = np.arange(24) * (2 * np.pi / 24)
+    offset = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
+    r = np.radians(_RINGS_DEG)[:, None, None]
+    wo = np.cos(r) * wi + np.sin(r) * offset
+    f = table.eval(np.broadcast_to(wi, wo.shape), wo).mean(axis=-1)
+    return np.asarray(np.median(f, axis=1))

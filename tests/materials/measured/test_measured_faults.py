@@ -1,0 +1,144 @@
+"""Faults of tables that were made with them are named, with the number; sound tables have none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.frames import direction
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured import load
+from lambent.materials.measured.inspection import inspect_table
+from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+from tests.materials.measured.measured_files import GLOSSY
+
+CLEAN = replace(
+    ISOTROPIC, noise=0.0, floor=0.0, theta_i_deg=tuple(range(0, 80, 10)), sector_deg=0.0, step_deg=5, fine_deg=2.5
+)
+Evaluate = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def findings(evaluate: Evaluate, **changes: object) -> list[str]:
+    return inspect_table(record(evaluate, "made up", replace(CLEAN, **changes)))["findings"]
+
+
+def bump_towards_light(height: float, width_deg: float) -> Evaluate:
+    def retro(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        apart = np.degrees(np.arccos(np.sum(wi * wo, axis=1).clip(-1, 1)))
+        return (0.1 + 0.1 * height * np.exp(-((apart / width_deg) ** 2)))[:, None]
+
+    return retro
+
+
+def test_a_sound_table_has_no_findings() -> None:
+    assert inspect_table(synthesise(GLOSSY, CLEAN))["findings"] == []
+
+
+@pytest.mark.parametrize("sector_deg", [0.0, 4.0])
+def test_a_retro_reflector_is_named_though_the_lamp_hides_the_peak(sector_deg: float) -> None:
+    found = findings(bump_towards_light(3, 10), sector_deg=sector_deg)
+    line = next(line for line in found if "retro-reflective" in line)
+    assert "quadrilinear" in line
+    ratio = float(line.split("towards the light is ")[1].split(" times")[0])
+    assert 2 < ratio < 4.2
+
+
+def oren_nayar(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Sigma = 0.7: brighter on the light's side, but without a peak."""
+    sin_i, sin_o = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1])
+    cos_phi = np.divide(wi[:, 0] * wo[:, 0] + wi[:, 1] * wo[:, 1], sin_i * sin_o, out=np.zeros(len(wi)),
+                        where=sin_i * sin_o > 0)  # fmt: skip
+    tan_low = np.minimum(sin_i / wi[:, 2], sin_o / np.maximum(wo[:, 2], 1e-6))
+    a, b = 1 - 0.5 * 0.49 / (0.49 + 0.33), 0.45 * 0.49 / (0.49 + 0.09)
+    rough = a + b * np.maximum(cos_phi, 0) * np.maximum(sin_i, sin_o) * tan_low
+    return (0.2 / np.pi * rough)[:, None]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_what_is_no_retro_reflector(noise: float) -> None:
+    for evaluate in (oren_nayar, bump_towards_light(0.2, 10), lambda wi, wo: 0.1 + 0 * wi[:, :1]):
+        assert not any("retro" in line for line in findings(evaluate, noise=noise))
+    mirrorlike = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=(0.9,) * 3, k=(1.0,) * 3),))
+    assert not any(
+        "retro" in line for line in inspect_table(synthesise(mirrorlike, replace(CLEAN, noise=noise)))["findings"]
+    )
+
+
+def test_real_files_are_no_retro_reflectors(shared_data: Path) -> None:
+    for name in ("cornell/garnet_red.brdf", "rgl/paper_white_rgb.bsdf", "gonio/fred_AnoBlackEC1onAlum.txt"):
+        assert inspect_table(load(shared_data / "measured" / name))["faults"]["retro_ratio"] == 1
+
+
+def test_more_light_than_arrives_is_said_with_its_angle() -> None:
+    found = findings(lambda wi, wo: (0.25 / wi[:, 2:]) * np.ones(1))
+    line = next(line for line in found if "more than arrives" in line)
+    assert "at theta_i = 75 degrees" in line and "over 1 at 45, 60, 75 degrees" in line
+    value = float(line.split("returns ")[1].split(" of")[0])
+    assert value == pytest.approx(0.25 / np.cos(np.radians(70)) * np.pi, rel=0.1)  # 75 takes the grid's edge, 70
+
+
+def test_a_lopsided_table_is_said_to_be() -> None:
+    found = findings(lambda wi, wo: 0.1 + 0.05 * wo[:, 1:2])
+    assert any("taken as isotropic, but mirrored directions differ by" in line for line in found)
+    quadrant = findings(lambda wi, wo: 0.1 + 0.05 * wo[:, 1:2], symmetry="quadrant", phi_i_deg=(0.0, 45.0, 90.0))
+    assert any("taken as quadrant" in line for line in quadrant)
+
+
+def test_non_reciprocal_and_left_out() -> None:
+    found = findings(lambda wi, wo: (0.02 + wi[:, 2:]) * np.ones(1) * 0.1, sector_deg=10.0, floor=0.05)
+    assert any("swapping light and viewer" in line for line in found)
+    assert any("not measured" in line for line in found) and any("are negative" in line for line in found)
+
+
+def test_a_lobe_narrower_than_the_grid() -> None:
+    narrow = Material(name="m", kd=(0.1,) * 3, lobes=(Lobe(mx=0.012, my=0.012, r0=(0.9,) * 3, k=(1.0,) * 3),))
+    found = inspect_table(synthesise(narrow, replace(CLEAN, fine_deg=5)))["findings"]
+    line = next(line for line in found if "under-sampled" in line)
+    assert "within one step of" in line
+    fine = inspect_table(synthesise(narrow, replace(CLEAN, fine_deg=0.25, fine_reach_deg=2)))["findings"]
+    assert not any("under-sampled" in line for line in fine)
+
+
+def test_half_vector_and_quadrilinear_between_two_incident_directions() -> None:
+    """Figures 3.1 and 3.2 of the thesis, at 45 degrees with measurements at 40 and 50.
+
+    Aligned on the half vector, the lobe stands at its place and keeps its height; blended as it stands, it falls to two
+    lower lobes where it was measured. Of a retro-reflector it is the other way round.
+    """
+    lobe = Material(name="lobe", lobes=(Lobe(mx=0.04, my=0.04, r0=(1.0,) * 3, k=(1.0,) * 3, alpha=0.5),))
+    setup = replace(CLEAN, theta_i_deg=(40, 50), step_deg=1, fine_deg=0.5)
+    theta = np.linspace(30, 60, 601)
+    wi = np.broadcast_to(direction(np.radians(45), 0.0), (len(theta), 3))
+    ahead, back = direction(np.radians(theta), np.pi), direction(np.radians(theta), 0.0)
+    mirrored, truth = {}, None
+    table = synthesise(lobe, setup)
+    for way in ("half_vector", "quadrilinear"):
+        mirrored[way] = replace(table, reconstruction=way).eval(wi, ahead).mean(axis=1) * ahead[:, 2]
+    from lambent.materials.bsdf import MaterialBSDF
+
+    truth = MaterialBSDF(lobe).eval(wi, ahead).mean(axis=1) * ahead[:, 2]
+    aligned, blended = mirrored["half_vector"], mirrored["quadrilinear"]
+    assert theta[aligned.argmax()] == pytest.approx(theta[truth.argmax()], abs=0.3)
+    assert aligned.max() == pytest.approx(truth.max(), rel=0.03)
+    assert peaks_of(aligned) == 1 and peaks_of(blended) == 2
+    assert blended[np.abs(theta - 45).argmin()] < 0.4 * truth.max()
+    assert np.abs(aligned - truth).sum() < 0.05 * truth.sum() < np.abs(blended - truth).sum() / 10
+
+    width = 12.0
+    retro = record(bump_towards_light(5, width), "retro", setup)
+    f = {way: replace(retro, reconstruction=way).eval(wi, back)[:, 0] for way in mirrored}
+    expected = bump_towards_light(5, width)(wi, back)[:, 0]
+    assert np.abs(f["quadrilinear"] - expected).max() < 0.2 * expected.max()
+    assert theta[f["quadrilinear"].argmax()] == pytest.approx(45, abs=1)
+    off = {way: np.abs(f[way] - expected).sum() for way in mirrored}
+    assert off["half_vector"] > 2 * off["quadrilinear"]
+
+
+def peaks_of(curve: np.ndarray) -> int:
+    """Local maxima above a fifth of the highest."""
+    inner = curve[1:-1]
+    return int(((inner > curve[:-2]) & (inner >= curve[2:]) & (inner > curve.max() / 5)).sum())
