@@ -32,7 +32,11 @@ def command(
 
         check_writable(plot, (".png", ".pdf", ".svg"))
     facts = plain(inspector_of(file)(file, plot))
-    show(facts, table(list(_rows(facts))), json)
+    text = table(list(_rows(facts)))
+    for name, value in facts.items():
+        if _is_prose(value):
+            text += f"\n\n{name}" + "".join(f"\n- {sentence}" for sentence in value)
+    show(facts, text, json)
 
 
 def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
@@ -61,8 +65,11 @@ def inspect_table(file: str, plot: Path | None) -> Facts:
 
     measurement = measured.load(Path(file))
     if plot is not None:
-        _plot(plot, "measured", measurement.eval, Path(file).name, measurement.info.transmits)
-    return {"is": "measured table", **inspection.inspect_table(measurement)}
+        from lambent.materials.plots import plot_measurement
+
+        plot_measurement(plot, measurement, title=Path(file).name)
+    facts = inspection.inspect_table(measurement)
+    return {"is": "measured table", **facts, "findings": facts["findings"] or ["no faults found"]}
 
 
 def inspect_material(file: str, plot: Path | None) -> Facts:
@@ -177,8 +184,13 @@ def _rows(facts: Facts, indent: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(value, dict) and value:
             yield label, ""
             yield from _rows(value, indent + "  ")
-        elif value not in ([], {}, None):
+        elif value not in ([], {}, None) and not _is_prose(value):
             yield label, _words(value)
+
+
+def _is_prose(value: Any) -> bool:
+    """Whether a fact is a list of sentences, which stand below the table."""
+    return isinstance(value, list) and bool(value) and all(isinstance(item, str) and " " in item for item in value)
 
 
 def _words(value: Any) -> str:

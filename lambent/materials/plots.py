@@ -1,15 +1,20 @@
-"""Pictures of a BSDF in the plane of incidence, for looking at measurements and fits."""
+"""Pictures of a BSDF for looking at measurements and materials: the plane of incidence, and the polar matrix."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.files import atomic_path
 from lambent.core.frames import direction
+from lambent.materials.fitting.disks import measured_disk
+from lambent.materials.fitting.incidence import Incidence, incidences
+from lambent.materials.measured.protocol import MeasuredTable
 
 Floats = NDArray[np.floating]
 Eval = Callable[[Floats, Floats], Floats]
@@ -17,6 +22,11 @@ Eval = Callable[[Floats, Floats], Floats]
 THETA_I_DEG = (0, 20, 40, 60, 75)
 STEPS = 721  # every quarter of a degree
 FLOOR = 1e-5  # 1/sr, the lowest value shown
+DISK_PIXELS = 96
+WHITE_PERCENTILE = 99.8  # of the brightness over all disks, shown as white
+MOST_ROWS, MOST_COLUMNS = 8, 12  # of disks; more incident directions are thinned out
+UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"
+IN_PLANE_INCHES, DISK_INCHES = 3.2, 1.3
 
 
 def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str, transmits: bool) -> None:
@@ -31,19 +41,62 @@ def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str
     transmits : bool
         Whether to show the far side as well; theta_o then runs from -180 to 180 degrees.
     """
-    import matplotlib
+    figure = _figure(3 * len(THETA_I_DEG), IN_PLANE_INCHES)
+    _draw_plane(figure, evals, THETA_I_DEG, transmits)
+    figure.suptitle(title, fontsize=10)
+    _save(figure, path)
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
 
+def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
+    """Draw a measurement: the in-plane curves as `eval` reconstructs them, above the polar matrix of the raw tuples.
+
+    Disks have the source at the top, theta_o from the centre to the rim, and the cube root of the transfer probability
+    as brightness; blue was not measured. Rows are theta_i and columns phi_i; with one phi_i alone theta_i runs along
+    the columns. The far side stands below the near one.
+
+    Parameters
+    ----------
+    path : Path
+        Picture to write: .png, .pdf or .svg.
+    """
+    samples = table.samples()
+    gathered = [_both_sides(entry) for entry in incidences(samples)] if samples.info.isotropic else incidences(samples)
+    shown = _thinned(gathered)
+    sides = (False, True) if samples.info.transmits else (False,)
+    thetas, phis = sorted({e.theta_deg for e in shown}), sorted({e.phi_deg for e in shown})
+    flat = len(phis) <= 1
+    rows, columns = (len(sides), len(thetas)) if flat else (len(thetas) * len(sides), len(phis))
+    matrix_inches = DISK_INCHES * max(rows, 1) + 0.6
+    figure = _figure(max(3.0 * len(THETA_I_DEG), DISK_INCHES * columns + 1), IN_PLANE_INCHES + matrix_inches)
+    above, below = figure.subfigures(2, 1, height_ratios=(IN_PLANE_INCHES, matrix_inches))
+    _draw_plane(above, {"measured": table.eval}, THETA_I_DEG, samples.info.transmits)
+    above.suptitle(title, fontsize=10)
+    _draw_matrix(below, shown, sides, (rows, columns), (thetas, phis))
+    _save(figure, path)
+
+
+def _figure(width: float, height: float) -> Any:
+    """A figure of its own Agg canvas: no global state, no window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Any, path: Path) -> None:
+    with atomic_path(path) as beside:
+        figure.savefig(beside, dpi=120)
+
+
+def _draw_plane(figure: Any, evals: Mapping[str, Eval], thetas_i_deg: Sequence[float], transmits: bool) -> None:
+    """One panel per theta_i; positive theta_o lies opposite the light, where a mirror sends it."""
     limit = 180 if transmits else 90
     theta_o = np.linspace(-limit, limit, STEPS)[1:-1]
-    # Positive theta_o lies opposite the light, where a mirror sends it.
     wo = direction(np.radians(np.abs(theta_o)), np.where(theta_o >= 0, np.pi, 0.0))
-    figure, axes = pyplot.subplots(
-        1, len(THETA_I_DEG), figsize=(3 * len(THETA_I_DEG), 3.2), sharey=True, layout="constrained"
-    )
-    for axis, theta_i in zip(axes, THETA_I_DEG, strict=True):
+    axes = figure.subplots(1, len(thetas_i_deg), sharey=True)
+    for axis, theta_i in zip(axes, thetas_i_deg, strict=True):
         wi = np.broadcast_to(direction(np.radians(theta_i), 0.0), wo.shape)
         for index, (name, evaluate) in enumerate(evals.items()):
             style = {"lw": 4, "color": "0.75"} if index == 0 and len(evals) > 1 else {"lw": 1.2}
@@ -54,7 +107,74 @@ def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str
         axis.tick_params(labelsize=8)
     axes[0].set_ylabel("f (1/sr)", fontsize=8)
     axes[-1].legend(fontsize=8)
-    figure.suptitle(title, fontsize=10)
-    with atomic_path(path) as beside:
-        figure.savefig(beside, dpi=120)
-    pyplot.close(figure)
+
+
+def _draw_matrix(
+    figure: Any,
+    shown: Sequence[Incidence],
+    sides: tuple[bool, ...],
+    shape: tuple[int, int],
+    angles_deg: tuple[list[float], list[float]],
+) -> None:
+    """The disks of every incident direction and side."""
+    if not shown:
+        figure.text(0.5, 0.5, "too few tuples per incident direction for disks", ha="center", fontsize=9)
+        return
+    (rows, columns), (thetas, phis) = shape, angles_deg
+    flat = len(phis) <= 1
+    disks = {(e.theta_deg, e.phi_deg, far): measured_disk(e, far, DISK_PIXELS) for e in shown for far in sides}
+    known = np.concatenate([disk[np.isfinite(disk)] for disk in disks.values()])
+    white = max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12) if len(known) else 1.0
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for (theta_deg, phi_deg, far), disk in disks.items():
+        row = int(far) if flat else thetas.index(theta_deg) * len(sides) + int(far)
+        axis = axes[row, thetas.index(theta_deg) if flat else phis.index(phi_deg)]
+        _draw_disk(axis, disk / white, theta_deg)
+        side = ", transmitted" if far else ""
+        axis.set_title(f"{theta_deg:g}°, {phi_deg:g}°{side}", fontsize=7, pad=2)
+    figure.supxlabel(
+        "raw tuples, theta_i and phi_i above each: cube root of the transfer probability; the dot is the source, "
+        "blue was not measured",
+        fontsize=8,
+    )
+
+
+def _draw_disk(axis: Any, image: Floats, theta_deg: float) -> None:
+    x = np.linspace(-1, 1, DISK_PIXELS)
+    inside = np.hypot(x, x[:, None]) < 1
+    image = np.broadcast_to(image, (*image.shape[:2], 3))
+    colours = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))
+    axis.imshow(np.concatenate([colours, inside[..., None]], axis=-1), extent=(-1, 1, -1, 1), interpolation="nearest")
+    rim = np.linspace(0, 2 * np.pi, 128)
+    axis.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
+    axis.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
+    axis.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
+
+
+def _both_sides(entry: Incidence) -> Incidence:
+    """The entry of an isotropic table, with the mirror images of tuples on one side of the plane of incidence alone."""
+    aside = entry.wo[:, 1]
+    left, right = aside > 1e-6, aside < -1e-6
+    if left.any() == right.any():
+        return entry
+    other = left | right
+    mirrored = entry.wo[other] * (1, -1, 1)
+    return replace(
+        entry,
+        wo=np.concatenate([entry.wo, mirrored]),
+        f=np.concatenate([entry.f, entry.f[other]]),
+        weight=np.concatenate([entry.weight, entry.weight[other]]),
+    )
+
+
+def _thinned(gathered: Sequence[Incidence]) -> list[Incidence]:
+    """At most so many theta_i and phi_i, evenly chosen, the ends among them."""
+    phis = sorted({entry.phi_deg for entry in gathered})
+    most = (MOST_COLUMNS, 1) if len(phis) <= 1 else (MOST_ROWS, MOST_COLUMNS)
+    kept = []
+    for angles, count in zip((sorted({entry.theta_deg for entry in gathered}), phis), most, strict=True):
+        chosen = np.unique(np.linspace(0, len(angles) - 1, min(count, len(angles))).round().astype(int))
+        kept.append({angles[k] for k in chosen} if angles else set())
+    return [entry for entry in gathered if entry.theta_deg in kept[0] and entry.phi_deg in kept[1]]

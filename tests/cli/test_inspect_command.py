@@ -1,0 +1,49 @@
+"""`lambent inspect` of measurements: facts, faults in words, one picture with curves and disks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.images import read_image
+from tests.materials.measured.measured_files import zemax_text
+
+
+@pytest.fixture
+def bright(tmp_path: Path) -> Path:
+    path = tmp_path / "bright.bsdf"
+    path.write_text(zemax_text(lambda wi, wo: 0.1 / wi[..., 2:] + 0.3 + 0 * wo[..., :1], "PlaneSymmetrical"))
+    return path
+
+
+def test_faults_are_sentences_below_the_facts(lambent, bright):
+    outcome = lambent("inspect", bright)
+    assert outcome.code == 0
+    facts, findings = outcome.out.split("\nfindings\n")
+    assert "Zemax BSDF text" in facts and "below the horizon" in facts
+    assert any("more than arrives" in line for line in findings.splitlines())
+    assert max(map(len, facts.split("\nnotes\n")[0].splitlines())) < 100
+    assert lambent("inspect", bright, "--json").json["faults"]["energy_above_one"] is True
+
+
+def test_the_picture_shows_curves_and_disks(lambent, bright, tmp_path):
+    """Curves above, disks below; in the disks the source is a dot and what was not measured is blue."""
+    assert lambent("inspect", bright, "--plot", tmp_path / "a.png").code == 0
+    image = read_image(tmp_path / "a.png")
+    below = image[int(0.65 * len(image)) :]
+    grey = np.abs(below - below.mean(axis=-1, keepdims=True)).max(axis=-1) < 0.01
+    assert (grey & (below[..., 0] < 0.9)).mean() > 0.05  # disks
+    assert (np.abs(below - np.array([1.0, 0.451, 0.0])).max(axis=-1) < 0.05).sum() > 20  # sources
+    assert (image[: int(0.6 * len(image)), :, 0] < 0.2).any()  # curves
+
+
+def test_decimal_commas_are_named(refused, bright):
+    bright.write_text(bright.read_text().replace(".", ","))
+    assert "decimal commas" in refused("inspect", bright)
+
+
+def test_a_file_that_does_not_say_its_quantity(refused, tmp_path):
+    (tmp_path / "a.txt").write_text("10 0 0 0 0.1\n10 0 20 0 0.1\n")
+    assert "theta_i phi_i theta_o phi_o, then f, f_cos or p" in refused("inspect", tmp_path / "a.txt")
