@@ -39,6 +39,36 @@ class Mesh:
 
 
 @dataclass(frozen=True)
+class Texture:
+    """A picture on a surface, linear values. texels (H, W, C) float16, row 0 at the top, repeated in u and v.
+
+    A point's texel is where M (u, v, 1) lies, M = `uv_transform` (2, 3); both the point's and the picture's v are up.
+    """
+
+    texels: Array
+    uv_transform: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@dataclass(frozen=True)
+class MaterialTextures:
+    """What varies over a surface: each picture multiplies numbers of the material's document, but for the last three.
+
+    diffuse (3 channels): kd and kt_d. specular (3): k of every lobe. roughness (1): mx and my of every lobe.
+    normal (3): the shading normal in the frame (t, b, n), components from -1 to 1.
+    direction (2): cosine and sine of the angle by which t is turned about n.
+    opacity (1): where it is below `cutoff` there is no surface.
+    """
+
+    diffuse: Texture | None = None
+    specular: Texture | None = None
+    roughness: Texture | None = None
+    normal: Texture | None = None
+    direction: Texture | None = None
+    opacity: Texture | None = None
+    cutoff: float = 0.5
+
+
+@dataclass(frozen=True)
 class SceneObject:
     """A named thing: a mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
 
@@ -129,6 +159,7 @@ class Scene:
     exposure_ev: float = 0.0
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
+    textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
 

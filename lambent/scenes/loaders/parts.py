@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lambent.materials.document import Material
-from lambent.scenes.scene import Camera, Light, SceneObject
+from lambent.scenes.scene import Camera, Light, MaterialTextures, SceneObject
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Parts:
     cameras: tuple[Camera, ...] = ()
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
+    textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
 
 
 def unique_name(name: str, taken: set[str]) -> str:
