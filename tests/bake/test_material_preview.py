@@ -1,0 +1,57 @@
+"""A ball that wears a table looks like one that wears the material it was synthesised from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lambent.bake import material_preview
+from lambent.bake.engine import engine
+from lambent.bake.material_preview import FOV_DEG, preview
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+
+SMALL = {"size_px": 48, "spp": 16}
+CLEAN = {"noise": 0.0, "floor": 0.0, "sector_deg": 0.0, "step_deg": 6.0, "fine_deg": 3.0}
+BRUSHED = Material(name="brushed", kd=0.02, lobes=(Lobe(k=0.9, mx=0.07, my=0.3, r0=0.8, alpha=0.4),))
+
+
+@pytest.fixture(autouse=True)
+def _small(monkeypatch):
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    monkeypatch.setattr(material_preview, "GRIDS", {True: GridShape(16, 1, 64, 16), False: GridShape(12, 12, 64, 32)})
+
+
+def test_a_lambertian_table_is_a_lambertian_ball():
+    material = Material(name="plaster", kd=(0.6, 0.3, 0.2))
+    seen = preview(synthesise(material, replace(ISOTROPIC, **CLEAN)), material, **SMALL)
+    assert seen.figures["psnr_db"] > 38 and seen.figures["flip_mean"] < 0.03
+    assert not seen.lamp
+    radius = np.tan(np.arcsin(1 / 6)) / np.tan(np.radians(FOV_DEG / 2))  # of the silhouette, in half pictures
+    assert seen.ball.mean() == pytest.approx(np.pi / 4 * radius**2, abs=0.06)
+    assert (seen.measured[~seen.ball] == 0).all()
+    assert seen.measured[seen.ball].mean() == pytest.approx(0.3, abs=0.01)
+
+
+def test_brushed_the_right_way():
+    table = synthesise(BRUSHED, replace(ANISOTROPIC, phi_i_deg=(0, 30, 60, 90), **CLEAN))
+    right = preview(table, BRUSHED, **SMALL).figures["flip_mean"]
+    lobe = BRUSHED.lobes[0].model_copy(update={"mx": 0.3, "my": 0.07})
+    wrong = preview(table, BRUSHED.model_copy(update={"lobes": (lobe,)}), **SMALL).figures["flip_mean"]
+    assert right < 0.12 and wrong > 1.5 * right
+
+
+def test_a_lamp_shines_through():
+    material = Material(name="paper", kd=0.3, lobes=(Lobe(side="transmission", k=0.6, mx=0.15, my=0.15, r0=0.0),))
+    seen = preview(synthesise(material, replace(ISOTROPIC, **CLEAN)), material, **SMALL)
+    assert seen.lamp
+    row, column = np.unravel_index(seen.model.sum(axis=-1).argmax(), seen.ball.shape)
+    assert row > 24 and column > 24  # below and to the right of the middle, where it hangs
+    assert seen.figures["psnr_db"] > 25

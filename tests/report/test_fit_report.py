@@ -1,0 +1,105 @@
+"""Reports of all kinds of fits: complete, honest, one file."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import pytest
+
+from lambent.bake import engine as engine_module
+from lambent.bake import material_preview
+from lambent.core.errors import UserError
+from lambent.core.progress import Cancelled
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.fit import fit
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.report.fit_report import peak_share, report, write_report
+from tests.report.test_report_page import check
+
+FEW = {"step_deg": 9.0, "fine_deg": 4.5, "fine_reach_deg": 9.0}
+PAINT = Material(name="<paint>", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=0.7, mx=0.15, my=0.15, r0=0.06, alpha=0.3),))
+SHEET = Material(
+    name="sheet",
+    kd=0.3,
+    kt_d=0.1,
+    lobes=(Lobe(k=0.7, mx=0.1, my=0.25, r0=0.1), Lobe(side="transmission", k=0.5, mx=0.1, my=0.25, r0=0.0)),
+)
+
+
+@pytest.fixture
+def no_engine(monkeypatch):
+    def fails():
+        raise UserError("no path tracing engine works here (llvm: too old)", hint="install LLVM")
+
+    monkeypatch.setattr(engine_module, "engine", fails)
+
+
+@pytest.fixture
+def small_previews(monkeypatch):
+    try:
+        engine_module.engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    small = GridShape(12, 1, 32, 16)
+    monkeypatch.setattr(material_preview, "GRIDS", {True: small, False: replace(small, viewer_phi=8)})
+    monkeypatch.setattr(material_preview, "preview", functools.partial(material_preview.preview, size_px=48, spp=4))
+
+
+def made(material, setup, **options):
+    table = synthesise(material, setup)
+    samples = table.samples()
+    return table, samples, fit(samples, **options)
+
+
+def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
+    table, samples, result = made(PAINT, replace(ISOTROPIC, **FEW))
+    source = tmp_path / "measured.txt"
+    source.write_text("what was measured")
+    write_report(tmp_path / "r.html", table, samples, result, source=source)
+    read = check((tmp_path / "r.html").read_text(encoding="utf-8"))
+    text = " ".join(read.text)
+    assert "No previews" in text and "too old" in text
+    for expected in (
+        "<paint>",
+        f"{len(samples):,} of",
+        "grazing",
+        "SHA-256",
+        f"{result.material.lobes[0].mx:.4f}",
+        f"{result.errors['log']:.4g}",
+        f"{result.lambertian_errors['l1']:.4g}",
+        f"{peak_share(samples, result.material):.2f} of the measured peak",
+        "undershoot peaks",
+    ):
+        assert expected in text, expected
+    assert [attributes.get("class") for tag, attributes in read.tags if tag == "tr"].count("chosen") == 1
+    assert sum(tag == "img" for tag, _ in read.tags) == 4
+
+
+def test_an_l2_fit_is_said_to_be_poor_to_the_eye(no_engine):
+    table, samples, result = made(PAINT, replace(ISOTROPIC, **FEW), metric="l2_ngan")
+    text = " ".join(check(report(table, samples, result)).text)
+    assert "often poor by metrics that weigh what eyes see" in text
+    ratio = result.errors["cuberoot"] / result.lambertian_errors["cuberoot"]
+    assert f"{ratio:.2f} under cuberoot" in text
+
+
+def test_transmitting_anisotropic_grey_and_partial(small_previews):
+    """All at once: a brushed sheet in grey, whose fit was stopped after its reflection."""
+    setup = replace(ANISOTROPIC, theta_i_deg=(5, 35, 65), phi_i_deg=(0, 45, 90), **FEW)
+    table = synthesise(SHEET, setup)
+    samples = table.samples()
+    grey = replace(samples, f=samples.f[:, :1], info=replace(samples.info, channels=1))
+
+    def stop(done, total, what):
+        if what.startswith("transmission"):
+            raise Cancelled
+
+    result = fit(grey, progress=stop)
+    assert result.partial
+    read = check(report(table, grey, result))
+    text = " ".join(read.text)
+    for expected in ("cancelled", "1, grey", "a lamp behind", "brushed along", "PSNR", "reflection and transmission"):
+        assert expected in text, expected
+    assert sum(tag == "img" for tag, _ in read.tags) >= 3 + 3 + 1
