@@ -89,7 +89,8 @@ def _register(variant: str) -> None:
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            return dr.select(active, mi.Color3f(self.material.kd), 0.0)
+            seen = bsdf.under_fresnel(dr.abs(si.wi.z), dr) if self.material.kd_coupled else 1.0
+            return dr.select(active, mi.Color3f(self.material.kd) * seen, 0.0)
 
         def to_string(self) -> str:
             return f"{PLUGIN}[{self.material.model_dump_json()}]"

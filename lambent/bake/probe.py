@@ -19,6 +19,7 @@ from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
+from lambent.materials.bsdf import under_fresnel
 from lambent.store.contract import FAR, HALF_MAX
 
 Array = NDArray[np.floating]
@@ -29,12 +30,16 @@ MIRROR_DEPTH = 6  # glossy surfaces in a row
 
 
 class LightMapCache:
-    """Diffuse radiance of surfaces, from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other."""
+    """Diffuse radiance of surfaces, from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other.
+
+    A coupled kd falls with the viewer's cosine, t(cos_o); that of the light is in its mean: exact under uniform light.
+    """
 
     def __init__(self, builder: SceneBuilder, irradiance: Array, irradiance_back: Array | None) -> None:
         materials = [builder.scene.materials[o.material] for o in builder.scene.objects]
         self._numbers = builder.object_numbers()
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
+        self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
         self._transmitted = mi.Color3f(np.array([m.kt_d for m in materials], np.float32).T / np.float32(np.pi))
         self._front = _texture(irradiance)
         self._back = _texture(irradiance_back) if irradiance_back is not None else None
@@ -48,6 +53,8 @@ class LightMapCache:
         outside = mi.Frame3f.cos_theta(si.wi) > 0
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
         transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)
+        coupled = dr.gather(mi.Bool, self._coupled, number, active)
+        reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
         this_side, other_side = dr.select(outside, front, back), dr.select(outside, back, front)
         return reflected * this_side + transmitted * other_side
 

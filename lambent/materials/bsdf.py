@@ -18,11 +18,31 @@ Floats = NDArray[np.floating]
 SELECTION_FLOOR = 0.02  # share of k: Fresnel at wo can vanish (r0 = 0, wo = n) where at the half vector it does not
 
 
+def under_fresnel(cosine: Any, ops: Any = NUMPY) -> Any:
+    """t = 1 - (1 - cos)^5: what Schlick's Fresnel lets through at this cosine, as a share of what it does at 1.
+
+    (1 - F)/(1 - r0): r0 drops out. Built as cos (1 + m + ... + m^4) with m = 1 - cos, which does not cancel at grazing.
+    """
+    cosine = ops.minimum(cosine, 1.0)
+    m = 1 - cosine
+    return cosine * (1 + m * (1 + m * (1 + m * (1 + m))))
+
+
+def coupling(cos_i: Any, cos_o: Any, ops: Any = NUMPY) -> Any:
+    """Factor of kd/pi of a coupled diffuse term, (21/20) t(cos_i) t(cos_o); cosines in [0, 1].
+
+    Reciprocal; the albedo at wo is kd t(cos_o) exactly. In the manner of Ashikhmin & Shirley 2000 (5), with Schlick's
+    own fifth power of the cosine.
+    """
+    return 21 / 20 * under_fresnel(cos_i, ops) * under_fresnel(cos_o, ops)
+
+
 def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Vector:
     """f in 1/sr per RGB channel, without the cosine (3.6)."""
     same, across = wi[2] * wo[2] > 0, wi[2] * wo[2] < 0
+    share = coupling(ops.abs(wi[2]), ops.abs(wo[2]), ops) if material.kd_coupled else 1.0
     value = [
-        ops.select(same, material.kd[c] / np.pi, 0.0) + ops.select(across, material.kt_d[c] / np.pi, 0.0)
+        ops.select(same, material.kd[c] / np.pi * share, 0.0) + ops.select(across, material.kt_d[c] / np.pi, 0.0)
         for c in range(3)
     ]
     for lobe in material.lobes:
@@ -40,7 +60,8 @@ def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
     A function of wo alone, roughly the energy each component returns, so the mixture pdf stays exact.
     """
     cos_o = ops.abs(wo[2])
-    weights: list[Any] = [_mean(material.kd) + 0 * cos_o, _mean(material.kt_d) + 0 * cos_o]
+    seen = under_fresnel(cos_o, ops) if material.kd_coupled else 1 + 0 * cos_o
+    weights: list[Any] = [_mean(material.kd) * seen, _mean(material.kt_d) + 0 * cos_o]
     for lobe in material.lobes:
         f = lobes.fresnel(cos_o, _mean(lobe.r0), ops)
         f = f if lobe.side == "reflection" else 1 - f

@@ -18,6 +18,7 @@ from lambent.core.files import read_bytes, write_text
 FORMAT: Literal["lambent-material"] = "lambent-material"
 VERSION: Literal[1] = 1
 LIMIT_BYTES = 16 << 20
+SCATTERING = {"kd", "kt_d", "lobes"}  # a document names at least one of them
 
 
 def _spread(value: object) -> object:
@@ -66,12 +67,17 @@ class Provenance(_Strict):
 
 
 class Material(_Strict):
-    """Sum of a diffuse term per side and any number of lobes (thesis eq. 3.6); a thin, two-sided sheet."""
+    """Sum of a diffuse term per side and any number of lobes (thesis eq. 3.6); a thin, two-sided sheet.
+
+    With `kd_coupled` the diffuse reflection falls towards grazing as Fresnel's rises (`bsdf.coupling`): kd is then the
+    albedo seen from straight above.
+    """
 
     format: Literal["lambent-material"] = FORMAT
     version: Literal[1] = VERSION
     name: str = "material"
     kd: RGB = (0.0, 0.0, 0.0)
+    kd_coupled: bool = False
     kt_d: RGB = (0.0, 0.0, 0.0)
     lobes: tuple[Lobe, ...] = ()
     provenance: Provenance | None = None
@@ -115,9 +121,13 @@ def material_from(data: Any, file: Path | str) -> Material:
     if data.get("version", VERSION) != VERSION:
         raise UserError("unknown version", file=file, field="version", got=data["version"], expected=VERSION)
     try:
-        return Material.model_validate(data)
+        material = Material.model_validate(data)
     except ValidationError as error:
         raise _one_line(error, file) from error
+    if not data.keys() & SCATTERING:
+        hint = "a black surface says so: kd = 0"
+        raise UserError("says nothing of how it scatters", file=file, expected="kd, kt_d or lobes", hint=hint)
+    return material
 
 
 def _one_line(error: ValidationError, file: Path | str) -> UserError:

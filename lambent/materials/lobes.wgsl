@@ -44,6 +44,13 @@ fn lambent_fresnel(cos_d: f32, r0: vec3f) -> vec3f {
     return r0 + (1.0 - r0) * (m2 * m2 * m);
 }
 
+// 1 - (1 - cos)^5, without cancelling at grazing: what Schlick's Fresnel lets through, as a share of that at cos = 1.
+fn lambent_under_fresnel(cosine: f32) -> f32 {
+    let c = min(cosine, 1.0);
+    let m = 1.0 - c;
+    return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m))));
+}
+
 // Microfacet density D(h) in 1/sr: Beckmann (3.3) or anisotropic GGX.
 fn lambent_distribution(h: vec3f, lobe: LambentLobe) -> f32 {
     let hz2 = max(h.z * h.z, 1e-12);

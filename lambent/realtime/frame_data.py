@@ -44,5 +44,5 @@ def sample_data(lobes: tuple[Lobe, ...], how: Integrator, n: int) -> NDArray[np.
 
 def material_data(material: Material) -> NDArray[np.void]:
     data = np.zeros(1, MATERIAL_DTYPE)
-    data["kd"][0, :3], data["kt_d"][0, :3] = material.kd, material.kt_d
+    data["kd"][0], data["kt_d"][0, :3] = (*material.kd, material.kd_coupled), material.kt_d
     return data

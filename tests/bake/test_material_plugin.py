@@ -15,6 +15,7 @@ from lambent.materials.document import Lobe, Material
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
 MATERIALS = {
     "diffuse": Material(kd=(0.2, 0.1, 0.3), kt_d=0.4),
+    "coupled": Material(kd=(0.2, 0.4, 0.6), kd_coupled=True, kt_d=0.1, lobes=(BRUSHED,)),
     "beckmann": Material(lobes=(BRUSHED,)),
     "ggx": Material(lobes=(BRUSHED.model_copy(update={"distribution": "ggx"}),)),
     "transmission": Material(lobes=(BRUSHED.model_copy(update={"side": "transmission"}),)),

@@ -15,6 +15,7 @@ from lambent.bake.probe_centre import flat_axis, probe_centre
 from lambent.bake.reference import render_reference
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.frames import normalize
+from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Camera, Scene, SceneObject
@@ -145,3 +146,22 @@ def test_a_glossy_room_of_one_mesh_sees_itself(tmp_path: Path) -> None:
     store = bake(replace(scene, materials={**scene.materials, "grey": glossy}), tmp_path / "s", quality=TINY)
     assert not store.artefact("probe/shell/radiance").meta["object_left_out"]
     assert store.artefact("probe/block/radiance").meta["object_left_out"]
+
+
+def test_a_coupled_wall_darkens_towards_grazing() -> None:
+    """The cached light of a wall is kd t(cos_o) E/pi; the other wall's is kd E/pi."""
+    import mitsuba as mi
+
+    from lambent.bake.probe import LightMapCache
+
+    walls = tuple(SceneObject(name, patch((x, 0, 0), (1, 0, 0), (0, 1, 0)), name) for x, name in ((0, "a"), (5, "b")))
+    uv2 = {wall.name: np.full((len(wall.mesh.positions), 2), 0.5) for wall in walls}
+    kd = (0.2, 0.4, 0.6)
+    builder = SceneBuilder(Scene("s", walls, {"a": Material(kd=kd, kd_coupled=True), "b": Material(kd=kd)}), uv2)
+    cache, scene = LightMapCache(builder, np.full((4, 4, 3), np.pi), None), builder.build()
+    towards = normalize(np.array([0.9, 0.1, 0.25]))
+    for x, factor in ((0.0, under_fresnel(towards[2])), (5.0, 1.0)):
+        start = np.array([x + 0.5, 0.5, 0]) + towards
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-towards)))
+        seen = np.array(cache(si, si.is_valid())).ravel()
+        np.testing.assert_allclose(seen, np.array(kd) * factor, rtol=1e-4)

@@ -12,7 +12,7 @@ import pytest
 
 from lambent.core.frames import direction
 from lambent.materials import lobes
-from lambent.materials.bsdf import components
+from lambent.materials.bsdf import components, under_fresnel
 from lambent.materials.document import Lobe
 from lambent.materials.shader_layout import LOBE_DTYPE, lobe_shader, packed_lobes
 from tests.tools.shader_parity import assert_parity, run_wgsl
@@ -85,6 +85,12 @@ def test_fresnel():
     expected = np.stack([lobes.fresnel(cosine.astype(float), r0) for r0 in (0.03, 0.5, 1.0)], axis=-1)
     call = "lambent_fresnel(cosine, vec3f(.03, .5, 1.))"
     assert_parity(run_wgsl(lobe_shader(), call, {"cosine": cosine}, components=3), expected, rtol=1e-5)
+
+
+def test_what_fresnel_lets_through():
+    cosine = np.geomspace(1e-4, 1, COUNT, dtype=np.float32)
+    got = run_wgsl(lobe_shader(), "lambent_under_fresnel(cosine)", {"cosine": cosine})
+    assert_parity(got, under_fresnel(cosine.astype(float)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("lobe", [LOBES[0], LOBES[-1]], ids=name_of)

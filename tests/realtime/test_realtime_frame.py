@@ -11,6 +11,7 @@ from conftest import cube_of, pixel_rays, smooth_light, wall_scene
 from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
 from lambent.core.colour import filmic, srgb_decode, srgb_encode
 from lambent.core.errors import UserError
+from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame import FrameState, Renderer
@@ -127,6 +128,19 @@ def test_show_splits_the_light(device) -> None:
     np.testing.assert_allclose(full, diffuse + specular, rtol=1e-4, atol=1e-6)
     assert diffuse.max() == pytest.approx(0.5 / np.pi, rel=1e-3)
     assert specular.max() > 0.01
+
+
+def test_coupled_diffuse_darkens_towards_grazing(device) -> None:
+    """kd/pi E t(cos_o), with t of the numpy material."""
+    coupled = Material(name="m", kd=(0.2, 0.4, 0.6), kd_coupled=True)
+    low = CameraRecord(name="low", position=(2.0, 0.2, 0.8), target=(0.0, 0.0, 0.0), fov_y_deg=30.0)
+    scene = wall_scene(coupled, np.zeros((6, 8, 8, 3)), irradiance=(1, 2, 3))
+    image = Renderer(device, scene).image(FrameState(low, 12, 8, show="diffuse", antialias=False))
+    cos_o = np.abs(pixel_rays(low, 12, 8)[..., 2:])
+    seen = cos_o[..., 0] > 0.1  # closer to grazing the shading normal is bent towards the viewer
+    assert seen.mean() > 0.8 and cos_o[seen].min() < 0.2 < 0.5 < cos_o.max()
+    expected = under_fresnel(cos_o) * np.array([0.2, 0.8, 1.8]) / np.pi
+    np.testing.assert_allclose(image[seen], expected[seen], rtol=2e-3)
 
 
 @pytest.mark.parametrize("view_transform", ["linear", "filmic"])

@@ -32,7 +32,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
     let e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front);
-    let diffuse = (material.kd.rgb * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI; // 4.1
+    let diffuse = diffuse_light(wo.z, e_here, e_beyond);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
     var specular = vec3f(0.0);

@@ -16,7 +16,7 @@ struct PlacedLobe {
 }
 
 struct Material {
-    kd: vec4f,
+    kd: vec4f, // w: 1 where the diffuse reflection is coupled to Fresnel
     kt_d: vec4f,
 }
 
@@ -126,6 +126,13 @@ fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
 // f cos_i / pdf for wi, wo on the upper side; the distribution D cancels and is never computed.
 fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));
+}
+
+// Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A coupled kd is kd t(cos_o) times
+// the mean of (21/20) t(cos_i) over the light, which is 1 under uniform light and taken as 1 under any.
+fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f) -> vec3f {
+    let seen = select(1.0, lambent_under_fresnel(cos_o), material.kd.w > 0.5);
+    return (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
 }
 
 // A direction of the upper side on the lobe's side: transmission is reflection mirrored at the surface.
