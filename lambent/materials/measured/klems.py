@@ -24,6 +24,7 @@ Indices = NDArray[np.int64]
 OUTSIDE = -1
 _TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0)
 _EXACT = 1e-9
+_THIRDS = 3  # pieces of a patch, in theta and in phi, that give a tuple each
 
 
 @dataclass(frozen=True)
@@ -159,20 +160,26 @@ class PatchMatrix:
     def tuples(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Headings (M, 3) of light that enters and leaves, f (M, C), and a weight (M,) in sr, of every pair of patches.
 
-        The headings are the patches' middles. The weight times the cosine of the leaving one is the patch's projected
-        solid angle, so that sums over the tuples are the sums over the patches.
+        Light enters in the middle of its patch and leaves at nine places of its own: at the middle alone a lobe far
+        narrower than the patch would fit, with any energy. The weights times the cosines of the leaving headings sum to
+        the patch's projected solid angle, so that sums over tuples are sums over patches.
         """
         o, i = np.indices(self.values.shape[:2]).reshape(2, -1)
-        leaving = self.outgoing.centres[o]
-        weight = self.outgoing.projected_sr[o] / leaving[:, 2]
-        return self.incident.centres[i], leaving, self.values.reshape(-1, self.channels), weight
+        places, share = _spread(self.outgoing)
+        leaving, weight = places[o].reshape(-1, 3), share[o].ravel()
+        return self._nine(self.incident.centres[i]), leaving, self._nine(self.values.reshape(-1, self.channels)), weight
 
     def tuples_reversed(self) -> tuple[Floats, Floats, Floats, Floats]:
         """The same of light that takes the ways backwards; entering and leaving are those of the light that does."""
-        entering, leaving, f, _ = self.tuples()
+        o, i = np.indices(self.values.shape[:2]).reshape(2, -1)
+        places, share = _spread(self.incident)
         back = np.array((-1, -1, 1))
-        i = np.indices(self.values.shape[:2])[1].ravel()
-        return leaving * back, entering * back, f, self.incident.projected_sr[i] / entering[:, 2]
+        entering, leaving = self.outgoing.centres[o] * back, places[i].reshape(-1, 3) * back
+        return self._nine(entering), leaving, self._nine(self.values.reshape(-1, self.channels)), share[i].ravel()
+
+    @staticmethod
+    def _nine(rows: Floats) -> Floats:
+        return np.repeat(rows, _THIRDS**2, axis=0)
 
     @cached_property
     def anisotropy(self) -> float:
@@ -210,3 +217,20 @@ class PatchMatrix:
             return 0.0
         projected, f = self.incident.projected_sr, self.f.sum(axis=-1)
         return float((projected**2) @ np.diagonal(f) / (projected @ f @ projected))
+
+
+def _spread(basis: AngleBasis) -> tuple[Floats, Floats]:
+    """Nine directions (count, 9, 3) in every patch, its middle among them, and weights (count, 9) in sr.
+
+    Theta and phi are cut in three each. A weight times the cosine is the projected solid angle of its piece.
+    """
+    n = np.array(basis.n_phis)
+    lower, upper = np.radians(basis.edges_deg[:-1]), np.radians(basis.edges_deg[1:])
+    cuts = lower[:, None] + (upper - lower)[:, None] * np.arange(_THIRDS + 1) / _THIRDS  # (R, 4)
+    sizes = -np.pi * np.diff(np.cos(cuts) ** 2) / (n * _THIRDS)[:, None]
+    theta, size = np.repeat((cuts[:, 1:] + cuts[:, :-1]) / 2, n, axis=0), np.repeat(sizes, n, axis=0)
+    place = (np.arange(basis.count) - np.repeat(basis.starts, n))[:, None] + (np.arange(_THIRDS) - 1) / _THIRDS
+    phi = 2 * np.pi * place / np.repeat(n, n)[:, None]
+    places = direction(theta[:, :, None], phi[:, None, :])
+    weight = np.broadcast_to((size / np.cos(theta))[:, :, None], places.shape[:-1])
+    return places.reshape(basis.count, -1, 3), weight.reshape(basis.count, -1)

@@ -27,7 +27,7 @@ Tuples = tuple[Floats, Floats, Floats, Floats]
 
 _CHUNK = 16  # queries at a time: a fine tree has tens of thousands of leaves for each
 _RADII, _GRID = 32, 16  # incident directions of the tuples: rank 3, and per side of the square rank 4
-_COARSEST = 1 / 16  # side of the largest cell that gives one tuple
+_COARSEST, _THIRDS = 1 / 16, 3  # side of the largest piece of a cell that gives one tuple; pieces per side at least
 _MOST_TUPLES = 500_000
 _REVERSED_GRID = 32
 
@@ -200,8 +200,11 @@ def _side_at(tree: TensorTree, fixed: tuple[int, ...], at: Floats, middle: Float
 
 
 def _cut(cells: Cells) -> Cells:
-    """The cells with those larger than `_COARSEST` cut into such."""
-    parts = np.maximum(np.round(cells.side / _COARSEST), 1).astype(np.int64)
+    """The cells cut into nine, and large ones into pieces of at most `_COARSEST`.
+
+    Nine, because at its middle alone a lobe far narrower than the cell would fit, with any energy.
+    """
+    parts = np.maximum(np.round(cells.side / _COARSEST), _THIRDS).astype(np.int64)
     pieces = []
     for n in np.unique(parts):
         whole = cells.chosen(parts == n)
