@@ -185,17 +185,18 @@ class ObjectResources:
         data["centre"][0] = (*light.centre, light.texels)
         data["emission"][0, :3] = record.emission
         self._uniform = device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
-        self._groups: dict[tuple[bool, int], Any] = {}
+        self._groups: dict[bool, Any] = {}
+        self._lit_by: Any = None  # the view that the groups hold
 
     def group(self, prefiltered: bool) -> Any:
-        key = (prefiltered, id(self.light.radiance_view))
-        if key not in self._groups:
-            light = self.light
-            self._groups = {k: v for k, v in self._groups.items() if k[1] == key[1]}
-            self._groups[key] = self._layouts.group(
+        light = self.light
+        if self._lit_by is not light.radiance_view:
+            self._lit_by, self._groups = light.radiance_view, {}
+        if prefiltered not in self._groups:
+            self._groups[prefiltered] = self._layouts.group(
                 self._layouts.object, self._uniform, light.planes, light.view(prefiltered), light.depth_view
             )
-        return self._groups[key]
+        return self._groups[prefiltered]
 
 
 class SceneResources:

@@ -54,3 +54,14 @@ def test_daylight_comes_from_its_sun():
     assert np.ptp(sky[3].reshape(-1, 3), axis=0).max() == 0, "the ground is even"
     across = irradiance(sky, np.stack([sun, -sun]))
     assert across[0].min() > 3 * across[1].max() and ground.min() > 0
+
+
+def test_a_series_begins_anew_after_a_frame_of_another_size(device):
+    """As the window does it: few pixels while a slider moves, then a series at full size, of the new material."""
+    scene = with_diffuse_light(unbaked_scene({"ball": sphere(0.8, 24, 12)}, Material(name="m"), EVEN))
+    renderer = Renderer(device, scene)
+    for step in range(12):
+        materials = {"m": Material(name="m", kd=step / 12)}
+        renderer.draw(FrameState(CAMERA, 16, 16, integrator="diffuse", materials=materials))
+        mean = renderer.converged(FrameState(CAMERA, 64, 64, n=1, materials=materials), 2)
+        assert mean[32, 32] == pytest.approx(step / 12 * 0.5, abs=0.01), f"step {step}"

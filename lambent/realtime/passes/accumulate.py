@@ -30,7 +30,7 @@ class AccumulatePass:
             primitive={"topology": "triangle-list"},
         )
         self._weight = device.create_buffer(size=16, usage=wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST)
-        self._size: tuple[int, int] = (0, 0)
+        self._frame: Any = None  # kept: another texture could else come to stand at the same address
         self._means: list[Any] = []
         self._groups: list[Any] = []
 
@@ -51,9 +51,9 @@ class AccumulatePass:
         return self._means[into]
 
     def _fit(self, frame: Any) -> None:
-        if self._size == (*frame.size[:2], id(frame)):
+        if self._frame is frame:
             return
-        self._size = (*frame.size[:2], id(frame))
+        self._frame = frame
         usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
         self._means = [self._device.create_texture(size=frame.size, format=MEAN_FORMAT, usage=usage) for _ in range(2)]
         self._groups = [
