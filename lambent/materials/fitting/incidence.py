@@ -13,7 +13,8 @@ from lambent.materials.measured.protocol import MeasuredSamples
 Floats = NDArray[np.floating]
 
 MOST_ANGLES = 12  # more distinct angles than this are gathered in bins
-BIN_CENTRES_DEG = np.array([2.5, 15.0, 30.0, 45.0, 60.0, 75.0])
+THETA_CENTRES_DEG = np.array([2.5, 15.0, 30.0, 45.0, 60.0, 75.0])
+PHI_CENTRES_DEG = np.array([0.0, 90.0, 180.0, 270.0])  # every ring of a Klems basis has patches there
 BIN_HALF_WIDTH_DEG = 2.5
 ROUND_DEG = 1.0
 LEAST_TUPLES = 16
@@ -60,8 +61,8 @@ def incidences(samples: MeasuredSamples) -> list[Incidence]:
         phi_o, phi = phi_o - phi, np.zeros_like(phi)
     theta_o = np.arctan2(np.hypot(samples.wo[:, 0], samples.wo[:, 1]), samples.wo[:, 2])
     wo = direction(theta_o, phi_o)
-    phi = np.where(theta < np.radians(ROUND_DEG) / 2, 0.0, phi) if samples.info.isotropic else phi
-    theta_key, phi_key = _keys(np.degrees(theta)), _keys(np.degrees(phi) % 360)
+    phi = np.where(theta < np.radians(ROUND_DEG) / 2, 0.0, phi)  # has no meaning there
+    theta_key, phi_key = _keys(np.degrees(theta), THETA_CENTRES_DEG), _keys(np.degrees(phi), PHI_CENTRES_DEG)
     gathered = []
     for theta_deg in np.unique(theta_key[theta_key >= 0]):
         for phi_deg in np.unique(phi_key[(theta_key == theta_deg) & (phi_key >= 0)]):
@@ -74,10 +75,11 @@ def incidences(samples: MeasuredSamples) -> list[Incidence]:
     return gathered
 
 
-def _keys(angle_deg: Floats) -> Floats:
+def _keys(angle_deg: Floats, centres_deg: Floats) -> Floats:
     """The angle a tuple is filed under: rounded where there are few; where there are many, its bin's centre or -1."""
-    rounded = np.round(angle_deg / ROUND_DEG) * ROUND_DEG
+    rounded = np.round(angle_deg / ROUND_DEG) * ROUND_DEG % 360
     if len(np.unique(rounded)) <= MOST_ANGLES:
         return rounded
-    nearest = BIN_CENTRES_DEG[np.argmin(np.abs(angle_deg[:, None] - BIN_CENTRES_DEG), axis=1)]
-    return np.where(np.abs(angle_deg - nearest) <= BIN_HALF_WIDTH_DEG, nearest, -1.0)
+    away = np.abs((angle_deg[:, None] - centres_deg + 180) % 360 - 180)
+    nearest = np.argmin(away, axis=1)
+    return np.where(away.min(axis=1) <= BIN_HALF_WIDTH_DEG, centres_deg[nearest], -1.0)

@@ -27,6 +27,20 @@ def test_tables_without_incident_directions_are_gathered_in_bins():
     assert [entry.theta_deg for entry in gathered] == [2.5, 15, 30, 45, 60, 75]
 
 
+def test_many_azimuths_are_gathered_at_the_quarters():
+    """As of a Klems basis: rings of 1, 8, 20 and 24 patches, phi from 0 to 360, the pole's anywhere."""
+    rings = [(0.0, [180.0]), *((10.0 * n, np.arange(0, 360, 360 / n)) for n in (8, 20, 24) if n < 9)]
+    rings += [(30.0, np.arange(0, 360, 18)), (40.0, np.arange(15, 361, 15))]
+    samples = grey(PAINT, FEW)
+    samples = replace(samples, info=replace(samples.info, isotropic=False))
+    incident = np.array([(theta, phi) for theta, phis in rings for phi in phis])
+    chosen = incident[np.arange(len(samples)) % len(incident)]
+    gathered = incidences(replace(samples, wi=direction(*np.radians(chosen.T))))
+    keys = {(entry.theta_deg, entry.phi_deg) for entry in gathered}
+    quarters = (0, 90, 180, 270)
+    assert keys == {(0, 0)} | {(theta, phi) for theta in (80, 30, 40) for phi in quarters}
+
+
 def test_albedo_of_an_incidence_ignores_gaps():
     for entry in incidences(grey(Material(kd=0.5), FEW)):
         assert entry.albedo(far=False)[0] == pytest.approx(0.5, rel=0.01)
