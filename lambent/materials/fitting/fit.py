@@ -167,9 +167,9 @@ def fit(
         name=Path(samples.info.file).stem,
         kd=_diffuse_rgb("reflection", samples, task, found),
         kt_d=_diffuse_rgb("transmission", samples, task, found),
+        kd_coupled=coupled,
         lobes=tuple(lobe for side, one in found.items() for lobe in _document_lobes(side, one, task)),
     )
-    material = material.model_copy(update={"kd_coupled": True}) if coupled else material
     model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
     kept = {side: (one.models[-1], one.boxes) for side, one in found.items() if one.models}

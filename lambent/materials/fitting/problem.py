@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.materials.bsdf import coupling
 from lambent.materials.fitting.metrics import BLOCK, Metric
 from lambent.materials.fitting.parameters import Side, from_search
 from lambent.materials.fitting.scale import Channel
@@ -210,8 +211,4 @@ def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -
 def diffuse_basis(cos_i: Floats, cos_o: Floats, coupled: bool) -> Floats:
     """f in 1/sr of the diffuse term with coefficient 1."""
     flat = np.full_like(cos_o, 1 / np.pi)
-    if not coupled:
-        return flat
-    from lambent.materials.bsdf import coupling
-
-    return np.asarray(flat * coupling(cos_i, cos_o))
+    return np.asarray(flat * coupling(cos_i, cos_o)) if coupled else flat

@@ -171,6 +171,15 @@ def test_degenerate_tables_give_a_finite_material(paint, metric, count, value):
     assert result.errors[metric] < 1e-3
 
 
+def test_a_coupled_diffuse_term_is_recovered():
+    coupled = PAINT.model_copy(update={"kd_coupled": True, "kd": (0.5,) * 3})
+    samples = grey(coupled, FEW)
+    with_it, without = fit(samples, coupled=True), fit(samples)
+    assert with_it.material.kd_coupled
+    assert with_it.material.kd[0] == pytest.approx(0.5, rel=0.01)
+    assert with_it.errors["cuberoot"] < 0.8 * without.errors["cuberoot"]
+
+
 def test_impossible_requests(paint):
     impossible = [{"method": "gird"}, {"metric": "l3"}, {"distribution": "ggxx"}, {"lobes": 0}, {"lobes": 5}]
     impossible += [{"gain": 0.0}, {"gain": 1.0}, {"fix": {"mxx": 1.0}}, {"fix": {"t_mx": 0.1}}]
