@@ -7,6 +7,7 @@ Colour is written as Radiance's tools write and read it: Visible is the luminanc
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -32,6 +33,7 @@ TAKES: tuple[Kind, ...] = ("table", "material")
 BASIS = KLEMS_FULL
 _WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes a table is searched with
 _DIRECT_SHARE = 0.5
+_EXACT = 1e-4  # share of its size: the subject is a matrix of these patches itself
 _ASKED_DEG = (1.0, 20.0, 45.0, 70.0)  # theta, whether a table says anything of light from behind
 _WAVELENGTHS = (("CIE-X", "X"), ("Visible", "Y"), ("CIE-Z", "Z"))
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd]")
@@ -58,7 +60,10 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     if not lit:
         raise UserError("scatters no light, and a file of zeros says nothing", file=scatterer.name)
     write_text(Path(path), _document(scatterer.name, lit, grey))
-    return read_back(subject, Path(path), _lost(lit, front, grey))
+    cost = read_back(subject, Path(path), _lost(lit, grey))
+    if max(cost.share.values()) < _EXACT:
+        return cost
+    return replace(cost, lost=(*_lost_detail(front), *cost.lost))
 
 
 def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[Means, Means]:
@@ -95,12 +100,17 @@ def _search(transmits: bool) -> Material:
     return Material(kd=half, kt_d=half if transmits else (0.0, 0.0, 0.0), lobes=tuple(lobes))
 
 
-def _lost(lit: dict[str, Floats], front: Means, grey: bool) -> tuple[str, ...]:
+def _lost_detail(front: Means) -> list[str]:
     lost = ["whatever is finer than a patch, 10 to 15 degrees wide: its mean stands for it"]
     for name, values in (("reflected", front.reflected), ("transmitted", front.transmitted)):
         share = _direct_share(values)
         if share > _DIRECT_SHARE:
             lost.append(f"the shape of the highlight: {100 * share:.0f} % of what is {name} is in one patch")
+    return lost
+
+
+def _lost(lit: dict[str, Floats], grey: bool) -> tuple[str, ...]:
+    lost = []
     if not grey:
         lost.append("colour in tools other than Radiance: they read Visible, the luminance, and not CIE-X and CIE-Z")
     if not any(name.endswith("Front") for name in lit):
