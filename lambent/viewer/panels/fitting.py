@@ -18,7 +18,7 @@ def draw(state: ViewerState) -> None:
     options = editor.options
     options.lobes = choice("lobes", options.lobes, LOBES)
     explain("per side; auto adds lobes as long as they take off a share of the error")
-    options.distribution = choice("shape", options.distribution, DISTRIBUTIONS)
+    options.distribution = choice("distribution", options.distribution, DISTRIBUTIONS)
     explain("distribution of the microfacets; best tries both")
     options.method = choice("method", options.method, METHODS)
     explain("gradient: least squares from several starts; grid: the hierarchical search of the thesis")
