@@ -24,8 +24,6 @@ Floats = NDArray[np.floating]
 STEPS = 33  # along each axis
 TUPLES = 6000
 REACH = 4.0  # mx and my are drawn from the optimum divided by it to the optimum times it
-PLANES = (("mx", "my"), ("r0", "alpha"))
-ISOTROPIC_PLANES = (("m", "alpha"), ("r0", "alpha"))  # m is mx and my at once
 SOLVER_STEPS = 6
 
 
@@ -62,14 +60,23 @@ def slices(
     steps: int = STEPS,
     progress: Progress = silent,
 ) -> list[Slice]:
-    """The two slices of lobe `index` of `material`: (mx, my), or (m, alpha) of an isotropic table, and (r0, alpha).
+    """The slices of lobe `index` of `material`: over (mx, my) and (r0, alpha).
 
-    An isotropic table holds one azimuth of wi, which cannot tell mx from my: there both move as one.
+    An isotropic table holds one azimuth of wi, which cannot tell mx from my: both move as one, and (m, alpha) stands in
+    place of (mx, my). Of a lobe of transmission r0 cannot be told from kt, so its slice has a roughness in its place.
     """
     lobe = material.lobes[index]
     problem, rest = _prepared(samples, material, index, metric)
     tied = samples.info.isotropic and lobe.mx == lobe.my
-    return [_slice(problem, rest, lobe, plane, steps, progress) for plane in (ISOTROPIC_PLANES if tied else PLANES)]
+    return [_slice(problem, rest, lobe, plane, steps, progress) for plane in _planes(lobe, tied)]
+
+
+def _planes(lobe: Lobe, tied: bool) -> list[tuple[str, str]]:
+    """Pairs of parameters; m is mx and my at once."""
+    roughness = "m" if tied else "mx"
+    planes = [("m", "alpha") if tied else ("mx", "my")]
+    last = ("r0" if lobe.side == "reflection" else roughness, "alpha")
+    return planes if last in planes else [*planes, last]
 
 
 def _axis(name: str, best: float, steps: int) -> Floats:

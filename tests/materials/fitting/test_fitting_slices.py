@@ -35,6 +35,11 @@ def test_isotropic_tables_move_both_roughnesses_at_once():
     assert (first.across, first.down, second.across, second.down) == ("m", "alpha", "r0", "alpha")
 
 
+def test_r0_of_a_transmission_lobe_is_not_drawn():
+    first, second = slices(grey(FOIL, COARSE), FOIL, 1, METRICS["cuberoot"], steps=5)
+    assert (first.across, first.down, second.across, second.down) == ("mx", "my", "mx", "alpha")
+
+
 def test_error_at_the_fit_is_the_fits_error():
     """A slice through the optimum holds, at the optimum, what the metric says of the material (k is solved again)."""
     samples = grey(FOIL, COARSE)
