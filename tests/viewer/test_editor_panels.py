@@ -64,6 +64,13 @@ def test_fix_and_narrow(driver, state):
     assert restrictions.fixed == {"kd"} and restrictions.ranges == {}
 
 
+def test_the_diffuse_term_is_coupled(driver, state):
+    driver.click("kd falls off as Fresnel rises", 0.1)
+    assert state.editor.material.kd_coupled
+    driver.click("undo")
+    assert state.editor.material == BRASS
+
+
 def test_lobes(driver, state):
     driver.click("add transmission lobe")
     tick(driver)

@@ -284,6 +284,7 @@ class Editor:
                 lobes="auto" if options.lobes == "auto" else most,
                 method=options.method,
                 distribution=options.distribution,
+                coupled=material.kd_coupled,
                 metric=metric,
                 fix=fix,
                 ranges=ranges,

@@ -125,6 +125,10 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     imgui.set_next_item_width(-LABEL_PX - RANGE_PX)
     changed, name = imgui.input_text("name", material.name)
     renamed = material.model_copy(update={"name": name}) if changed and name.strip() else material
+    changed, coupled = imgui.checkbox("kd falls off as Fresnel rises", material.kd_coupled)
+    explain("couples the diffuse reflection to the lobes: kd is then the albedo from straight above; a fit keeps this")
+    if changed:
+        renamed = renamed.model_copy(update={"kd_coupled": coupled})
     imgui.text_disabled("fix")
     explain("a fixed number stays as it is in a fit; <> narrows the interval where a fit may seek it")
 
