@@ -75,8 +75,10 @@ def test_check_value_of_t3(shared_data: Path) -> None:
     assert table.info.isotropic and table.info.transmits
 
 
-@pytest.mark.parametrize("structure", ["Columns", "Rows"])
-@pytest.mark.parametrize("basis", [KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER])
+@pytest.mark.parametrize(
+    ("structure", "basis"),
+    [("Columns", KLEMS_FULL), ("Rows", KLEMS_FULL), ("Columns", KLEMS_HALF), ("Rows", KLEMS_QUARTER)],
+)
 def test_random_matrices_agree_with_radiance(tmp_path: Path, structure: str, basis) -> None:
     """Both sides, no symmetry whatever: every convention of index, side and order shows."""
     random = np.random.default_rng(basis.count)
@@ -117,9 +119,18 @@ def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
     assert agree(path, tmp_path, n=800).info.isotropic == (rank == 3)
 
 
-@pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
-@pytest.mark.parametrize("only", ["Front", "Back"])
-@pytest.mark.parametrize("other", ["absent", "zero"])
+@pytest.mark.parametrize(
+    ("structure", "only", "other"),
+    [
+        ("Columns", "Front", "absent"),
+        ("Columns", "Back", "absent"),
+        ("Columns", "Front", "zero"),
+        ("TensorTree3", "Front", "zero"),
+        ("TensorTree3", "Back", "absent"),
+        ("TensorTree4", "Front", "absent"),
+        ("TensorTree4", "Back", "zero"),
+    ],
+)
 def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: str, only: str, other: str) -> None:
     random = np.random.default_rng(5)
     if structure == "Columns":
@@ -133,7 +144,7 @@ def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: 
     path = tmp_path / "r.xml"
     path.write_text(lbnl_xml(structure, blocks))
     table = read(path)
-    asked = angles_away_from_borders(600)
+    asked = angles_away_from_borders(300)
     answers = ask_radiance(path, tmp_path, asked, asked[:100, :2])
     wi, wo = towards(asked[:, :2]), towards(asked[:, 2:])
     f = table.eval(wi, wo)[:, 0]
@@ -148,7 +159,7 @@ def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: 
     assert any("backwards" in note for note in table.info.notes)
 
 
-def by_quadrature(table: LbnlTable, wi: Floats, n: int = 400) -> Floats:
+def by_quadrature(table: LbnlTable, wi: Floats, n: int = 300) -> Floats:
     """Transmissivity (N, C) by a midpoint rule over the disk, without the table's own sums."""
     line = (np.arange(n) + 0.5) / n
     r, phi = (x.ravel() for x in np.meshgrid(np.sqrt(line), 2 * np.pi * line))
