@@ -128,7 +128,7 @@ def _asked(scatterer: Scatterer, wi: Floats, m: Floats) -> tuple[Floats, Floats]
     wo = reflect(all_wi, m)
     above = wo[:, 2] > _LOWEST
     # Mirrored about a half vector at the horizon, wi at the normal goes straight down: then m says the azimuth.
-    level = normalize((wo + 0.1 * m) * (1, 1, 0)) + (0, 0, _LOWEST)
+    level = normalize((wo + 0.1 * m) * (1, 1, 0)) + np.array([0.0, 0.0, _LOWEST])
     lifted = normalize(np.where(above[:, None], wo, level))
     values = np.maximum(scatterer.rgb(all_wi, lifted), 0) * lifted[:, 2:]
     theta_m = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])

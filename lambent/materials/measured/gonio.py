@@ -28,6 +28,7 @@ Symmetry = Literal["isotropic", "quadrant", "half", "none"]
 PHI_I_RANGE_DEG: dict[Symmetry, float] = {"isotropic": 0.0, "quadrant": 90.0, "half": 180.0, "none": 360.0}
 Reconstruction = Literal["half_vector", "quadrilinear"]
 _COS_MIN = 1e-4
+_STEEPEST = 4.0  # times f of a neighbour: where the asked direction is well above the horizon that wo is at
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,8 @@ class GonioTable(IntegratedTable):
             neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b]))
             asked = reflect(neighbour, h) if self.reconstruction == "half_vector" else wo
             # p is interpolated, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon.
-            weight = weight * np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN)
+            # At the horizon itself f = p / cos would run away, and with it a picture's brightest pixels.
+            weight = weight * np.minimum(np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN), _STEEPEST)
             for k, rows in _groups(a * len(self.phi_i_deg) + b, weight > 0):
                 sheet = sheets[k // len(self.phi_i_deg)][k % len(self.phi_i_deg)]
                 f[rows] += sheet.at(asked[rows]) * weight[rows, None]

@@ -122,6 +122,13 @@ def test_scattered_incident_directions(tmp_path: Path, hemisphere: Callable[...,
     assert any("isotropic" in note for note in table.info.notes) and len(table.samples()) == 300
 
 
+def test_another_encoding_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text(table_text("theta_in phi_in theta_out phi_out brdf", np.ones((5, 5))), encoding="utf-16")
+    with pytest.raises(UserError, match=r"is UTF-16.*save it again as UTF-8"):
+        load(path)
+
+
 ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
 
 

@@ -103,6 +103,14 @@ def test_half_vector_beats_quadrilinear_on_a_lobe() -> None:
     assert error["half_vector"] < 0.03 < 0.2 < error["quadrilinear"]
 
 
+def test_f_stays_in_bounds_at_the_horizon() -> None:
+    """p of a neighbour does not vanish where wo's cosine does: their quotient is limited."""
+    table = synthesise(GLOSSY, replace(ISOTROPIC, **CLEAN))
+    wi = np.broadcast_to(direction(np.radians(40), 0.0), (500, 3))
+    wo = direction(np.radians(np.linspace(80, 89.999, 500)), np.pi)
+    assert table.eval(wi, wo).max() < 4 * MaterialBSDF(GLOSSY).eval(wi, wo).max()
+
+
 def test_quadrilinear_keeps_a_retro_reflector() -> None:
     """A bump towards the light stays where it was measured; aligning on the half vector would move it."""
     from lambent.materials.measured.synthetic import record
