@@ -47,10 +47,10 @@ def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
     pairs = pairs_of(material, 11, seed=5)
     value = evaluated(mi, ball.bsdf(), pairs.samples)
     parts, _ = mitsuba.likeness(material)
-    claimed = np.broadcast_to(sums.evaluate(pairs, material, mitsuba.TOOL, parts), value.shape)
+    claimed = np.broadcast_to(sums.evaluate(pairs, sums.flattened(material), mitsuba.TOOL, parts), value.shape)
     np.testing.assert_allclose(value, claimed, rtol=2e-3, atol=1e-5)
     if not material.transmits:
-        assert cost.share["cuberoot"] < 0.07
+        assert cost.share["cuberoot"] < 0.08
 
 
 def test_the_comment_holds_the_exact_material(mi, tmp_path):

@@ -125,7 +125,7 @@ def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str
     """What Smith-masked GGX facets with a Fresnel factor cannot say of the lobes."""
     lost = []
     if material.kd_coupled and any(material.kd):
-        lost.append("the diffuse term no longer darkens towards grazing as the reflection rises")
+        lost.append("the diffuse term is coupled to Fresnel in the way of the format, not in ours, or not at all")
     if not beckmann_kept and any(lobe.distribution == "beckmann" for lobe in material.lobes):
         lost.append("Beckmann lobes became GGX lobes, whose tails are longer")
     if material.lobes:

@@ -102,6 +102,7 @@ TOOL = Tool(NAME, _eval, _others, _colour_start, 1.0, lambda lobe: "ggx")
 
 def document(material: Material, parts: Iterable[Part]) -> str:
     """The MaterialX document."""
+    material = sums.flattened(material)
     root = ET.Element("materialx", version=VERSION, colorspace="lin_rec709")
     names = []
     if any(material.kd) or not (material.transmits or material.lobes):

@@ -121,7 +121,7 @@ def document(material: Material, parts: Sequence[Part]) -> str:
     scene = ET.Element("scene", version=VERSION)
     ET.SubElement(scene, "integrator", type="path")
     scene.append(_exact(material))
-    bsdf = _bsdf(material, parts)
+    bsdf = _bsdf(sums.flattened(material), parts)
     bsdf.set("id", "material")
     scene.append(bsdf)
     ball = ET.SubElement(scene, "shape", type="sphere")

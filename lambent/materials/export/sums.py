@@ -11,7 +11,7 @@ from lambent.core.frames import Floats
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost
-from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, slope_start
+from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, slope_start, three
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, pairs_of
 
 
@@ -68,19 +68,33 @@ def likeness(
     material: Material, tool: Tool, lost: Sequence[str], rounded: Callable[[Part], Part], progress: Progress
 ) -> tuple[list[Part], Cost]:
     """The parts that together with the diffuse terms look most like the material, as written, and what they cost."""
-    pairs = pairs_of(material, FIT_LOG2, seed=0)
+    pairs, flat = pairs_of(material, FIT_LOG2, seed=0), flattened(material)
     parts: list[Part] = []
     if material.lobes:
         starts, low, high = zip(*(_space(lobe, tool, pairs) for lobe in material.lobes), strict=True)
 
         def model(x: Floats) -> Floats:
-            return evaluate(pairs, material, tool, _read(x, material, tool, pairs))
+            return evaluate(pairs, flat, tool, _read(x, material, tool, pairs))
 
         bounds = np.concatenate(low), np.concatenate(high)
         x, _ = match(pairs, model, [np.concatenate(starts)], bounds, progress, tool.name)
         parts = [rounded(part) for part in _read(x, material, tool, pairs)]
     check = pairs_of(material, CHECK_LOG2, seed=1)
-    return parts, cost_of(check, evaluate(check, material, tool, parts), lost)
+    return parts, cost_of(check, evaluate(check, flat, tool, parts), lost)
+
+
+def flattened(material: Material) -> Material:
+    """The material with a plain diffuse term that returns as much light as its coupled one."""
+    if not material.kd_coupled:
+        return material
+    plain = material.model_copy(update={"kd_coupled": False})
+    coupled, flat = (
+        pairs_of(one.model_copy(update={"lobes": (), "kt_d": (0.0, 0.0, 0.0)}), FIT_LOG2, seed=0).samples
+        for one in (material, plain)
+    )
+    before, after = (float(((s.weight * s.wo[:, 2]) @ s.f).mean()) for s in (coupled, flat))
+    share = before / after if after > 0 else 1.0
+    return plain.model_copy(update={"kd": three(share * np.array(material.kd))})
 
 
 def evaluate(pairs: Pairs, material: Material, tool: Tool, parts: Sequence[Part]) -> Floats:

@@ -91,7 +91,7 @@ def _axis(name: str, best: float, steps: int) -> Floats:
 def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: Metric) -> tuple[Problem, Floats]:
     """Some tuples of the lobe's side, and f (C, N) there of everything but the lobe."""
     lobe = material.lobes[index]
-    problem = problem_of(samples, lobe.side, metric, lobe.distribution, _coupled(material))
+    problem = problem_of(samples, lobe.side, metric, lobe.distribution, material.kd_coupled)
     problem = problem.thinned([TUPLES], 0, [np.float64])[0]
     channels = len(problem.measured)
     diffuse = np.array(material.kd if lobe.side == "reflection" else material.kt_d)[:channels]
@@ -100,10 +100,6 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
         if number != index and other.side == lobe.side:
             rest = rest + np.array(other.k)[:channels, None] * _basis(problem, other)
     return problem, rest
-
-
-def _coupled(material: Material) -> bool:
-    return bool(getattr(material, "kd_coupled", False))
 
 
 def _basis(problem: Problem, lobe: Lobe) -> Floats:

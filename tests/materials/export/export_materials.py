@@ -21,5 +21,6 @@ FOIL = Material(
     ),
 )
 PAPER = Material(name="-- paper", kd=0.6, kt_d=0.2)
+VARNISH = Material(name="varnish", kd=(0.5, 0.3, 0.1), kd_coupled=True, lobes=(Lobe(mx=0.05, my=0.05, k=0.8),))
 BLACK = Material(name="black")
-ALL = {material.name: material for material in (PLASTIC, BRUSHED, GOLD, FOIL, PAPER, BLACK)}
+ALL = {material.name: material for material in (PLASTIC, BRUSHED, GOLD, FOIL, PAPER, VARNISH, BLACK)}
