@@ -93,7 +93,7 @@ def command(
         surroundings = ImageEnvironment(environment) if environment is not None else None
         with progress_bar() as progress:
             write_report(report, measurement, samples, result, source=file, environment=surroundings, progress=progress)
-    for warning in result.warnings:
+    for warning in (*samples.info.notes, *result.warnings):
         say(f"note: {warning}")
     facts = {
         "material": result.material.model_dump(mode="json"),

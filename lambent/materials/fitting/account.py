@@ -22,6 +22,7 @@ Floats = NDArray[np.floating]
 AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
 ENERGY_TOLERANCE = 0.01
+TOTAL_TOLERANCE = 0.1  # of the light scattered to one side, over all tuples
 PEAK_SHARE = 0.001  # of the tuples, the brightest
 LAMBERTIAN_STEPS = 30
 CHUNK = 1 << 14  # tuples evaluated at once
@@ -69,6 +70,7 @@ def warnings_of(
     """One line per doubt about a fit; `model` is its f (N, C) at the tuples."""
     lines = [line for side, (one, boxes) in found.items() for line in _bounds(side, one.lobes, boxes)]
     lines += _peaks(samples, model, metric)
+    lines += _totals(samples, model)
     lines += _energy(material)
     lines += _ambiguity(samples, found)
     return tuple(lines)
@@ -106,6 +108,19 @@ def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
         return []
     hint = "; more lobes or the l2_ngan metric follow it better" if metric != "l2_ngan" else "; try more lobes"
     return [f"the model reaches {share:.2f} of the measured peak{hint}"]
+
+
+def _totals(samples: MeasuredSamples, model: Floats) -> list[str]:
+    """Sides of which the model scatters noticeably less or more light in all than was measured."""
+    light = samples.weight * np.abs(samples.wo[:, 2])
+    lines = []
+    for here, word in ((~samples.transmitted, "reflects"), (samples.transmitted, "transmits")):
+        measured = float((light[here] @ samples.f[here]).sum())
+        if measured > 0:
+            share = float((light[here] @ model[here]).sum()) / measured
+            if abs(share - 1) > TOTAL_TOLERANCE:
+                lines.append(f"the model {word} {share:.2f} times the light that was measured")
+    return lines
 
 
 def _energy(material: Material) -> list[str]:

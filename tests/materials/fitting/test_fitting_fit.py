@@ -171,6 +171,12 @@ def test_degenerate_tables_give_a_finite_material(paint, metric, count, value):
     assert result.errors[metric] < 1e-3
 
 
+def test_light_that_a_model_loses_is_said(paint):
+    lines = fit(paint, fix={"kd": 0.1, "ks": 0.7, "mx": 0.15, "r0": 0.06, "alpha": 0.3}).warnings
+    assert any("reflects 0." in line and "times the light that was measured" in line for line in lines)
+    assert not any("times the light" in line for line in fit(paint).warnings)
+
+
 def test_a_coupled_diffuse_term_is_recovered():
     coupled = PAINT.model_copy(update={"kd_coupled": True, "kd": (0.5,) * 3})
     samples = grey(coupled, FEW)
