@@ -116,8 +116,8 @@ def _light_lost(pairs: Pairs, f_written: Floats) -> list[str]:
     cosine = samples.weight * np.abs(samples.wo[:, 2])
     for side, here in (("reflected", ~pairs.far), ("transmitted", pairs.far)):
         before, after = (float((cosine[here] @ f[here]).mean()) for f in (samples.f, f_written))
-        if abs(after - before) > ALBEDO_TOLERANCE * before:
-            lines.append(f"{after / before:.2f} of the {side} light" if before > 0 else f"no light was {side} before")
+        if before > 0 and abs(after - before) > ALBEDO_TOLERANCE * before:
+            lines.append(f"the {side} light is {after / before:.2f} times the material's")
     return lines
 
 
@@ -127,7 +127,7 @@ def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str
     if material.kd_coupled and any(material.kd):
         lost.append("the diffuse term is coupled to Fresnel in the way of the format, not in ours, or not at all")
     if not beckmann_kept and any(lobe.distribution == "beckmann" for lobe in material.lobes):
-        lost.append("Beckmann lobes became GGX lobes, whose tails are longer")
+        lost.append("Beckmann lobes became GGX lobes, whose tails are longer; a fit of GGX lobes loses less")
     if material.lobes:
         alphas = ", ".join(f"{lobe.alpha:.2g}" for lobe in material.lobes)
         lost.append(f"alpha ({alphas}): Smith's masking stands in place of the exponent of the cosines")

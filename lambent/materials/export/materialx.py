@@ -10,7 +10,6 @@ Sources: MaterialX Physically Based Shading Nodes 1.39; its GLSL closures for th
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from lambent.materials.export import sums
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.match import material_of, shape_losses, three
 from lambent.materials.export.pairs import Pairs
-from lambent.materials.export.sums import Part, Tool
+from lambent.materials.export.sums import Likeness, Part, Tool
 
 NAME = "MaterialX"
 ENDINGS = (".mtlx",)
@@ -36,12 +35,12 @@ F0_RANGE = (0.02, 0.25)  # of the thin wall; beyond it renderers bend or lose th
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write a .mtlx document with one surface material."""
     material = material_of(subject)
-    parts, cost = likeness(material, progress)
-    write_text(path, document(material, parts))
+    found, cost = likeness(material, progress)
+    write_text(path, document(material.name, found))
     return cost
 
 
-def likeness(material: Material, progress: Progress = silent) -> tuple[list[Part], Cost]:
+def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness, Cost]:
     """The nodes' numbers that look most like `material`, rounded as they are written, and what they cost."""
     lost = shape_losses(material)
     if material.lobes:
@@ -100,28 +99,27 @@ def _rounded(part: Part) -> Part:
 TOOL = Tool(NAME, _eval, _others, _colour_start, 1.0, lambda lobe: "ggx")
 
 
-def document(material: Material, parts: Iterable[Part]) -> str:
+def document(name: str, found: Likeness) -> str:
     """The MaterialX document."""
-    material = sums.flattened(material)
     root = ET.Element("materialx", version=VERSION, colorspace="lin_rec709")
     names = []
-    if any(material.kd) or not (material.transmits or material.lobes):
-        names.append(_node(root, "oren_nayar_diffuse_bsdf", "diffuse", color=material.kd, roughness=0.0))
-    if any(material.kt_d):
-        names.append(_node(root, "translucent_bsdf", "diffuse_transmission", color=material.kt_d))
-    for number, part in enumerate(parts, 1):
+    if any(found.kd) or not (any(found.kt_d) or found.parts):
+        names.append(_node(root, "oren_nayar_diffuse_bsdf", "diffuse", color=three(found.kd), roughness=0.0))
+    if any(found.kt_d):
+        names.append(_node(root, "translucent_bsdf", "diffuse_transmission", color=three(found.kt_d)))
+    for number, part in enumerate(found.parts, 1):
         names.append(_lobe_node(root, part, f"lobe_{number}"))
     total = names[0]
-    for number, name in enumerate(names[1:], 1):
+    for number, other in enumerate(names[1:], 1):
         add = ET.SubElement(root, "add", name=f"sum_{number}", type="BSDF")
         ET.SubElement(add, "input", name="in1", type="BSDF", nodename=total)
-        ET.SubElement(add, "input", name="in2", type="BSDF", nodename=name)
+        ET.SubElement(add, "input", name="in2", type="BSDF", nodename=other)
         total = f"sum_{number}"
     surface = ET.SubElement(root, "surface", name="thin_sheet", type="surfaceshader")
     ET.SubElement(surface, "input", name="bsdf", type="BSDF", nodename=total)
     ET.SubElement(surface, "input", name="thin_walled", type="boolean", value="true")
-    name = _identifier(material.name, {element.get("name", "") for element in root})
-    worn = ET.SubElement(root, "surfacematerial", name=name, type="material")
+    own = _identifier(name, {element.get("name", "") for element in root})
+    worn = ET.SubElement(root, "surfacematerial", name=own, type="material")
     ET.SubElement(worn, "input", name="surfaceshader", type="surfaceshader", nodename="thin_sheet")
     ET.indent(root, "  ")
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

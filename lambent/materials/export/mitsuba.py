@@ -29,7 +29,7 @@ from lambent.materials.export import sums
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.match import brightness, material_of, shape_losses, three
 from lambent.materials.export.pairs import Pairs
-from lambent.materials.export.sums import Part, Tool
+from lambent.materials.export.sums import Likeness, Part, Tool
 
 NAME = "Mitsuba 3 scene"
 ENDINGS = (".xml",)
@@ -44,12 +44,12 @@ LEAST_SHARE = 0.05  # of the blend, so that no part is sampled too rarely
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write a scene of a sphere, a light and a camera; the BSDF has the id `material`."""
     material = material_of(subject)
-    parts, cost = likeness(material, progress)
-    write_text(path, document(material, parts))
+    found, cost = likeness(material, progress)
+    write_text(path, document(material, found))
     return cost
 
 
-def likeness(material: Material, progress: Progress = silent) -> tuple[list[Part], Cost]:
+def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness, Cost]:
     """The parts that look most like `material`, rounded as they are written, and what they cost."""
     lost = shape_losses(material, beckmann_kept=True)
     lost = [
@@ -116,12 +116,12 @@ TOOL = Tool(
 )
 
 
-def document(material: Material, parts: Sequence[Part]) -> str:
+def document(material: Material, found: Likeness) -> str:
     """The scene as XML."""
     scene = ET.Element("scene", version=VERSION)
     ET.SubElement(scene, "integrator", type="path")
     scene.append(_exact(material))
-    bsdf = _bsdf(sums.flattened(material), parts)
+    bsdf = _bsdf(found)
     bsdf.set("id", "material")
     scene.append(bsdf)
     ball = ET.SubElement(scene, "shape", type="sphere")
@@ -160,21 +160,19 @@ def _exact(material: Material) -> Any:
     )
 
 
-def _bsdf(material: Material, parts: Sequence[Part]) -> ET.Element:
+def _bsdf(found: Likeness) -> ET.Element:
     """All parts: reflection in one two-sided blend, each part of transmission beside it."""
-    reflected = [(part, brightness(part.lobe)) for part in parts if part.lobe.side == "reflection"]
-    passed = [(part, brightness(part.lobe)) for part in parts if part.lobe.side == "transmission"]
+    reflected = [(part, brightness(part.lobe)) for part in found.parts if part.lobe.side == "reflection"]
+    passed = [(part, brightness(part.lobe)) for part in found.parts if part.lobe.side == "transmission"]
     near: list[tuple[Part | str, float]] = [*reflected]
     far: list[tuple[Part | str, float]] = [*passed]
-    if any(material.kd) or not (near or far or any(material.kt_d)):
-        near.append(("diffuse", float(np.mean(material.kd))))
-    if any(material.kt_d):
-        far.append(("diffuse", float(np.mean(material.kt_d))))
+    if any(found.kd) or not (near or far or any(found.kt_d)):
+        near.append(("diffuse", float(np.mean(found.kd))))
+    if any(found.kt_d):
+        far.append(("diffuse", float(np.mean(found.kt_d))))
     shares = _shares([share for _, share in [*near, *far]])
-    leaves_near = [(_near(material, part, share), share) for (part, _), share in zip(near, shares, strict=False)]
-    leaves_far = [
-        (_far(material, part, share), share) for (part, _), share in zip(far, shares[len(near) :], strict=True)
-    ]
+    leaves_near = [(_near(found, part, share), share) for (part, _), share in zip(near, shares, strict=False)]
+    leaves_far = [(_far(found, part, share), share) for (part, _), share in zip(far, shares[len(near) :], strict=True)]
     if leaves_near:
         both = ET.Element("bsdf", type="twosided")
         both.append(_blend(leaves_near))
@@ -202,10 +200,10 @@ def _blend(leaves: list[tuple[ET.Element, float]]) -> ET.Element:
     return blend
 
 
-def _near(material: Material, part: Part | str, share: float) -> ET.Element:
+def _near(found: Likeness, part: Part | str, share: float) -> ET.Element:
     if isinstance(part, str):
         bsdf = ET.Element("bsdf", type="diffuse")
-        bsdf.append(_colour("reflectance", np.array(material.kd) / share))
+        bsdf.append(_colour("reflectance", found.kd / share))
         return bsdf
     bsdf = ET.Element("bsdf", type="roughconductor")
     ET.SubElement(bsdf, "string", name="distribution", value=part.lobe.distribution)
@@ -217,12 +215,12 @@ def _near(material: Material, part: Part | str, share: float) -> ET.Element:
     return bsdf
 
 
-def _far(material: Material, part: Part | str, share: float) -> ET.Element:
+def _far(found: Likeness, part: Part | str, share: float) -> ET.Element:
     bsdf = ET.Element("bsdf", type="principledthin")
     ET.SubElement(bsdf, "float", name="eta", value=repr(THIN_ETA))
     if isinstance(part, str):
         ET.SubElement(bsdf, "float", name="diff_trans", value="2")
-        bsdf.append(_colour("base_color", np.array(material.kt_d) / share))
+        bsdf.append(_colour("base_color", found.kt_d / share))
         return bsdf
     aspect2 = part.my / part.mx
     roughness = (part.mx * part.my) ** 0.25 / (0.65 * THIN_ETA - 0.35)

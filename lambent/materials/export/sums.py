@@ -1,4 +1,4 @@
-"""For tools whose materials are sums, like ours: the diffuse terms stay as they are, each lobe gets a counterpart."""
+"""For tools whose materials are sums, like ours: diffuse terms stay diffuse terms, each lobe gets a counterpart."""
 
 from __future__ import annotations
 
@@ -64,47 +64,51 @@ class Tool:
     distribution: Callable[[Lobe], str]
 
 
+@dataclass(frozen=True)
+class Likeness:
+    """A material as the other tool has it: diffuse coefficients (C,) of both sides, and a part per lobe."""
+
+    kd: Floats
+    kt_d: Floats
+    parts: tuple[Part, ...] = ()
+
+    def eval(self, pairs: Pairs, tool: Tool) -> Floats:
+        """f (N, C) in 1/sr at the pairs."""
+        f = np.where(pairs.far[:, None], self.kt_d / np.pi, self.kd / np.pi)
+        for part in self.parts:
+            f = f + tool.eval(pairs, part)
+        return f
+
+
 def likeness(
     material: Material, tool: Tool, lost: Sequence[str], rounded: Callable[[Part], Part], progress: Progress
-) -> tuple[list[Part], Cost]:
-    """The parts that together with the diffuse terms look most like the material, as written, and what they cost."""
-    pairs, flat = pairs_of(material, FIT_LOG2, seed=0), flattened(material)
-    parts: list[Part] = []
-    if material.lobes:
-        starts, low, high = zip(*(_space(lobe, tool, pairs) for lobe in material.lobes), strict=True)
-
-        def model(x: Floats) -> Floats:
-            return evaluate(pairs, flat, tool, _read(x, material, tool, pairs))
-
-        bounds = np.concatenate(low), np.concatenate(high)
-        x, _ = match(pairs, model, [np.concatenate(starts)], bounds, progress, tool.name)
-        parts = [rounded(part) for part in _read(x, material, tool, pairs)]
+) -> tuple[Likeness, Cost]:
+    """What looks most like the material, as written, and what it costs. Without lobes it is the material itself."""
+    pairs = pairs_of(material, FIT_LOG2, seed=0)
+    kd, kt_d = (np.array(rgb[: pairs.samples.f.shape[1]]) for rgb in (material.kd, material.kt_d))
+    found = Likeness(kd, kt_d)
+    if material.lobes or material.kd_coupled:
+        spaces = [_diffuse_space(kd), _diffuse_space(kt_d), *(_space(lobe, tool, pairs) for lobe in material.lobes)]
+        start, low, high = (np.concatenate(parts) for parts in zip(*spaces, strict=True))
+        x, _ = match(
+            pairs,
+            lambda x: _read(x, material, tool, pairs).eval(pairs, tool),
+            [start],
+            (low, high),
+            progress,
+            tool.name,
+        )
+        best = _read(x, material, tool, pairs)
+        kd, kt_d = (np.array(three(rgb))[: len(rgb)] for rgb in (best.kd, best.kt_d))
+        found = Likeness(kd, kt_d, tuple(rounded(part) for part in best.parts))
     check = pairs_of(material, CHECK_LOG2, seed=1)
-    return parts, cost_of(check, evaluate(check, flat, tool, parts), lost)
+    return found, cost_of(check, found.eval(check, tool), lost)
 
 
-def flattened(material: Material) -> Material:
-    """The material with a plain diffuse term that returns as much light as its coupled one."""
-    if not material.kd_coupled:
-        return material
-    plain = material.model_copy(update={"kd_coupled": False})
-    coupled, flat = (
-        pairs_of(one.model_copy(update={"lobes": (), "kt_d": (0.0, 0.0, 0.0)}), FIT_LOG2, seed=0).samples
-        for one in (material, plain)
-    )
-    before, after = (float(((s.weight * s.wo[:, 2]) @ s.f).mean()) for s in (coupled, flat))
-    share = before / after if after > 0 else 1.0
-    return plain.model_copy(update={"kd": three(share * np.array(material.kd))})
-
-
-def evaluate(pairs: Pairs, material: Material, tool: Tool, parts: Sequence[Part]) -> Floats:
-    """f (N, C) of the diffuse terms of `material` and the parts."""
-    channels = pairs.samples.f.shape[1]
-    kd, kt_d = (np.array(rgb)[:channels] / np.pi for rgb in (material.kd, material.kt_d))
-    f = np.where(pairs.far[:, None], kt_d, kd)
-    for part in parts:
-        f = f + tool.eval(pairs, part)
-    return f
+def _diffuse_space(coefficient: Floats) -> tuple[Floats, Floats, Floats]:
+    """Start and bounds of the roots of a diffuse coefficient; one that is 0 stays 0."""
+    root = np.sqrt(np.minimum(coefficient, 1))
+    return root, np.zeros_like(root), np.where(root > 0, 1.0, 0.0)
 
 
 def _space(lobe: Lobe, tool: Tool, pairs: Pairs) -> tuple[Floats, Floats, Floats]:
@@ -122,8 +126,9 @@ def _space(lobe: Lobe, tool: Tool, pairs: Pairs) -> tuple[Floats, Floats, Floats
     return start, low, high
 
 
-def _read(x: Floats, material: Material, tool: Tool, pairs: Pairs) -> list[Part]:
-    channels, parts, at = pairs.samples.f.shape[1], [], 0
+def _read(x: Floats, material: Material, tool: Tool, pairs: Pairs) -> Likeness:
+    channels = pairs.samples.f.shape[1]
+    kd, kt_d, at, parts = x[:channels] ** 2, x[channels : 2 * channels] ** 2, 2 * channels, []
     for lobe in material.lobes:
         count = 2 + channels + len(tool.others(lobe, channels)[0])
         own = x[at : at + count]
@@ -131,4 +136,4 @@ def _read(x: Floats, material: Material, tool: Tool, pairs: Pairs) -> list[Part]
         mx = float(np.exp(own[0]))
         my = mx if lobe.mx == lobe.my else float(np.exp(own[1]))
         parts.append(Part(lobe, mx, my, own[2 : 2 + channels] ** 2, own[2 + channels :]))
-    return parts
+    return Likeness(kd, kt_d, tuple(parts))
