@@ -129,6 +129,12 @@ def _failures(error: float, energy: Furnace, sampler: list[SamplerCheck]) -> lis
         found.append(f"not reciprocal: swapping wi and wo changes f by up to {error:.2g} of its value")
     if max(energy.mean_albedo) > ENERGY_LIMIT:
         found.append(f"mean albedo {max(energy.mean_albedo):.3f}: light between such walls grows without bound")
+    return found + sampler_failures(sampler)
+
+
+def sampler_failures(sampler: list[SamplerCheck]) -> list[str]:
+    """What is wrong with the sampler, in words; empty where nothing is."""
+    found = []
     least = 1 - (1 - P_VALUE_LIMIT) ** (1 / len(sampler))
     for one in sampler:
         where = f"at theta {one.theta_deg:g}, phi {one.phi_deg:g} degrees"
@@ -168,7 +174,7 @@ def _sphere(rng: np.random.Generator, n: int) -> Floats:
 def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int = 0) -> Furnace:
     """Directional albedo over theta 0..89 degrees by importance sampling with scrambled Sobol points.
 
-    Nothing is clipped. The mean weighs the directions with their cosine; the last degree counts like 89.
+    Nothing is clipped.
     """
     from scipy.stats import qmc
 
@@ -177,10 +183,15 @@ def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int =
     albedo = np.array(
         [[_weights(bsdf, direction(np.radians(t), np.radians(p)), u).mean(axis=0) for p in PHI_DEG] for t in THETA_DEG]
     )
+    return Furnace(tuple(map(float, THETA_DEG)), PHI_DEG, albedo, mean_albedo(albedo))
+
+
+def mean_albedo(albedo: Floats) -> tuple[float, float, float]:
+    """Mean of a directional albedo (THETA_DEG, phi, 3), weighed with the cosine; the last degree counts like 89."""
     sin2 = np.append(np.sin(np.radians(THETA_DEG)) ** 2, 1.0)
     rows = np.concatenate([albedo, albedo[-1:]]).mean(axis=1)
     red, green, blue = (float(np.trapezoid(rows[:, c], sin2)) for c in range(3))
-    return Furnace(tuple(map(float, THETA_DEG)), PHI_DEG, albedo, (red, green, blue))
+    return red, green, blue
 
 
 def _weights(bsdf: Scatters, wo: Floats, u: Floats) -> Floats:

@@ -1,0 +1,178 @@
+"""Is a measured table fit for a path tracer? What can be asked of a measurement.
+
+A table is reciprocal to the accuracy of its device, not to 1e-6: swapping wi and wo changes published RGL files by 3 to
+22 % of the light. Its albedo may pass 1 near grazing, where devices see mostly their own errors. So percentages are
+reported, and only what no device explains is a failure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from lambent.core.frames import Floats, direction
+from lambent.core.progress import Progress, silent
+from lambent.core.sequences import cosine_hemisphere
+from lambent.materials.bsdf import components
+from lambent.materials.check import (
+    PHI_DEG,
+    SAMPLER_THETA_DEG,
+    THETA_DEG,
+    Furnace,
+    SamplerCheck,
+    check_sampler,
+    mean_albedo,
+    sampler_failures,
+)
+from lambent.materials.chi_square import adapted_cells, integrate_cells
+from lambent.materials.measured import half_vector_grid
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.sampling import TableBSDF
+
+RECIPROCITY_LIMIT = 0.5  # share of the light; the worst published file has .22, mixed up columns have 1 and more
+ENERGY_LIMIT = 1.02  # albedo: what a good device measures of a white tile
+INTEGRAL_LIMIT = 0.05  # share of the albedo between reflectivity() and an independent quadrature
+INTEGRAL_THETA_DEG = (10.0, 40.0, 70.0)
+LAST_THETA_DEG = 84.0  # energy beyond is a warning at most
+
+
+@dataclass(frozen=True)
+class IntegralCheck:
+    """r + t of one incident direction as the table's own methods give it and by adaptive quadrature; means of RGB."""
+
+    theta_deg: float
+    phi_deg: float
+    from_table: float
+    quadrature: float
+
+    @property
+    def deviation(self) -> float:
+        """Share of the quadrature."""
+        return abs(self.from_table - self.quadrature) / max(self.quadrature, 1e-12)
+
+
+@dataclass(frozen=True)
+class TableReport:
+    """Everything that was measured; `failures` and `warnings` say in words what is wrong with it.
+
+    Attributes
+    ----------
+    reciprocity_share : float
+        Integral of |f(wi, wo) - f(wo, wi)| cos cos over that of the mean of both, reflection only.
+    resampling_share : float
+        Deviation of what the path tracer looks up from the table itself, as a share of the light.
+    furnace : Furnace
+        r + t over the incident directions, by the table's own methods.
+    """
+
+    reciprocity_share: float
+    resampling_share: float
+    furnace: Furnace
+    integrals: tuple[IntegralCheck, ...]
+    sampler: tuple[SamplerCheck, ...]
+    warnings: tuple[str, ...]
+    failures: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as plain numbers, strings and lists."""
+        data = asdict(self) | {"passed": self.passed}
+        data["furnace"]["albedo"] = self.furnace.albedo.tolist()
+        return data
+
+
+def check_table(
+    table: MeasuredTable, seed: int = 0, progress: Progress = silent, shape: GridShape | None = None
+) -> TableReport:
+    """Check a measured table; ten seconds to two minutes, by the format's `eval`; deterministic for a seed."""
+    bsdf = TableBSDF(table, shape, progress)
+    steps = len(INTEGRAL_THETA_DEG) + len(SAMPLER_THETA_DEG) + 2
+    progress(0, steps, "reciprocity")
+    reciprocity, resampling = asymmetry(bsdf, seed)
+    progress(1, steps, "energy")
+    energy = albedos(table)
+    integrals, sampler = [], []
+    for i, theta in enumerate(INTEGRAL_THETA_DEG):
+        progress(2 + i, steps, f"albedo at {theta:g} degrees")
+        integrals.append(check_integral(bsdf, theta, 20.0 + 50 * i, seed))
+    for i, theta in enumerate(SAMPLER_THETA_DEG):
+        progress(2 + len(integrals) + i, steps, f"sampler at {theta:g} degrees")
+        sampler.append(check_sampler(bsdf, theta, 20.0 + 50 * i, seed=seed + i))
+    progress(steps, steps, "checked")
+    failures = _failures(reciprocity, energy, integrals) + sampler_failures(sampler)
+    warnings = _warnings(resampling, energy)
+    return TableReport(
+        reciprocity, resampling, energy, tuple(integrals), tuple(sampler), tuple(warnings), tuple(failures)
+    )
+
+
+def asymmetry(bsdf: TableBSDF, seed: int = 0, pairs: int = 60_000) -> tuple[float, float]:
+    """Share of the reflected light by which f(wi, wo) differs from f(wo, wi), and of all light from the grid's.
+
+    Importance sampled: wo by its cosine, wi by the grid; both within LAST_THETA_DEG.
+    """
+    rng = np.random.default_rng(seed)
+    wo = cosine_hemisphere(rng.random((pairs, 2)))
+    wi = bsdf.sample(wo, rng.random((pairs, 3)))
+    lowest = np.cos(np.radians(LAST_THETA_DEG))
+    used = (np.abs(wi[:, 2]) > lowest) & (wo[:, 2] > lowest)
+    wi, wo = wi[used], wo[used]
+    near = wi[:, 2] > 0
+    gain = (np.abs(wi[:, 2]) / bsdf.pdf(wi, wo))[:, None]
+    f, swapped = bsdf.eval(wi, wo), bsdf.eval(wo[near], wi[near])
+    looked_up = np.stack(half_vector_grid.evaluate(components(wi), components(wo), bsdf.grid), axis=-1)
+    changed = (np.abs(swapped - f[near]) * gain[near]).sum() / max(((swapped + f[near]) / 2 * gain[near]).sum(), 1e-30)
+    return float(changed), float((np.abs(looked_up - f) * gain).sum() / max((f * gain).sum(), 1e-30))
+
+
+def albedos(table: MeasuredTable) -> Furnace:
+    """r + t of a table up to 89 degrees, in one azimuth of an isotropic table, else in four."""
+    phi_deg = PHI_DEG[:1] if table.info.isotropic else PHI_DEG
+    wi = direction(*np.radians(np.meshgrid(THETA_DEG, phi_deg, indexing="ij")))
+    albedo = np.broadcast_to(table.albedo(wi), wi.shape)
+    return Furnace(tuple(map(float, THETA_DEG)), phi_deg, albedo, mean_albedo(albedo))
+
+
+def check_integral(bsdf: TableBSDF, theta_deg: float, phi_deg: float, seed: int = 0) -> IntegralCheck:
+    """The table's own r + t at an incident direction against an adaptive quadrature of its f cos(theta_o)."""
+    wi = direction(np.radians(theta_deg), np.radians(phi_deg))
+
+    def returned(wo: Floats) -> Floats:
+        return np.asarray(bsdf.eval(np.broadcast_to(wi, wo.shape), wo).mean(axis=-1) * np.abs(wo[..., 2]))
+
+    pilot = bsdf.sample(np.broadcast_to(wi, (1 << 15, 3)), np.random.default_rng(seed).random((1 << 15, 3)))
+    quadrature = float(integrate_cells(returned, adapted_cells(pilot), pilot).sum())
+    return IntegralCheck(theta_deg, phi_deg, float(bsdf.sheet.table.albedo(wi).mean()), quadrature)
+
+
+def _failures(reciprocity: float, energy: Furnace, integrals: list[IntegralCheck]) -> list[str]:
+    found = []
+    if reciprocity > RECIPROCITY_LIMIT:
+        found.append(f"swapping wi and wo changes {reciprocity:.0%} of the light: columns mixed up, or not reflection")
+    if max(energy.mean_albedo) > ENERGY_LIMIT:
+        found.append(f"mean albedo {max(energy.mean_albedo):.3f}: light between such walls grows without bound")
+    for one in integrals:
+        if one.deviation > INTEGRAL_LIMIT:
+            found.append(
+                f"r + t is {one.from_table:.4f}, its quadrature {one.quadrature:.4f} at theta {one.theta_deg:g} degrees"
+            )
+    return found
+
+
+def _warnings(resampling: float, energy: Furnace) -> list[str]:
+    found = []
+    albedo, theta, phi = energy.highest
+    if albedo > ENERGY_LIMIT:
+        where = "beyond what was measured well" if theta > LAST_THETA_DEG else "more than arrives"
+        found.append(f"returns {albedo:.3f} of the light at theta {theta:g}, phi {phi:g} degrees: {where}")
+    if resampling > 0.05:
+        found.append(
+            f"the path tracer's grid deviates from the table by {resampling:.0%} of the light: steps or spikes"
+        )
+    return found

@@ -1,0 +1,64 @@
+"""`lambent check` takes documents, models and measured files, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+
+from lambent.materials import check, check_table
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured import half_vector_grid
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.synthetic import Setup, synthesise
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    for module in (check, check_table):
+        monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(check_table, "INTEGRAL_THETA_DEG", (40.0,))
+
+
+def test_a_model_by_name(lambent):
+    outcome = lambent("check", "ward", "--set", "mx=0.1", "--set", "ks=0.2,0.4,0.9", "--json")
+    assert outcome.code == 0
+    mean = outcome.json["furnace"]["mean_albedo"]
+    assert mean[1] / mean[0] == pytest.approx(2) and mean[2] / mean[0] == pytest.approx(4.5)
+
+
+def test_a_model_that_fails(lambent):
+    outcome = lambent("check", "kurt", "--set", "k=4", "--set", "r0=1", "--set", "alpha=1")
+    assert outcome.code == 1 and "without bound" in outcome.out
+
+
+def test_a_measured_file(lambent, tmp_path, monkeypatch):
+    monkeypatch.setattr(half_vector_grid, "ISOTROPIC", half_vector_grid.GridShape(16, 1, 64, 32))
+    setup = Setup((0.0, 30.0, 60.0), step_deg=10, fine_deg=5, noise=0.0, floor=0.0)
+    material = Material(name="m", kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, k=0.3),))
+    write_gonio(tmp_path / "m.txt", synthesise(material, setup))
+    outcome = lambent("check", tmp_path / "m.txt")
+    assert outcome.code == 0 and "swapping wi and wo changes" in outcome.out and outcome.out.endswith("passed\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["wart"], "did you mean 'ward'"),
+        (["ward", "--set", "kss=1"], "did you mean"),
+        (["ward", "--set", "mx=wide"], "NAME=VALUE"),
+        (["ward", "--set", "mx"], "NAME=VALUE"),
+        (["ward", "--set", "mx=0.1,0.2,0.3"], "a number from"),
+        (["ward", "--set", "mx=7"], "from 0.003 to 1"),
+    ],
+)
+def test_nonsense(refused, arguments, complaint):
+    assert complaint in refused("check", *arguments)
+
+
+def test_files_take_no_parameters(refused, tmp_path):
+    Material(kd=0.5).save(tmp_path / "m.json")
+    assert "only models" in refused("check", tmp_path / "m.json", "--set", "kd=1")
+
+
+def test_an_empty_document(refused, tmp_path):
+    (tmp_path / "m.json").write_text("{}")
+    assert "nothing of how it scatters" in refused("check", tmp_path / "m.json")

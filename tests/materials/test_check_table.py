@@ -1,0 +1,85 @@
+"""The check of tables finds what no device explains, and reports what every device has."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from lambent.materials import check_table as module
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.check_table import check_table
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.protocol import TableInfo
+from lambent.materials.measured.table import IntegratedTable
+
+SMALL = GridShape(24, 1, 64, 32)
+GLOSSY = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.2, my=0.2, k=0.5, r0=0.5, alpha=0.2),))
+
+
+class Exact(IntegratedTable):
+    """A table without gaps, from a material document."""
+
+    def __init__(self, material=GLOSSY):
+        self.bsdf = MaterialBSDF(material)
+        self.info = TableInfo("exact", "exact", True, False, 3, "f")
+
+    def eval(self, wi, wo):
+        return np.where((wi[..., 2:] > 0) & (wo[..., 2:] > 0), self.bsdf.eval(wi, wo), 0.0)
+
+    def samples(self, max_count=None):
+        raise NotImplementedError
+
+
+class Asymmetric(Exact):
+    def eval(self, wi, wo):
+        return super().eval(wi, wo) * (1 + self.strength * (wi[..., 2:] - wo[..., 2:]))
+
+
+class FCosTakenForF(Exact):
+    """Its eval lacks a cosine that its albedo has."""
+
+    def eval(self, wi, wo):
+        return super().eval(wi, wo) * np.abs(wo[..., 2:])
+
+    def albedo(self, wi):
+        return Exact().albedo(wi)
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(module, "INTEGRAL_THETA_DEG", (40.0,))
+
+
+def test_a_sound_table_passes_and_the_report_is_json():
+    report = check_table(Exact(), shape=SMALL)
+    assert report.passed and not report.warnings, report
+    assert report.reciprocity_share < 1e-12 and 0 < report.resampling_share < 0.03
+    assert report.integrals[0].deviation < 0.01
+    expected = MaterialBSDF(GLOSSY).albedo(np.array([0, 0, 1.0]), samples=200_000)
+    np.testing.assert_allclose(report.furnace.albedo[0, 0], expected, rtol=0.01)
+    data = json.loads(json.dumps(report.to_json()))
+    assert data["passed"] and np.shape(data["furnace"]["albedo"]) == (24, 1, 3) and len(data["sampler"]) == 1
+
+
+@pytest.mark.parametrize(("strength", "passes"), [(0.1, True), (1.0, False)])
+def test_asymmetry_is_reported_and_only_much_of_it_fails(strength, passes):
+    """Of a matt surface |f - f'| = 2 s |cos_i - cos_o| f, whose mean over both cosine-weighted hemispheres is 4/15."""
+    table = Asymmetric(Material(kd=0.5))
+    table.strength = strength
+    report = check_table(table, shape=SMALL)
+    assert report.reciprocity_share == pytest.approx(2 * strength * 4 / 15, rel=0.05)  # but for the last 6 degrees
+    assert report.passed == passes and any("swapping" in text for text in report.failures) != passes
+
+
+def test_a_table_that_returns_more_than_arrives_fails():
+    report = check_table(Exact(Material(kd=1.1)), shape=SMALL)
+    assert "without bound" in report.failures[0] and "1.1" in report.warnings[0]
+
+
+def test_an_albedo_that_is_not_the_integral_fails():
+    report = check_table(FCosTakenForF(), shape=SMALL)
+    assert any("its quadrature" in text for text in report.failures), report
