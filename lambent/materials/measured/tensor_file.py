@@ -56,7 +56,8 @@ def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
         at += 11 + 8 * dimensions
         dtype = np.dtype(_TYPES[kind])
         end = offset + math.prod(shape) * dtype.itemsize
-        if end > len(content):
+        # A size of 0 makes the product 0 whatever the others are.
+        if end > len(content) or max(shape, default=0) > len(content):
             got, expected = f"shape {shape} at byte {offset}", f"to end by byte {len(content)}"
             raise UserError("tensor lies outside the file", file=path, field=name, got=got, expected=expected)
         tensors[name] = np.frombuffer(content, dtype, math.prod(shape), offset).reshape(shape)

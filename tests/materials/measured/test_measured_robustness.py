@@ -107,6 +107,8 @@ def test_headers_that_promise_too_much(files: dict[str, Path], target: Path) -> 
     rgl = bytearray(files["rgl"].read_bytes())
     for at in range(14, 400, 7):
         attempt(target, bytes(rgl[:at] + b"\xff" * 8 + rgl[at + 8 :]))
+    at = rgl.index(b"ndf") + 3 + 11
+    attempt(target, bytes(rgl[:at] + b"\0" * 8 + b"\xff" * 7 + b"\x7f" + rgl[at + 16 :]))  # nothing, times very much
     attempt(target, b"1000000000\n400 500 600\n" + b"0 " * 100)
     attempt(target, b"1e308 400 500 600 " + b"0 " * 100)
     attempt(target, b"theta_i phi_i theta_o phi_o p\n" + b"0 " * 100000 + b"\n")
