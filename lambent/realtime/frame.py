@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
+from lambent.core.false_colour import LM_PER_W, Range
 from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import hammersley, radical_inverse
@@ -30,7 +31,7 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.shade import Draw, ShadePass
 from lambent.realtime.passes.sky import SkyPass
 from lambent.realtime.passes.smooth import SmoothPass
-from lambent.realtime.passes.tonemap import VIEW_TRANSFORMS, TonemapPass
+from lambent.realtime.passes.tonemap import FALSE_COLOUR, VIEW_TRANSFORMS, TonemapPass
 from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.resources import Layouts, SceneResources
 from lambent.realtime.targets import PassTimer, Targets
@@ -38,7 +39,9 @@ from lambent.store.contract import CameraRecord
 from lambent.store.store import Store
 
 Floats = NDArray[np.float32]
-SHOW = {"full": (1, 1, 1), "diffuse": (1, 0, 0), "specular": (0, 1, 0)}  # weights of diffuse, specular, sky
+LIGHT_MAP = "light map"  # irradiance, in the place of radiance
+# Weights of diffuse, specular, sky, irradiance.
+SHOW = {"full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0), LIGHT_MAP: (0, 0, 0, 1)}
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
 SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
 
@@ -60,7 +63,11 @@ class FrameState:
     exposure_ev : float
         Radiance is multiplied by 2^exposure_ev before the view transform; only the display image knows it.
     view_transform : str
-        filmic, neutral or linear.
+        filmic, neutral, linear, or false-colour: luminance in colours of `scale`.
+    scale : false_colour.Range
+        What the false colours mean, in cd/m^2, or in lx where the light map is shown.
+    near_m : float, optional
+        Nearer things are cut away; by default a ten-thousandth of the scene's size.
     materials : mapping
         Materials that stand in for the store's, by name.
     lookup : str
@@ -68,7 +75,7 @@ class FrameState:
     lookups : mapping
         The same for single objects, by name.
     show : str
-        full, diffuse or specular.
+        full, diffuse, specular, or light map: the irradiance, W/m^2.
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
     antialias : bool
@@ -84,6 +91,8 @@ class FrameState:
     n: int | None = None
     exposure_ev: float = 0.0
     view_transform: str = "filmic"
+    scale: Range = field(default_factory=Range)
+    near_m: float | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
     lookup: str = "auto"
     lookups: Mapping[str, str] = field(default_factory=dict)
@@ -101,6 +110,8 @@ class FrameState:
             raise UserError(
                 "unknown view transform", got=self.view_transform, expected=", ".join(reversed(VIEW_TRANSFORMS))
             )
+        if self.view_transform == FALSE_COLOUR:
+            self.scale.check()
         if self.show not in SHOW:
             raise UserError("unknown part of the light", got=self.show, expected=", ".join(SHOW))
         if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
@@ -122,12 +133,13 @@ class Renderer:
         What the store lacks, in plain words.
     """
 
-    def __init__(self, device: Any, source: Store | BakedScene) -> None:
+    def __init__(self, device: Any, source: Store | BakedScene, beside: Renderer | None = None) -> None:
+        """`beside` draws the same scene on the same device already: what stays on the GPU is shared with it."""
         self.device = device
         self.scene = source if isinstance(source, BakedScene) else read_baked(source)
         self.missing = self.scene.missing
-        self._layouts = Layouts(device)
-        self.resources = SceneResources(device, self.scene, self._layouts)
+        self._layouts = beside._layouts if beside else Layouts(device)
+        self.resources = beside.resources if beside else SceneResources(device, self.scene, self._layouts)
         self._depth, self._shade = DepthPass(device, self._layouts), ShadePass(device, self._layouts)
         self._sky, self._accumulate = SkyPass(device, self._layouts), AccumulatePass(device)
         self._tonemap = TonemapPass(device, self._layouts)
@@ -246,13 +258,14 @@ class Renderer:
             index = np.array([state.accumulate + 1])
             jitter = (float(radical_inverse(index, 2)[0]) - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
         low, high = np.asarray(self.scene.record.bounds)
-        near_m = float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+        near_m = state.near_m or float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
         across, up, forward = image_plane(camera, width, height)
         data = np.zeros((), FRAME_DTYPE)
         data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns
         data["eye"][:3], data["across"][:3], data["up"][:3] = camera.position, across, up
         data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
-        data["show"][:3] = SHOW[state.show]
+        data["show"] = SHOW[state.show]
+        data["scale"] = (state.scale.low, state.scale.high, state.scale.log, LM_PER_W)
         data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
         data["view_transform"] = VIEW_TRANSFORMS[state.view_transform]
         data["exposure"] = 2.0**state.exposure_ev
@@ -277,7 +290,8 @@ class Renderer:
         return calls
 
     def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
-        smooth = state.antialias and state.accumulate is None
+        # Blended false colours would name luminances that are not there.
+        smooth = state.antialias and state.accumulate is None and state.view_transform != FALSE_COLOUR
         edged = self._targets.picture("edged", state.width, state.height) if smooth else None
         shown = target_view if edged is None else edged.create_view()
         self._tonemap.encode(encoder, self._frame_group, radiance, shown, self._timer.writes("tonemap"))

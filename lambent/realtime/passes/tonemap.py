@@ -10,7 +10,8 @@ from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
 
 DISPLAY_FORMAT = "rgba8unorm"
-VIEW_TRANSFORMS = {"linear": 0, "neutral": 1, "filmic": 2}
+FALSE_COLOUR = "false-colour"
+VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}
 
 
 class TonemapPass:

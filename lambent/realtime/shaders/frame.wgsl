@@ -6,11 +6,12 @@ struct Frame {
     across: vec4f,   // the ray of clip position (x, y) is forward + x across + y up
     up: vec4f,
     forward: vec4f,
-    show: vec4f,     // weights of: diffuse, specular, sky, unused
+    show: vec4f,     // weights of: diffuse, specular, sky, irradiance instead of light
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
     exposure: f32,   // factor on radiance, 2^EV
     unused: f32,
+    scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -39,6 +39,6 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     for (var i = 0u; i < LOBES; i++) {
         specular += integrate(i, wo, s);
     }
-    let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular;
+    let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return vec4f(clamp(light, vec3f(0.0), vec3f(HALF_MAX)), 1.0);
 }

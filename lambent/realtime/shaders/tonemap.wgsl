@@ -2,6 +2,7 @@
 
 #include "frame.wgsl"
 #include "screen.wgsl"
+#include "false_colour.wgsl"
 
 @group(1) @binding(0) var radiance: texture_2d<f32>;
 
@@ -30,7 +31,9 @@ fn srgb(c: vec3f) -> vec3f {
 }
 
 @fragment fn tonemap_main(screen: Screen) -> @location(0) vec4f {
-    let light = frame.exposure * textureLoad(radiance, vec2i(screen.position.xy), 0).rgb;
+    let seen = textureLoad(radiance, vec2i(screen.position.xy), 0).rgb;
+    if (frame.view_transform == 3u) { return vec4f(false_colour(seen), 1.0); }
+    let light = frame.exposure * seen;
     var shown = light;
     if (frame.view_transform == 1u) { shown = neutral(light); }
     if (frame.view_transform == 2u) { shown = filmic(light); }

@@ -1,0 +1,152 @@
+"""Luminance in false colour, with a scale of numbers: for people who plan light.
+
+Photometry: cd/m^2 = 179 lm/W times the luminance Y of linear Rec.709 radiance in W/(sr m^2); lx = 179 lm/W times that
+of irradiance in W/m^2. 179 lm/W is the efficacy that Radiance (Ward 1994) gives white light over the visible range;
+spectral radiance weighted by V(lambda) would take 683 lm/W, but the three channels each stand for a broad band.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.colour import luminance
+from lambent.core.errors import UserError
+
+Floats = NDArray[np.floating[Any]]
+
+LM_PER_W = 179.0
+LUMINANCE_UNIT, ILLUMINANCE_UNIT = "cd/m²", "lx"
+# Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
+STOPS = np.array(
+    [
+        (0.11, 0.07, 0.28), (0.16, 0.27, 0.62), (0.12, 0.52, 0.78), (0.09, 0.70, 0.64), (0.30, 0.76, 0.35),
+        (0.71, 0.80, 0.20), (0.96, 0.75, 0.13), (0.94, 0.45, 0.12), (0.78, 0.12, 0.12),
+    ]
+)  # fmt: skip
+BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+LEAST, MOST = 1e-4, 1e9  # cd/m^2 that a range can name
+DECADES = 3.0  # of a logarithmic range that is chosen by the picture
+
+
+@dataclass(frozen=True)
+class Range:
+    """From `low` (dark blue) to `high` (red), in cd/m^2 or lx; below is black, above white."""
+
+    low: float = 1.0
+    high: float = 1000.0
+    log: bool = True
+
+    def check(self) -> None:
+        """`UserError` where no scale can be drawn."""
+        least = LEAST if self.log else 0.0
+        if not (least <= self.low < self.high <= MOST):
+            expected = f"{least:g} <= LOW < HIGH <= {MOST:g}"
+            raise UserError("range of luminance", got=f"{self.low:g}:{self.high:g}", expected=expected)
+
+    def share(self, values: Floats) -> Floats:
+        """Where values stand on the scale: 0 at `low`, 1 at `high`."""
+        if self.log:
+            lowest = math.log(self.low)
+            return np.asarray((np.log(np.maximum(values, 1e-12)) - lowest) / (math.log(self.high) - lowest))
+        return np.asarray((values - self.low) / (self.high - self.low))
+
+    def marks(self) -> list[float]:
+        """Round numbers for the scale, the ends among them where they are round: 1, 2 and 5 of each decade."""
+        if self.log:
+            decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            wide = math.log10(self.high / self.low) > 4
+            digits = (1,) if wide else (1, 2, 5)
+            found = [digit * 10.0**decade for decade in decades for digit in digits]
+        else:
+            rough = (self.high - self.low) / 8
+            step = 10.0 ** math.floor(math.log10(rough))
+            step *= next(m for m in (1, 2, 5, 10) if m * step >= rough)
+            first = math.ceil(self.low / step)
+            found = [step * k for k in range(first, math.floor(self.high / step) + 1)]
+        inside = [x for x in found if self.low * (1 - 1e-9) <= x <= self.high * (1 + 1e-9)]
+        return inside or [self.low, self.high]
+
+
+def photometric(radiance: Floats) -> Floats:
+    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance."""
+    return np.asarray(LM_PER_W * luminance(radiance))
+
+
+def fitting_range(values: Floats, *, log: bool = True) -> Range:
+    """A range of round numbers that holds nearly all of a picture's values (the brightest half percent aside).
+
+    Logarithmic ranges span at most `DECADES` below the high end.
+    """
+    positive = values[np.isfinite(values) & (values > 0)]
+    if not positive.size:
+        return Range(log=log)
+    low, high = np.percentile(positive, (1.0, 99.5))
+    high = _round_up(min(max(float(high), 10 * LEAST), MOST))
+    if not log:
+        return Range(0.0, high, log=False)
+    low = max(float(low), high / 10**DECADES, LEAST)
+    down = 10.0 ** math.floor(math.log10(low))
+    low = max(m * down for m in (1, 2, 5) if m * down <= low * (1 + 1e-9))
+    return Range(low if low < high else high / 10, high)
+
+
+def false_colour(values: Floats, scale: Range) -> Floats:
+    """Encoded colours (..., 3) of luminances (...)."""
+    share = scale.share(values)
+    at = np.clip(share, 0, 1) * (len(STOPS) - 1)
+    colours = np.stack([np.interp(at, np.arange(len(STOPS)), channel) for channel in STOPS.T], axis=-1)
+    colours = np.where((share < 0)[..., None], BELOW, colours)
+    return np.asarray(np.where((share > 1)[..., None], ABOVE, colours))
+
+
+def number(value: float) -> str:
+    """A number of the scale as people write it: three digits, no exponent."""
+    if value <= 0:
+        return "0"
+    return (
+        f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}".rstrip("0").rstrip(".")
+        if value < 100
+        else f"{value:.0f}"
+    )
+
+
+def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE_UNIT) -> NDArray[np.uint8]:
+    """A copy of an encoded picture (H, W, 3) with the scale and its numbers over its right edge."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width = picture.shape[:2]
+    size = max(8, min(18, height // 30, width // 12))
+    font = ImageFont.load_default(size)
+    image = Image.fromarray(picture.copy()).convert("RGB")
+    draw = ImageDraw.Draw(image, "RGBA")
+    labels = [number(value) for value in scale.marks()]
+    wide = max([draw.textlength(text, font) for text in (*labels, unit)])
+    bar, gap = size, size // 2
+    x0, y0, y1 = width - bar - 2 * gap - round(wide) - gap, 2 * size + gap, height - size - gap
+    if y1 - y0 < 2 * size or x0 < 0:
+        return picture
+    draw.rectangle((x0 - gap, 0, width, height), fill=(0, 0, 0, 150))
+    draw.text((x0, gap), unit, font=font, fill=(255, 255, 255, 255))
+    steps = np.linspace(1, 0, y1 - y0)
+    span = scale.low * (scale.high / scale.low) ** steps if scale.log else scale.low + (scale.high - scale.low) * steps
+    colours = (255 * false_colour(span, scale) + 0.5).astype(int)
+    for row, colour in enumerate(colours):
+        draw.line((x0, y0 + row, x0 + bar, y0 + row), fill=(*map(int, colour), 255))
+    last = math.inf
+    for value, text in zip(scale.marks(), labels, strict=True):
+        y = y1 - float(scale.share(np.array(value))) * (y1 - y0)
+        if last - y >= 1.1 * size:  # a number that would touch the one below is left out
+            draw.line((x0 + bar - gap // 2, y, x0 + bar, y), fill=(255, 255, 255, 255))
+            draw.text((x0 + bar + gap, y), text, font=font, fill=(255, 255, 255, 255), anchor="lm")
+            last = y
+    return np.asarray(image, np.uint8)
+
+
+def _round_up(value: float) -> float:
+    down = 10.0 ** math.floor(math.log10(value))
+    return next(m * down for m in (1, 2, 5, 10) if m * down >= value * (1 - 1e-9))
