@@ -27,11 +27,14 @@ from lambent.bake.work import run_tiles, seed_of
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.files import sha256_of
 from lambent.core.progress import Progress, silent
+from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
 from lambent.store.contract import (
     TIMINGS,
     CameraRecord,
     PathRecord,
+    ReflectorPart,
+    ReflectorRecord,
     SceneRecord,
     is_two_sided,
     needs_probe,
@@ -312,7 +315,21 @@ def scene_record_of(scene: Scene) -> SceneRecord:
         materials=dict(scene.materials),
         cameras=tuple(camera(c) for c in scene.cameras),
         paths=tuple(PathRecord(name=p.name, keys=tuple(map(camera, p.keys)), seconds=p.seconds) for p in scene.paths),
+        reflectors=tuple(_reflector_record(r) for r in find_reflectors(scene)),
         exposure_ev=scene.exposure_ev,
         bounds=(low, high),  # type: ignore[arg-type]
         warnings=scene.warnings,
+    )
+
+
+def _reflector_record(r: Reflector) -> ReflectorRecord:
+    return ReflectorRecord(
+        plane=r.plane,
+        outline=tuple((float(x), float(y), float(z)) for x, y, z in r.outline),
+        deviation_m=r.deviation_m,
+        two_sided=r.two_sided,
+        parts=tuple(
+            ReflectorPart(object=part.object, faces=tuple(map(int, part.faces)), area_m2=part.area_m2)
+            for part in r.parts
+        ),
     )

@@ -130,8 +130,23 @@ def inspect_store(file: str, plot: Path | None) -> Facts:
         "is": "store",
         "arrays": {a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()},
         "documents": sorted(store.documents),
+        "reflectors": _reflectors(store),
         "inputs": store.inputs,
     }
+
+
+def _reflectors(store: Any) -> list[str]:
+    """Planar reflectors in words: plane, area, whose they are."""
+    from lambent.store.contract import SCENE, scene_record
+
+    if SCENE not in store.documents:
+        return []
+    said = []
+    for r in scene_record(store).reflectors:
+        *n, d = (round(x, 3) + 0.0 for x in r.plane)
+        area = sum(part.area_m2 for part in r.parts)
+        said.append(f"{area:.2f} m2 of {', '.join(part.object for part in r.parts)}: n {n}, d {d}")
+    return said
 
 
 def inspect_picture(file: str, plot: Path | None) -> Facts:

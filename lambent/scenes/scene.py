@@ -146,6 +146,18 @@ class CameraPath:
 
 
 @dataclass(frozen=True)
+class ReflectorRule:
+    """What the scene says of planar reflectors (scenes.reflectors): objects whose name fits `objects` are or are not.
+
+    `plane` (n, d), n.x + d = 0, stands in for what would be found.
+    """
+
+    objects: str
+    use: bool = True
+    plane: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything a bake needs. `sources` are the files it was read from: a bake hashes them to notice a change."""
 
@@ -162,6 +174,7 @@ class Scene:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
+    reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
 
     @property
     def bounds(self) -> tuple[Array, Array]:

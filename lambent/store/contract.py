@@ -10,6 +10,8 @@
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] with OBJECT left out
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
+    texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures; row 0 is the
+                                           picture's top; the record says how it lies on uv
 
 The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings".
 """
@@ -46,6 +48,13 @@ class ObjectRecord(_Record):
     probe: bool = False  # wants probe/NAME/*
 
 
+class TexturesRecord(_Record):
+    """See scenes.scene.MaterialTextures: PART -> its uv transform; the texels are arrays."""
+
+    parts: dict[str, tuple[Triple, Triple]]
+    cutoff: float = 0.5
+
+
 class CameraRecord(_Record):
     """See scenes.scene.Camera."""
 
@@ -64,6 +73,24 @@ class PathRecord(_Record):
     seconds: float
 
 
+class ReflectorPart(_Record):
+    """What one object has of a planar reflector. `faces` are numbers within the object's range of geometry/faces."""
+
+    object: str
+    faces: tuple[int, ...]
+    area_m2: float
+
+
+class ReflectorRecord(_Record):
+    """A planar reflector, see scenes.reflectors.Reflector: plane (n, d) with n.x + d = 0, convex outline in it."""
+
+    plane: tuple[float, float, float, float]
+    outline: tuple[Triple, ...]
+    deviation_m: float = 0.0
+    two_sided: bool = False
+    parts: tuple[ReflectorPart, ...]
+
+
 class SceneRecord(_Record):
     """What the interactive side needs to know of a scene besides its arrays."""
 
@@ -72,9 +99,11 @@ class SceneRecord(_Record):
     materials: dict[str, Material]
     cameras: tuple[CameraRecord, ...]
     paths: tuple[PathRecord, ...] = ()
+    reflectors: tuple[ReflectorRecord, ...] = ()
     exposure_ev: float = 0.0
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
+    textures: dict[str, TexturesRecord] = {}  # by the material's name
 
 
 def probe_name(object_name: str, part: str) -> str:
@@ -82,14 +111,19 @@ def probe_name(object_name: str, part: str) -> str:
     return f"probe/{object_name}/{part}"
 
 
+def texture_name(material_name: str, part: str) -> str:
+    """Name of a texture's array; `part` is a field of scenes.scene.MaterialTextures."""
+    return f"texture/{material_name}/{part}"
+
+
 def needs_probe(material: Material) -> bool:
     """Whether a surface of this material shows a directional lobe."""
     return any(max(lobe.k) > 0 for lobe in material.lobes)
 
 
-def is_two_sided(material: Material) -> bool:
-    """Whether light on the far side shows on this side, so that both sides need irradiance."""
-    return material.transmits
+def is_two_sided(material: Material, *, masked: bool = False) -> bool:
+    """Whether both sides need irradiance: light of one shows on the other, or, as of cut-out leaves, both are seen."""
+    return material.transmits or masked
 
 
 def scene_record(store: Store) -> SceneRecord:

@@ -133,6 +133,21 @@ class PathSection(Section):
     keys: Annotated[tuple[ViewSection, ...], Field(min_length=2)]
 
 
+class ReflectorSection(Section):
+    """Objects that are, or are not, planar reflectors; see scenes.reflectors."""
+
+    objects: str
+    use: bool = True
+    plane: Plane | None = None
+
+    @field_validator("plane")
+    @classmethod
+    def _plane(cls, plane: Any) -> Any:
+        if plane is not None:
+            _not_zero(plane[:3])
+        return plane
+
+
 class SceneDocument(Section):
     """A whole scene.toml."""
 
@@ -146,6 +161,7 @@ class SceneDocument(Section):
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[PointSection | SpotSection | DirectionalSection, Field(discriminator="kind")], ...] = ()
     cameras: tuple[CameraSection, ...] = ()
+    reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()
 
     @field_validator("geometry", mode="before")

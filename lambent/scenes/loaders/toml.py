@@ -35,6 +35,7 @@ from lambent.scenes.scene import (
     ImageEnvironment,
     Light,
     PointLight,
+    ReflectorRule,
     Scene,
     SceneObject,
     SunSky,
@@ -88,6 +89,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         warnings=tuple(w for p in parts for w in p.warnings),
         probe_planes=planes,
         probe_centres=centres,
+        reflector_rules=_reflector_rules(document, objects, path),
     )
 
 
@@ -187,6 +189,17 @@ def _apply(
             if own_planes is not None:
                 planes[name] = _unit_planes(own_planes)
     return tuple(by_name.values()), centres, planes
+
+
+def _reflector_rules(
+    document: SceneDocument, objects: tuple[SceneObject, ...], path: Path
+) -> tuple[ReflectorRule, ...]:
+    names = [o.name for o in objects]
+    for section in document.reflectors:
+        if not any(fnmatchcase(name, section.objects) for name in names):
+            hint = did_you_mean(section.objects, names) or "see the names with `lambent inspect`"
+            raise UserError("fits no object", file=path, field="reflectors.objects", got=section.objects, hint=hint)
+    return tuple(ReflectorRule(r.objects, r.use, r.plane) for r in document.reflectors)
 
 
 def _unit_planes(planes: Any) -> Any:
