@@ -1,9 +1,10 @@
-"""`lambent render`: stills and films of a store, without a window."""
+"""`lambent render`: stills, films and picture sequences of a store, without a window."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,56 +14,85 @@ from lambent.cli.console import Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
+    from lambent.core.false_colour import Range
     from lambent.core.progress import Progress
     from lambent.store.contract import CameraRecord, SceneRecord
     from lambent.store.store import Store
 
 PATH_TRACER = "path"
-FILM = ".mp4"
 DEFAULT_SPP = {PATH_TRACER: 64, "qmc": 256}
+FALSE_COLOUR = "false-colour"
+VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
+FILM_SUPERSAMPLES = 4  # of the radiance in a picture sequence
 Picture = Callable[["CameraRecord", "Progress"], Any]
 
 
 def command(
     store: Annotated[Path, typer.Argument(help="Folder of a baked store.")],
-    output: Annotated[Path, typer.Option("-o", help="Picture (.png, .exr, .hdr) or film (.mp4).")],
-    camera: Annotated[str | None, typer.Option(help="Camera by name. [default: the first]")] = None,
-    path: Annotated[str | None, typer.Option(help="Camera path by name, for films. [default: the first]")] = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", help="Picture (.png, .exr, .hdr), film (.mp4), or with --path pictures (tour-####.png, .exr)."
+        ),
+    ],
+    camera: Annotated[str | None, typer.Option(help="Camera or saved view by name. [default: the first]")] = None,
+    path: Annotated[
+        str | None, typer.Option(help="Camera path or recorded walk by name, for films. [default: the first]")
+    ] = None,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
     integrator: Annotated[
         str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
     ] = "rings",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
     exposure: Annotated[float | None, typer.Option(help="In EV. [default: the scene's]")] = None,
+    view: Annotated[
+        str, typer.Option(help="How PNG and MP4 show light: filmic, neutral, linear, or false-colour (cd/m2).")
+    ] = "filmic",
+    false_range: Annotated[
+        str | None, typer.Option("--range", help="LOW:HIGH of false-colour, in cd/m2. [default: by the first picture]")
+    ] = None,
+    linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
+    part: Annotated[
+        str, typer.Option("--show", help="full, diffuse, specular, or light-map: irradiance, in lx.")
+    ] = "full",
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     json: Json = False,
 ) -> None:
-    """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through the filmic view transform.
+    """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through a view transform.
 
     Example: lambent render room.store --camera entrance -o entrance.png
     """
-    from lambent.core.film import even_size
+    from lambent.core.film import FILM, SEQUENCES, even_size, sequence_file
     from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
     from lambent.store.contract import scene_record
     from lambent.store.store import Store
+    from lambent.store.views import read_views, with_views
 
     check_writable(output, (*WRITABLE, FILM))
+    scale = parse_range(false_range, log=not linear) if view == FALSE_COLOUR or false_range else None
+    if view not in VIEWS:
+        hint = did_you_mean(view, VIEWS)
+        raise UserError("unknown view transform", field="--view", got=view, expected=", ".join(VIEWS), hint=hint)
     width, height = parse_size(size)
     opened = Store.open(store)
-    record = scene_record(opened)
+    record = with_views(scene_record(opened), read_views(store))
     exposure_ev = record.exposure_ev if exposure is None else exposure
     if not -64 <= exposure_ev <= 64:  # also refuses nan
         raise UserError("exposure is out of range", field="--exposure", got=exposure_ev, expected="-64 to 64 EV")
     film = output.suffix.lower() == FILM
+    row = path is not None and output.suffix.lower() in SEQUENCES
+    if row:
+        sequence_file(output, 1)
     if film:
         width, height = even_size(width, height)
     began = time.perf_counter()
-    views = _views(record, camera, path, fps if film else None)
-    radiance, shown = pictures(opened, width, height, integrator, samples, exposure_ev, scene, film=film)
+    views = _views(record, camera, path, fps if film or row else None)
+    how = Look(exposure_ev, view, scale, part)
+    radiance, shown = pictures(opened, width, height, integrator, samples, how, scene, film=film or row)
     with progress_bar() as progress:
-        if film:
-            _write_film(output, views, shown, (width, height, fps), progress)
+        if film or row:
+            _write_film(output, views, (radiance, shown), (width, height, fps), progress)
         elif output.suffix.lower() == ".png":
             write_shown(output, shown(views[0], progress))
         else:
@@ -85,7 +115,7 @@ def pictures(
     height: int,
     integrator: str,
     samples: int | None,
-    exposure_ev: float,
+    look: Look,
     scene: str | None = None,
     *,
     film: bool = False,
@@ -94,10 +124,9 @@ def pictures(
 
     Of a film the latter is as the window shows it in motion; a still is averaged from many frames.
     """
-    from lambent.core.colour import filmic, srgb_encode
-    from lambent.core.images import to_bytes
-
     if integrator == PATH_TRACER:
+        if look.part != "full":
+            raise UserError("the path tracer shows all light", field="--show", got=look.part, expected="full")
         radiance = _path_traced(store, width, height, samples or DEFAULT_SPP[PATH_TRACER], scene)
     else:
         from lambent.realtime.device import open_device
@@ -111,18 +140,69 @@ def pictures(
 
         def state(camera: CameraRecord) -> FrameState:
             n = samples if integrator != "qmc" else None
-            return FrameState(camera, width, height, integrator=integrator, n=n, exposure_ev=exposure_ev)
+            return FrameState(
+                camera, width, height, integrator=integrator, n=n, exposure_ev=look.exposure_ev,
+                view_transform="filmic" if look.view == FALSE_COLOUR else look.view, show=look.part,
+            )  # fmt: skip
 
         def radiance(camera: CameraRecord, progress: Progress) -> Any:
             if integrator == "qmc":
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
-            return renderer.still_radiance(state(camera))
+            return renderer.still_radiance(state(camera), *((FILM_SUPERSAMPLES,) if film else ()))
 
-        if integrator != "qmc":
+        if integrator != "qmc" and look.view != FALSE_COLOUR:
             show_frame = renderer.display_image if film else renderer.still
             return radiance, lambda camera, progress: show_frame(state(camera))
 
-    return radiance, lambda camera, progress: to_bytes(srgb_encode(filmic(radiance(camera, progress), exposure_ev)))
+    return radiance, lambda camera, progress: look.shown(radiance(camera, progress))
+
+
+def parse_range(text: str | None, *, log: bool) -> Range:
+    """The range of "10:500"; one still to be found, with no extent, where there is no text."""
+    from lambent.core.false_colour import Range
+
+    if text is None:
+        return Range(0.0, 0.0, log)
+    low, _, high = text.partition(":")
+    try:
+        scale = Range(float(low), float(high), log)
+    except ValueError:
+        raise UserError("not a range", field="--range", got=text, expected="LOW:HIGH, as in 10:500") from None
+    scale.check()
+    return scale
+
+
+@dataclass
+class Look:
+    """How radiance becomes a picture; a `scale` without extent is fitted to the first one."""
+
+    exposure_ev: float = 0.0
+    view: str = "filmic"
+    scale: Range | None = None
+    part: str = "full"
+
+    def shown(self, radiance: Any) -> Any:
+        """uint8 (H, W, 3), encoded."""
+        from lambent.core.colour import shown
+        from lambent.core.false_colour import (
+            ILLUMINANCE_UNIT,
+            LUMINANCE_UNIT,
+            Range,
+            false_colour,
+            fitting_range,
+            photometric,
+            with_scale,
+        )
+        from lambent.core.images import to_bytes
+
+        if self.view != FALSE_COLOUR:
+            return to_bytes(shown(radiance, self.view, self.exposure_ev))
+        values = photometric(radiance)
+        scale = self.scale or Range(0.0, 0.0)
+        if scale.low == scale.high:
+            scale = self.scale = fitting_range(values, log=scale.log)
+        unit = ILLUMINANCE_UNIT if self.part == "light-map" else LUMINANCE_UNIT
+        return with_scale(to_bytes(false_colour(values, scale)), scale, unit)
 
 
 def _path_traced(store: Store, width: int, height: int, spp: int, place: str | None) -> Picture:
@@ -141,14 +221,19 @@ def _path_traced(store: Store, width: int, height: int, spp: int, place: str | N
 
 
 def _write_film(
-    output: Path, views: list[CameraRecord], shown: Picture, form: tuple[int, int, int], progress: Progress
+    output: Path,
+    views: list[CameraRecord],
+    pictures: tuple[Picture, Picture],
+    form: tuple[int, int, int],
+    progress: Progress,
 ) -> None:
-    from lambent.core.film import film_writer
+    from lambent.core.film import pictures_writer, radiance_wanted
     from lambent.core.progress import silent
 
-    with film_writer(output, *form) as write:
+    wanted = pictures[0] if radiance_wanted(output) else pictures[1]
+    with pictures_writer(output, *form) as write:
         for index, view in enumerate(views):
-            write(shown(view, silent))
+            write(wanted(view, silent))
             progress(index + 1, len(views), "frames")
 
 
@@ -156,7 +241,7 @@ def _views(record: SceneRecord, camera: str | None, path: str | None, fps: int |
     """One camera, or, with `fps`, those along a path."""
     if fps is None:
         if path is not None:
-            raise UserError("a path makes a film", field="--path", hint="write to a name that ends in .mp4")
+            raise UserError("a path makes a film", field="--path", hint="write to .mp4, .png or .exr")
         return [_named("camera", record.cameras, camera)]
     if camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")

@@ -74,3 +74,23 @@ def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:
     x = np.minimum(x, 1e4)  # the curve is flat there; squares of larger half floats would overflow
     curve = np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0, 1)
     return np.asarray(curve, linear.dtype)
+
+
+def neutral(linear: Floats, exposure_ev: float = 0.0) -> Floats:
+    """Scene radiance to display-linear [0, 1] that keeps colours below .76: Khronos PBR Neutral (2024)."""
+    x = np.maximum(linear, 0) * np.asarray(2.0**exposure_ev, linear.dtype)
+    low = x.min(axis=-1, keepdims=True)
+    x = x - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
+    peak = x.max(axis=-1, keepdims=True)
+    start, room = 0.76, 0.24
+    new_peak = 1 - room * room / (np.maximum(peak, start) + room - start)
+    grey = 1 - 1 / (0.15 * (np.maximum(peak, start) - new_peak) + 1)
+    rolled = x * new_peak / np.maximum(peak, start) * (1 - grey) + new_peak * grey
+    return np.asarray(np.clip(np.where(peak < start, x, rolled), 0, 1), linear.dtype)
+
+
+def shown(radiance: Floats, view: str, exposure_ev: float = 0.0) -> Floats:
+    """What a display gets, encoded, of scene radiance by a view transform: filmic, neutral or linear."""
+    if view == "linear":
+        return srgb_encode(radiance * np.asarray(2.0**exposure_ev, radiance.dtype))
+    return srgb_encode({"filmic": filmic, "neutral": neutral}[view](radiance, exposure_ev))

@@ -20,7 +20,7 @@ from lambent.core.errors import UserError
 Floats = NDArray[np.floating[Any]]
 
 LM_PER_W = 179.0
-LUMINANCE_UNIT, ILLUMINANCE_UNIT = "cd/m²", "lx"
+LUMINANCE_UNIT, ILLUMINANCE_UNIT = "cd/m2", "lx"
 # Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
 STOPS = np.array(
     [

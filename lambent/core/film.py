@@ -1,10 +1,12 @@
-"""Films: H.264 in MP4, frame by frame, whole or not at all."""
+"""Films: H.264 in MP4, frame by frame, whole or not at all; or pictures in a row, each of them whole."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,8 @@ from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
 
 Frame = NDArray[np.uint8]
+FILM = ".mp4"
+SEQUENCES = (".png", ".exr")
 # The matrix is converted and named: players take small films for BT.601 and large ones for BT.709 when it is not.
 _BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
           "-color_trc", "bt709", "-color_range", "tv"]  # fmt: skip
@@ -69,3 +73,54 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
 def even_size(width: int, height: int) -> tuple[int, int]:
     """The size cut to even numbers, at least 2 x 2."""
     return max(2, width - width % 2), max(2, height - height % 2)
+
+
+def sequence_file(path: Path, number: int) -> Path:
+    """Name of a sequence's picture: `number` in the place of the # signs of `path`, else four digits at its end."""
+    stem, signs, rest = re.fullmatch(r"([^#]*)(#*)(.*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
+    if "#" in rest:
+        raise UserError("name of a picture sequence", file=path, expected="one run of # signs, as in tour-####.png")
+    return path.with_name(f"{stem}{number:0{len(signs)}}{rest}{path.suffix}" if signs else
+                          f"{path.stem}-{number:04}{path.suffix}")  # fmt: skip
+
+
+@contextmanager
+def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """Function that takes the next picture of a sequence and writes it whole: see `sequence_file`, from number 1.
+
+    PNG takes (height, width, 3) uint8 encoded, EXR linear radiance. An interruption leaves the pictures before.
+
+    Raises
+    ------
+    UserError
+        Where a picture cannot be written.
+    """
+    from lambent.core.images import check_writable, write_image, write_shown
+
+    check_writable(path, SEQUENCES)
+    sequence_file(path, 1)
+    number = 0
+
+    def write(picture: NDArray[Any]) -> None:
+        nonlocal number
+        number += 1
+        file = sequence_file(path, number)
+        try:
+            (write_image if radiance_wanted(path) else write_shown)(file, picture)
+        except (OSError, RuntimeError) as error:  # OpenEXR raises the latter
+            raise UserError(f"could not be written ({error})", file=file) from error
+
+    yield write
+
+
+@contextmanager
+def pictures_writer(path: Path, width: int, height: int, fps: float) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """`film_writer` or `sequence_writer`, by the suffix."""
+    film = film_writer(path, width, height, fps) if path.suffix.lower() == FILM else sequence_writer(path)
+    with film as write:
+        yield write
+
+
+def radiance_wanted(path: Path) -> bool:
+    """Whether a picture sequence of this name takes radiance instead of what a display shows."""
+    return path.suffix.lower() == ".exr"

@@ -39,7 +39,7 @@ from lambent.store.contract import CameraRecord
 from lambent.store.store import Store
 
 Floats = NDArray[np.float32]
-LIGHT_MAP = "light map"  # irradiance, in the place of radiance
+LIGHT_MAP = "light-map"  # irradiance, in the place of radiance
 # Weights of diffuse, specular, sky, irradiance.
 SHOW = {"full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0), LIGHT_MAP: (0, 0, 0, 1)}
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
@@ -75,7 +75,7 @@ class FrameState:
     lookups : mapping
         The same for single objects, by name.
     show : str
-        full, diffuse, specular, or light map: the irradiance, W/m^2.
+        full, diffuse, specular, or light-map: the irradiance, W/m^2.
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
     antialias : bool

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.images import read_image
+from lambent.core.false_colour import Range, false_colour, photometric
+from lambent.core.images import read_encoded, read_image
 from tests.viewer.small_store import write_small_store
 
 
@@ -43,6 +44,42 @@ def test_film(lambent, store, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
 
+def test_picture_sequences(lambent, store, tmp_path):
+    for name in ("a-##.png", "b.exr"):
+        outcome = lambent(
+            "render", store, "-o", tmp_path / name, "--path", "tour", "--size", "32x24", "--fps", 1, "--json"
+        )
+        assert outcome.code == 0 and outcome.json["frames"] == 3, outcome
+    names = ["a-01.png", "a-02.png", "a-03.png", "b-0001.exr", "b-0002.exr", "b-0003.exr"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == names
+    assert not np.array_equal(read_image(tmp_path / "b-0001.exr"), read_image(tmp_path / "b-0003.exr"))
+
+
+def test_false_colour_names_the_luminance(lambent, store, tmp_path):
+    """The plaster of the small store has a luminance of kd E/pi everywhere: the picture says so in its colour."""
+    file = tmp_path / "a.png"
+    common = ("render", store, "-o", file, "--size", "192x128", "--view", "false-colour", "--show", "diffuse")
+    assert lambent(*common, "--range", "10:1000").code == 0
+    floor = read_encoded(file)[-8, 20]
+    expected = false_colour(photometric(np.array([0.6, 0.55, 0.5]) * 2 / np.pi), Range(10, 1000))
+    np.testing.assert_allclose(floor, expected, atol=0.01)
+    assert lambent(*common, "--linear").code == 0, "the range is found"
+
+
+def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
+    from lambent.store.views import change_views
+    from tests.viewer.small_store import SIDE
+
+    saved = SIDE.model_copy(update={"name": "my/view"})
+    change_views(store, lambda views: views.model_copy(update={"cameras": (saved,)}))
+    for name in ("my/view", "side"):
+        lambent("render", store, "-o", tmp_path / f"{name[-4:]}.png", "--camera", name, "--size", "32x24")
+    assert (tmp_path / "view.png").read_bytes() == (tmp_path / "side.png").read_bytes()
+    (store / "views.json").write_text('{"format": "lambent-views", "version": 7}')
+    assert "views.json: version" in refused("render", store, "-o", tmp_path / "a.png")
+    (store / "views.json").unlink()
+
+
 @pytest.mark.parametrize(
     ("options", "word"),
     [
@@ -50,7 +87,12 @@ def test_film(lambent, store, tmp_path):
         (("-o", "a.png", "--size", "10"), "expected WIDTHxHEIGHT"),
         (("-o", "a.png", "--size", "0x5"), "expected WIDTHxHEIGHT"),
         (("-o", "a.png", "--camera", "sied"), "did you mean 'side'?"),
-        (("-o", "a.png", "--path", "tour"), "a path makes a film"),
+        (("-o", "a.hdr", "--path", "tour"), "a path makes a film"),
+        (("-o", "a#b#.png", "--path", "tour"), "one run of # signs"),
+        (("-o", "a.png", "--view", "falsecolour"), "did you mean 'false-colour'?"),
+        (("-o", "a.png", "--view", "false-colour", "--range", "5"), "expected LOW:HIGH"),
+        (("-o", "a.png", "--view", "false-colour", "--range", "5:1"), "range of luminance"),
+        (("-o", "a.png", "--show", "spec"), "unknown part of the light"),
         (("-o", "a.mp4", "--camera", "side"), "a film needs a path"),
         (("-o", "a.mp4", "--path", "tuor"), "did you mean 'tour'?"),
         (("-o", "a.png", "--integrator", "ring"), "did you mean 'rings'?"),

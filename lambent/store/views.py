@@ -1,0 +1,121 @@
+"""Views and ways that people saved while they looked at a store: `views.json` in its folder, which no bake touches.
+
+It holds cameras and recorded paths by name. Every change reads the file again and replaces it whole, so that two
+windows on one store do not lose each other's views.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from lambent.core.errors import UserError
+from lambent.core.files import read_bytes, write_text
+from lambent.store.camera_paths import TimedPath
+from lambent.store.contract import CameraRecord, SceneRecord
+
+FILE = "views.json"
+LIMIT_BYTES = 64 << 20
+LONGEST_NAME = 80
+
+
+class Views(BaseModel):
+    """What a `views.json` holds."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal["lambent-views"] = "lambent-views"
+    version: Literal[1] = 1
+    cameras: tuple[CameraRecord, ...] = ()
+    paths: tuple[TimedPath, ...] = ()
+
+
+def read_views(folder: Path) -> Views:
+    """The saved views of the store in `folder`; none where there is no file yet.
+
+    Raises
+    ------
+    UserError
+        Where the file is damaged, of another version, or holds cameras that nobody can look through.
+    """
+    path = Path(folder) / FILE
+    if not path.exists():
+        return Views()
+    try:
+        views = Views.model_validate(json.loads(read_bytes(path, LIMIT_BYTES)))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UserError(f"saved views cannot be used ({first['msg']})", file=path, field=where or None) from error
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"saved views cannot be used ({error})", file=path, hint="mend it or delete it") from error
+    _check(views, path)
+    return views
+
+
+def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
+    """Read, change, replace; returns what the file holds then.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be read or written; it is as it was then.
+    """
+    views = change(read_views(folder))
+    try:
+        write_text(Path(folder) / FILE, json.dumps(views.model_dump(mode="json"), indent=1) + "\n")
+    except OSError as error:
+        raise UserError(f"cannot be written ({error.strerror})", file=Path(folder) / FILE) from error
+    return views
+
+
+def with_views(record: SceneRecord, views: Views) -> SceneRecord:
+    """The scene record with the saved views after its own; a name of the scene's hides a saved one."""
+    cameras = {c.name for c in record.cameras}
+    paths = {p.name for p in record.paths}
+    return record.model_copy(
+        update={
+            "cameras": (*record.cameras, *(c for c in views.cameras if c.name not in cameras)),
+            "paths": (*record.paths, *(p for p in views.paths if p.name not in paths)),
+        }
+    )
+
+
+def checked_name(text: str, taken: set[str]) -> str:
+    """The name that was typed, without blanks around it; `UserError` where a view cannot have it."""
+    name = text.strip()
+    if not name:
+        raise UserError("a name is missing", expected="a name like entrance")
+    if len(name) > LONGEST_NAME or not name.isprintable():
+        raise UserError("not a name", got=name, expected=f"at most {LONGEST_NAME} characters that can be shown")
+    if name in taken:
+        raise UserError("the name is taken", got=name)
+    return name
+
+
+def free_name(stem: str, taken: set[str]) -> str:
+    """`stem` with the first number that is not taken."""
+    number = 1
+    while f"{stem} {number}" in taken:
+        number += 1
+    return f"{stem} {number}"
+
+
+def _check(views: Views, path: Path) -> None:
+    for kind, cameras in (("cameras", views.cameras), *((f"paths.{p.name}", p.keys) for p in views.paths)):
+        for camera in cameras:
+            numbers = (*camera.position, *camera.target, *camera.up, camera.fov_y_deg)
+            if not all(map(math.isfinite, numbers)) or not 0 < camera.fov_y_deg < 180:
+                raise UserError("a camera is not finite, or sees no angle", file=path, field=f"{kind}.{camera.name}")
+    for way in views.paths:
+        times = way.times_s
+        if not way.keys or len(times) != len(way.keys):
+            raise UserError("a path needs one time per key", file=path, field=way.name, got=len(times))
+        if times[0] != 0 or times[-1] != way.seconds or any(b <= a for a, b in pairwise(times)):
+            raise UserError("times of a path begin at 0, grow, and end with it", file=path, field=way.name)

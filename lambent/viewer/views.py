@@ -1,0 +1,127 @@
+"""The views and ways that people save while they look at a store, as the window keeps them; see `store.views`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.store.camera_paths import TimedPath
+from lambent.store.contract import CameraRecord, SceneRecord
+from lambent.store.views import Views, change_views, checked_name, free_name, read_views, with_views
+
+
+@dataclass
+class SavedViews:
+    """Saved cameras and paths of one store; every change is on disk at once, or said not to be.
+
+    Attributes
+    ----------
+    scene : SceneRecord
+        Whose names are taken.
+    folder : Path, optional
+        Of the store; without one nothing can be saved.
+    say : callable
+        Shows the user a line.
+    """
+
+    scene: SceneRecord
+    folder: Path | None = None
+    say: Callable[[str], None] = lambda text: None
+    _views: Views = field(default_factory=Views)
+
+    def load(self) -> None:
+        """Read the file, or say why it cannot be used."""
+        if self.folder is None:
+            return
+        try:
+            self._take(read_views(self.folder))
+        except UserError as error:
+            self.say(str(error))
+
+    @property
+    def cameras(self) -> tuple[CameraRecord, ...]:
+        return self._views.cameras
+
+    @property
+    def paths(self) -> tuple[TimedPath, ...]:
+        return self._views.paths
+
+    @property
+    def all(self) -> SceneRecord:
+        """The scene record with what was saved."""
+        return with_views(self.scene, self._views)
+
+    def free_camera_name(self) -> str:
+        return free_name("view", {camera.name for camera in self.all.cameras})
+
+    def free_path_name(self) -> str:
+        return free_name("walk", {path.name for path in self.all.paths})
+
+    def add_camera(self, camera: CameraRecord, name: str) -> CameraRecord | None:
+        """Save where `camera` stands as `name`; None where that cannot be."""
+        named: list[CameraRecord] = []
+
+        def change(views: Views) -> Views:
+            named.append(camera.model_copy(update={"name": self._camera_name(views, name)}))
+            return views.model_copy(update={"cameras": (*views.cameras, named[0])})
+
+        return named[0] if self._change(change) else None
+
+    def rename_camera(self, old: str, new: str) -> bool:
+        def change(views: Views) -> Views:
+            name = self._camera_name(views, new, but=old)
+            renamed = (c.model_copy(update={"name": name}) if c.name == old else c for c in views.cameras)
+            return views.model_copy(update={"cameras": tuple(renamed)})
+
+        return self._change(change)
+
+    def delete_camera(self, name: str) -> bool:
+        return self._change(
+            lambda views: views.model_copy(update={"cameras": tuple(c for c in views.cameras if c.name != name)})
+        )
+
+    def add_path(self, path: TimedPath, name: str) -> TimedPath | None:
+        """Save a path as `name`; None where that cannot be."""
+        named: list[TimedPath] = []
+
+        def change(views: Views) -> Views:
+            named.append(path.model_copy(update={"name": self._path_name(views, name)}))
+            return views.model_copy(update={"paths": (*views.paths, named[0])})
+
+        return named[0] if self._change(change) else None
+
+    def rename_path(self, old: str, new: str) -> bool:
+        def change(views: Views) -> Views:
+            name = self._path_name(views, new, but=old)
+            renamed = (p.model_copy(update={"name": name}) if p.name == old else p for p in views.paths)
+            return views.model_copy(update={"paths": tuple(renamed)})
+
+        return self._change(change)
+
+    def delete_path(self, name: str) -> bool:
+        return self._change(
+            lambda views: views.model_copy(update={"paths": tuple(p for p in views.paths if p.name != name)})
+        )
+
+    def _camera_name(self, views: Views, name: str, but: str | None = None) -> str:
+        return checked_name(name, {c.name for c in (*self.scene.cameras, *views.cameras)} - {but or ""})
+
+    def _path_name(self, views: Views, name: str, but: str | None = None) -> str:
+        return checked_name(name, {p.name for p in (*self.scene.paths, *views.paths)} - {but or ""})
+
+    def _change(self, change: Callable[[Views], Views]) -> bool:
+        """Apply a change to the file; whether it is there now."""
+        if self.folder is None:
+            self.say("not saved: there is no store")
+            return False
+        try:
+            self._take(change_views(self.folder, change))
+        except UserError as error:
+            self.say(f"not saved: {error}")
+            return False
+        return True
+
+    def _take(self, views: Views) -> None:
+        self._views = views
