@@ -16,7 +16,7 @@ from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting import plot
-from lambent.materials.fitting.account import PEAK_SHARE, evaluate
+from lambent.materials.fitting.account import PEAK_SHARE, evaluate, peak_share
 from lambent.materials.fitting.fit import FitResult
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.fitting.metrics import METRICS, Metric
@@ -273,7 +273,7 @@ def _errors(samples: MeasuredSamples, result: FitResult) -> list[str]:
 
 def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:
     """What is known of fits of this kind, and how much of it shows here."""
-    peak = peak_share(samples, result.material)
+    peak = peak_share(samples, evaluate(result.material, samples))
     lines = []
     if metric.name == "cuberoot":
         lines.append(
@@ -296,14 +296,6 @@ def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> l
         "Compare errors, not parameters, between fits: r0, alpha and the coefficient stand in for one another."
     )
     return lines
-
-
-def peak_share(samples: MeasuredSamples, material: Material) -> float:
-    """Sum of p of the model over that of the measurement, over the brightest tuples."""
-    measured = samples.p.mean(axis=1)
-    fitted = (evaluate(material, samples) * np.abs(samples.wo[:, 2:])).mean(axis=1)
-    brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]
-    return float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
 
 
 def _plots(

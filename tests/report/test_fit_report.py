@@ -12,10 +12,13 @@ from lambent.bake import material_preview
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.account import evaluate, peak_share
 from lambent.materials.fitting.fit import fit
+from lambent.materials.fitting.slices import slices
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
-from lambent.report.fit_report import peak_share, report, write_report
+from lambent.report import fit_report
+from lambent.report.fit_report import report, write_report
 from tests.report.test_report_page import check
 
 FEW = {"step_deg": 9.0, "fine_deg": 4.5, "fine_reach_deg": 9.0}
@@ -26,6 +29,12 @@ SHEET = Material(
     kt_d=0.1,
     lobes=(Lobe(k=0.7, mx=0.1, my=0.25, r0=0.1), Lobe(side="transmission", k=0.5, mx=0.1, my=0.25, r0=0.0)),
 )
+
+
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch):
+    monkeypatch.setattr(fit_report, "DPI", 40)
+    monkeypatch.setattr(fit_report, "slices", functools.partial(slices, steps=5))
 
 
 @pytest.fixture
@@ -69,7 +78,7 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
         f"{result.material.lobes[0].mx:.4f}",
         f"{result.errors['log']:.4g}",
         f"{result.lambertian_errors['l1']:.4g}",
-        f"{peak_share(samples, result.material):.2f} of the measured peak",
+        f"{peak_share(samples, evaluate(result.material, samples)):.2f} of the measured peak",
         "undershoot peaks",
     ):
         assert expected in text, expected

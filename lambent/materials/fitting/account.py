@@ -99,11 +99,16 @@ def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> lis
     return lines
 
 
-def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
+def peak_share(samples: MeasuredSamples, model: Floats) -> float:
+    """Sum of p of the model, f (N, C), over that of the measurement, over the brightest PEAK_SHARE of the tuples."""
     measured = samples.p.mean(axis=1)
     fitted = (model * np.abs(samples.wo[:, 2:])).mean(axis=1)
     brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]
-    share = float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
+    return float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
+
+
+def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
+    share = peak_share(samples, model)
     if share >= UNDERSHOOT:
         return []
     hint = "; more lobes or the l2_ngan metric follow it better" if metric != "l2_ngan" else "; try more lobes"
