@@ -15,12 +15,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.chi_square import ChiSquare, adapted_cells, chi_square, integrate_cells
-from lambent.materials.document import RGB, Lobe, Material
+from lambent.materials.document import Material
 
 Floats = NDArray[np.floating]
 
@@ -230,32 +229,3 @@ def check_sampler(
     return SamplerCheck(
         theta_deg, phi_deg, test.p_value, test.pdf_integral, test.rejected_share, quadrature, sampled, error
     )
-
-
-def normalised(material: Material, seed: int = 0) -> Material:
-    """The material with its lobes scaled, per channel, so that no furnace angle (theta up to 89 degrees) exceeds 1.
-
-    The diffuse terms stay, the shapes stay. A material that does not exceed 1 comes back unchanged.
-
-    Raises
-    ------
-    UserError
-        Where the diffuse terms alone exceed 1.
-    """
-    diffuse = np.add(material.kd, material.kt_d)
-    if diffuse.max() > 1:
-        raise UserError("diffuse terms exceed 1 without any lobe", field="kd + kt_d", got=diffuse.tolist())
-    lobes_only = material.model_copy(update={"kd": (0.0, 0.0, 0.0), "kt_d": (0.0, 0.0, 0.0)})
-    highest = furnace(lobes_only, seed=seed).albedo.max(axis=(0, 1))
-    room = 1 - diffuse
-    over = highest > room
-    if not over.any():
-        return material
-    margin = 0.999  # for the furnace's own error
-    scale = np.where(over, margin * room / np.maximum(highest, 1e-12), 1.0)
-    return material.model_copy(update={"lobes": tuple(_scaled(lobe, scale) for lobe in material.lobes)})
-
-
-def _scaled(lobe: Lobe, scale: Floats) -> Lobe:
-    k: RGB = tuple(float(v) for v in np.asarray(lobe.k) * scale)  # type: ignore[assignment]
-    return lobe.model_copy(update={"k": k})

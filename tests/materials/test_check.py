@@ -7,11 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.materials import check as module
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.check import check, check_sampler, furnace, normalised
+from lambent.materials.check import check, check_sampler, furnace
 from lambent.materials.document import Lobe, Material
 
 FOIL = Material(
@@ -97,24 +96,6 @@ def test_furnace_of_a_tight_mirror():
     result = furnace(Material(lobes=(Lobe(mx=0.005, my=0.005, r0=1, alpha=0.5),)))
     below_85 = np.array(result.theta_deg) < 85
     np.testing.assert_allclose(result.albedo[below_85], 1, atol=2e-3)
-
-
-@pytest.mark.parametrize("material", [FOIL, Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))])
-def test_normalised_does_not_exceed_one(material):
-    tame = normalised(material)
-    assert furnace(material).highest[0] > 1 >= furnace(tame).highest[0]
-    assert tame.kd == material.kd and [o.mx for o in tame.lobes] == [o.mx for o in material.lobes]
-    _, theta, phi = furnace(material).highest
-    assert check_sampler(MaterialBSDF(tame), theta, phi, samples=200_000).albedo_quadrature <= 1.002
-
-
-def test_normalised_leaves_alone_what_needs_nothing():
-    assert normalised(BRUSHED) is BRUSHED
-
-
-def test_normalised_refuses_diffuse_terms_over_one():
-    with pytest.raises(UserError, match="kd"):
-        normalised(Material(kd=0.8, kt_d=0.3))
 
 
 def test_the_check_is_deterministic_and_shows_progress(quick):

@@ -1,0 +1,90 @@
+"""A material that returns more light than arrives, made one that does not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats
+from lambent.core.sequences import cosine_hemisphere
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.check import furnace
+from lambent.materials.document import RGB, Lobe, Material
+
+MARGIN = 0.999  # for the furnace's own error
+HALVINGS = 6  # of the interval in which alpha's factor lies
+ROUGHLY = 1 << 11  # samples of the furnace meanwhile; `with_less_k` has the last word
+PAIRS = 20_000
+
+
+def normalised(material: Material, seed: int = 0) -> Material:
+    """The material changed so that no furnace angle (theta up to 89 degrees) exceeds 1.
+
+    Of two remedies the one that changes the looks less (`change`): all k scaled, per channel; or all alpha scaled
+    first, which is what makes lobes exceed 1 towards grazing, and k for what is left. The diffuse terms and slopes
+    stay. A material that does not exceed 1 comes back unchanged.
+
+    Raises
+    ------
+    UserError
+        Where the diffuse terms alone exceed 1.
+    """
+    diffuse = np.add(material.kd, material.kt_d)
+    if diffuse.max() > 1:
+        raise UserError("diffuse terms exceed 1 without any lobe", field="kd + kt_d", got=diffuse.tolist())
+    if not _excess(material, seed).any():
+        return material
+    remedies = with_less_k(material, seed), with_less_k(with_less_alpha(material, seed), seed)
+    return min(remedies, key=lambda remedy: change(material, remedy, seed))
+
+
+def with_less_k(material: Material, seed: int = 0) -> Material:
+    """All k scaled, per channel, as far down as it takes."""
+    highest, room = _highest(material, seed), _room(material)
+    scale = np.where(highest > room, MARGIN * room / np.maximum(highest, 1e-12), 1.0)
+    return material.model_copy(update={"lobes": tuple(_scaled(lobe, scale) for lobe in material.lobes)})
+
+
+def with_less_alpha(material: Material, seed: int = 0) -> Material:
+    """All alpha scaled by the largest factor with which nothing exceeds 1; 0 where none is small enough."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if _excess(_flatter(material, middle), seed, ROUGHLY).any() else (middle, high)
+    return _flatter(material, low)
+
+
+def change(before: Material, after: Material, seed: int = 0) -> float:
+    """RMS over all pairs of the difference between the cube roots of f cos(theta_i), as eyes weigh it; (1/sr)^(1/3)."""
+    rng = np.random.default_rng(seed)
+    wo, bsdf = cosine_hemisphere(rng.random((PAIRS, 2))), MaterialBSDF(before)
+    wi = bsdf.sample(wo, rng.random((PAIRS, 3)))
+    pdf, cos_i = bsdf.pdf(wi, wo), np.abs(wi[:, 2:])
+    roots = [np.cbrt(MaterialBSDF(material).eval(wi, wo) * cos_i) for material in (before, after)]
+    share = np.divide(1.0, pdf, out=np.zeros_like(pdf), where=pdf > 0)
+    return float(np.sqrt((((roots[0] - roots[1]) ** 2).mean(axis=-1) * share).mean()))
+
+
+def _excess(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
+    """By how much (3,) the lobes exceed what the diffuse terms leave; 0 where they do not."""
+    return np.maximum(_highest(material, seed, samples) - _room(material), 0.0)
+
+
+def _highest(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
+    """(3,) largest albedo of the lobes alone."""
+    lobes_only = material.model_copy(update={"kd": (0.0, 0.0, 0.0), "kt_d": (0.0, 0.0, 0.0)})
+    return np.asarray(furnace(lobes_only, seed=seed, samples=samples).albedo.max(axis=(0, 1)))
+
+
+def _room(material: Material) -> Floats:
+    return 1 - np.add(material.kd, material.kt_d)
+
+
+def _flatter(material: Material, factor: float) -> Material:
+    lobes = tuple(lobe.model_copy(update={"alpha": lobe.alpha * factor}) for lobe in material.lobes)
+    return material.model_copy(update={"lobes": lobes})
+
+
+def _scaled(lobe: Lobe, scale: Floats) -> Lobe:
+    k: RGB = tuple(float(v) for v in np.asarray(lobe.k) * scale)  # type: ignore[assignment]
+    return lobe.model_copy(update={"k": k})

@@ -1,0 +1,41 @@
+"""No direction returns more than arrives, and the looks change as little as two remedies allow."""
+
+from __future__ import annotations
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.check import check_sampler, furnace
+from lambent.materials.document import Lobe, Material
+from lambent.materials.normalise import change, normalised, with_less_alpha, with_less_k
+from tests.materials.test_check import BRUSHED, FOIL
+
+STEEP = Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))
+BRIGHT = Material(kd=0.2, lobes=(Lobe(k=2, mx=0.2, my=0.2, r0=0.7, alpha=0.0),))
+
+
+def test_normalised_does_not_exceed_one():
+    material, tame = FOIL, normalised(FOIL)
+    assert furnace(material).highest[0] > 1 >= furnace(tame).highest[0]
+    assert all(now.alpha < before.alpha for now, before in zip(tame.lobes, material.lobes, strict=True))
+    assert tame.kd == material.kd and [o.mx for o in tame.lobes] == [o.mx for o in material.lobes]
+    _, theta, phi = furnace(material).highest
+    assert check_sampler(MaterialBSDF(tame), theta, phi, samples=200_000).albedo_quadrature <= 1.002
+
+
+def test_alpha_is_lowered_where_it_is_to_blame_and_k_where_it_is():
+    less_alpha, less_k = with_less_alpha(STEEP), with_less_k(STEEP)
+    assert less_alpha.lobes[0].k == STEEP.lobes[0].k and 0 < less_alpha.lobes[0].alpha < 1
+    assert change(STEEP, less_alpha) < 0.7 * change(STEEP, less_k)
+    assert normalised(BRIGHT).lobes[0].alpha == 0 and normalised(BRIGHT).lobes[0].k[0] < 1.3
+    assert change(STEEP, STEEP) == 0
+
+
+def test_normalised_leaves_alone_what_needs_nothing():
+    assert normalised(BRUSHED) is BRUSHED
+
+
+def test_normalised_refuses_diffuse_terms_over_one():
+    with pytest.raises(UserError, match="kd"):
+        normalised(Material(kd=0.8, kt_d=0.3))
