@@ -12,6 +12,7 @@ import logging
 import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from lambent.core.files import sha256_of
 from lambent.core.progress import Progress, silent
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
+from lambent.scenes.textures import bounded
 from lambent.store.contract import (
     TIMINGS,
     CameraRecord,
@@ -42,6 +44,7 @@ from lambent.store.contract import (
     write_scene_record,
 )
 from lambent.store.store import Store
+from lambent.store.textures import texture_records, write_textures
 
 Array = NDArray[np.floating]
 KINDS = ("geometry", "light_map", "environment", "probe")
@@ -115,6 +118,7 @@ class _Bake:
     def __init__(self, scene: Scene, path: Path, quality: Quality, resume: bool, progress: Progress, seed: int) -> None:
         if not scene.objects:
             raise UserError("scene has no objects", field=scene.name)
+        scene = replace(scene, textures=bounded(scene.textures))
         self.scene, self.quality, self.progress, self.seed = scene, quality, progress, seed
         existing = Store.open(path) if (Path(path) / "manifest.json").exists() else None
         changes = changed_inputs(existing, scene) if existing else []
@@ -150,7 +154,7 @@ class _Bake:
         return name in self.store and self.store.artefact(name).key == key
 
     def geometry(self) -> None:
-        """Split meshes with second coordinates, and the scene record."""
+        """Split meshes with second coordinates, the pictures on them, and the scene record."""
         names = ("positions", "normals", "tangents", "uv", "uv2", "faces")
         if not all(self._current(f"geometry/{name}", self.geometry_key) for name in names):
             self._forget_times("geometry")
@@ -159,6 +163,7 @@ class _Bake:
                 meta = {"light_map_size": [atlas.width, atlas.height]}
                 for name, array in atlases.merged(atlas).items():
                     self.store.put(f"geometry/{name}", "geometry", array, key=self.geometry_key, meta=meta)
+        write_textures(self.store, self.scene.textures)
         write_scene_record(self.store, scene_record_of(self.scene))
 
     def _forget_times(self, name: str) -> None:
@@ -189,7 +194,7 @@ class _Bake:
 
     def light_map(self) -> None:
         sides = ["irradiance"]
-        if any(is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects):
+        if any(self._two_sided):
             sides.append("irradiance_back")
         if all(self._current(f"light_map/{side}", self.irradiance_key) for side in sides):
             return
@@ -264,8 +269,14 @@ class _Bake:
         return self._sides[sign]
 
     def _two_sided_faces(self) -> NDArray[np.bool_]:
-        two_sided = [is_two_sided(self.scene.materials[o.material]) for o in self.scene.objects]
-        return np.repeat(two_sided, [len(o.mesh.faces) for o in self.scene.objects])
+        return np.repeat(self._two_sided, [len(o.mesh.faces) for o in self.scene.objects])
+
+    @cached_property
+    def _two_sided(self) -> list[bool]:
+        """By object."""
+        masked = {name for name, textures in self.scene.textures.items() if textures.opacity}
+        materials = self.scene.materials
+        return [is_two_sided(materials[o.material], masked=o.material in masked) for o in self.scene.objects]
 
     def probes(self) -> None:
         wanted = [o.name for o in self.scene.objects if needs_probe(self.scene.materials[o.material])]
@@ -319,6 +330,7 @@ def scene_record_of(scene: Scene) -> SceneRecord:
         exposure_ev=scene.exposure_ev,
         bounds=(low, high),  # type: ignore[arg-type]
         warnings=scene.warnings,
+        textures=texture_records(scene.textures),
     )
 
 

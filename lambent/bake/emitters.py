@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake import paths
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.core.colour import luminance
 from lambent.core.frames import normalize
@@ -36,7 +37,7 @@ def balance_emitters(builder: SceneBuilder) -> None:
     si = dr.zeros(mi.SurfaceInteraction3f, width)
     si.p = dr.gather(mi.Point3f, mi.Point3f(position.T.astype(np.float32)), at)
     si.n = mi.Normal3f(dr.gather(mi.Vector3f, mi.Vector3f(normal.T.astype(np.float32)), at))
-    ds, value = scene.sample_emitter_direction(si, sampler.next_2d(), True)
+    ds, value = paths.sample_emitter(scene, si, sampler.next_2d(), mi.Bool(True), paths.has_holes(scene))
     value *= dr.maximum(dr.dot(ds.d, si.n), 0.0)
     brought = luminance(np.nan_to_num(np.array(value).T, posinf=0.0))
     chosen = np.array(dr.reinterpret_array(mi.UInt32, ds.emitter))

@@ -12,6 +12,7 @@ import numpy as np
 
 from lambent.core.files import sha256_of
 from lambent.scenes.scene import Environment, ImageEnvironment, Scene
+from lambent.scenes.textures import digest, parts
 
 REVISION = {
     "geometry": 2,
@@ -48,8 +49,13 @@ def geometry_parts(scene: Scene) -> list[object]:
 
 
 def material_parts(scene: Scene) -> object:
-    """What the materials do to light, by object: neither their names nor their provenance."""
-    look = {n: m.model_dump(mode="json", exclude={"name", "provenance"}) for n, m in scene.materials.items()}
+    """What the materials and their pictures do to light, by object: neither their names nor their provenance."""
+    look: dict[str, object] = {
+        n: m.model_dump(mode="json", exclude={"name", "provenance"}) for n, m in scene.materials.items()
+    }
+    for name, textures in scene.textures.items():
+        pictures = {part: digest(texture) for part, texture in parts(textures).items()}
+        look[name] = [look.get(name), pictures, textures.cutoff]
     return [(o.name, look[o.material]) for o in scene.objects]
 
 

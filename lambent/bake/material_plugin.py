@@ -9,30 +9,43 @@ cosine. A material is a thin two-sided sheet without refraction, so radiance and
 Brushing direction: if the shape has a mesh attribute `vertex_tangent` (3 floats, world space, need not be exactly
 perpendicular to the normal), t is its projection onto the shading plane and b = n x t. Without it, t is the s axis of
 `si.sh_frame`, which Mitsuba derives from the uv's (dp/du), or arbitrarily for a mesh that has none.
-Isotropic materials never look.
+Isotropic materials without a normal map never look.
+
+Where a texture says that there is no surface, `eval_null_transmission` is 1 and the flag Null is set: `bake.paths` goes
+on there. Mitsuba's own integrators do not: to them such a surface is whole.
 """
 
 from __future__ import annotations
 
 import functools
 import json
+from dataclasses import dataclass
 from typing import Any
 
 from lambent.bake.engine import engine
 from lambent.materials import bsdf
 from lambent.materials.document import Material, material_from
+from lambent.scenes.scene import MaterialTextures
 
 PLUGIN = "lambent_material"
 TANGENT_ATTRIBUTE = "vertex_tangent"
+DIFFUSE_ATTRIBUTE = "diffuse"  # of the BSDF: the texture that multiplies kd and kt_d
 
 
-def material_dict(material: Material, *, diffuse: bool = True, lobes: bool = True) -> dict[str, Any]:
+def material_dict(
+    material: Material, textures: MaterialTextures | None = None, *, diffuse: bool = True, lobes: bool = True
+) -> dict[str, Any]:
     """The dictionary for `mi.load_dict`; `diffuse` and `lobes` switch the two parts of the material.
 
-    Surfaces that scatter light alike have equal dictionaries, whatever their materials' names.
+    Surfaces without textures that scatter light alike have equal dictionaries, whatever their materials' names.
     """
     scattering = _without(material, diffuse=diffuse, lobes=lobes)
-    return {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
+    result = {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
+    if textures is not None:
+        from lambent.bake.textured import textures_dict  # imports Mitsuba, whose variant is set by now
+
+        result |= textures_dict(textures)
+    return result
 
 
 def register_material_plugin() -> None:
@@ -46,29 +59,34 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
+    from lambent.bake.textured import SurfaceTextures
+
     class MaterialBSDF(mi.BSDF):  # type: ignore[misc, name-defined]
         """Diffuse terms and lobes; component i of Mitsuba is component i of `bsdf.selection`."""
 
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
             self.material = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
+            self.textures = SurfaceTextures(props)
             self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
+            self.framed = "normal" in self.textures or (self.anisotropic and "direction" in self.textures)
             names = _component_names(self.material)
             self.kinds = [getattr(mi.BSDFFlags, kind) for kind, *_ in names]
             self.m_components = [_flags(mi, name) for name in names]
             self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
+            if "opacity" in self.textures:
+                self.m_flags |= int(mi.BSDFFlags.Null)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            material = self._enabled(ctx)
-            tangent = brushing_angle(si, active, self.anisotropic)
-            wo = turned(si.wi, tangent)
+            material, frame = self._enabled(ctx, si, active), self._frame(si, active)
+            wo = frame.to_local(si.wi)
             wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, dr)
             density = bsdf.pdf(wi, wo, material, dr)
-            active &= density > 0
+            bs = mi.BSDFSample3f()
+            bs.wo = mi.Vector3f(frame.to_world(mi.Vector3f(*wi)))
+            active &= (density > 0) & self._is_possible(bs.wo, wi)
             value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
 
-            bs = mi.BSDFSample3f()
-            bs.wo = mi.Vector3f(turned(wi, (tangent[0], -tangent[1])))
             bs.pdf = dr.select(active, density, 0.0)
             bs.eta = 1.0
             bs.sampled_component, bs.sampled_type = self._component(sample1, wo, material)
@@ -81,24 +99,43 @@ def _register(variant: str) -> None:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            material = self._enabled(ctx)
-            tangent = brushing_angle(si, active, self.anisotropic)
-            viewer, light = turned(si.wi, tangent), turned(wo, tangent)
+            material, frame = self._enabled(ctx, si, active), self._frame(si, active)
+            viewer, light = frame.to_local(si.wi), frame.to_local(wo)
             value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
             density = bsdf.pdf(light, viewer, material, dr)
+            active &= self._is_possible(wo, light)
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
             seen = bsdf.under_fresnel(dr.abs(si.wi.z), dr) if self.material.kd_coupled else 1.0
-            return dr.select(active, mi.Color3f(self.material.kd) * seen, 0.0)
+            kd = mi.Color3f(self.material.kd) * self.textures.diffuse(si, active)
+            return dr.select(active, kd * seen, 0.0)
+
+        def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
+            return dr.select(self.textures.is_hole(si, active), mi.Color3f(1.0), mi.Color3f(0.0))
+
+        def has_attribute(self, name: str, active: Any = True) -> Any:
+            return mi.Bool(name == DIFFUSE_ATTRIBUTE)
+
+        def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
+            """The diffuse texture, whatever the coefficients it multiplies."""
+            return self.textures.diffuse(si, active)
 
         def to_string(self) -> str:
             return f"{PLUGIN}[{self.material.model_dump_json()}]"
 
-        def _enabled(self, ctx: Any) -> Material:
-            """The material with the components that `ctx` leaves out at coefficient zero."""
+        def _enabled(self, ctx: Any, si: Any, active: Any) -> Material:
+            """The material at `si` with the components that `ctx` leaves out at coefficient zero."""
             on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
-            return self.material if all(on) else _masked(self.material, on)
+            return self.textures.material(self.material if all(on) else _masked(self.material, on), si, active)
+
+        def _frame(self, si: Any, active: Any) -> Any:
+            tangent = brushing_angle(si, active, self.anisotropic or self.framed)
+            return self.textures.frame(tangent, si, active) if self.framed else Turned(*tangent)
+
+        def _is_possible(self, wi: Any, in_frame: Any) -> Any:
+            """False for light from behind the surface that a bent normal would let in."""
+            return wi.z * in_frame[2] > 0 if "normal" in self.textures else mi.Bool(True)
 
         def _component(self, sample1: Any, wo: Any, material: Material) -> tuple[Any, Any]:
             """Index and flags of the component that `bsdf.sample` chose."""
@@ -127,10 +164,18 @@ def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
     return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
 
 
-def turned(w: Any, angle: tuple[Any, Any]) -> tuple[Any, Any, Any]:
-    """Components of `w` in a frame turned about n by the angle of this cosine and sine."""
-    c, s = angle
-    return c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]
+@dataclass(frozen=True)
+class Turned:
+    """A frame turned about n by the angle of this cosine and sine; its methods are those of mi.Frame3f."""
+
+    c: Any
+    s: Any
+
+    def to_local(self, w: Any) -> tuple[Any, Any, Any]:
+        return self.c * w[0] + self.s * w[1], self.c * w[1] - self.s * w[0], w[2]
+
+    def to_world(self, w: Any) -> tuple[Any, Any, Any]:
+        return self.c * w[0] - self.s * w[1], self.c * w[1] + self.s * w[0], w[2]
 
 
 def _without(material: Material, *, diffuse: bool, lobes: bool) -> Material:

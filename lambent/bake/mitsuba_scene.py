@@ -47,13 +47,14 @@ class SceneBuilder:
         register_material_plugin()
         self.scene = scene
         # Equal materials share a BSDF: each one costs every kernel a function of its own.
-        bsdfs: dict[str, Any] = {}
+        bsdfs: dict[object, Any] = {}
         self.meshes = {}
         for o in scene.objects:
-            wanted = material_dict(scene.materials[o.material], diffuse=diffuse)
-            if wanted["material"] not in bsdfs:
-                bsdfs[wanted["material"]] = mi.load_dict(wanted)
-            self.meshes[o.name] = mesh_of(o, bsdfs[wanted["material"]], (uv2 or {}).get(o.name))
+            material, textures = scene.materials[o.material], scene.textures.get(o.material)
+            look = (material_dict(material, diffuse=diffuse)["material"], textures and o.material)
+            if look not in bsdfs:
+                bsdfs[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse))
+            self.meshes[o.name] = mesh_of(o, bsdfs[look], (uv2 or {}).get(o.name))
         self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
         self._environment = mi.load_dict(environment_dict(scene.environment)) if scene.environment else None
 

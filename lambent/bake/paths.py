@@ -2,6 +2,9 @@
 
 Multiple importance sampling between emitter sampling and BSDF sampling (Veach 1997, balance heuristic), Russian
 roulette from the second bounce on. The path starts at a vertex the caller has sampled, of whose density it tells.
+
+Where a texture says that there is no surface (`eval_null_transmission` of the BSDF), rays go on as if nothing were
+there, those to emitters too. An emitter is sampled as if it had no holes.
 """
 
 from __future__ import annotations
@@ -48,7 +51,7 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     """
     return _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
-        mi.Bool(start.direct), max_depth, cache or _nothing,
+        mi.Bool(start.direct), max_depth, cache or _nothing, has_holes(scene),
     )  # fmt: skip
 
 
@@ -56,8 +59,59 @@ def _nothing(si: Any, active: Any) -> Any:
     return mi.Color3f(0.0)
 
 
+def has_holes(scene: Any) -> bool:
+    """Whether a shape of the scene has holes; where none has, nothing is spent on looking for them."""
+    return any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) for shape in scene.shapes())
+
+
+def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
+    """What a ray meets behind all holes; `si.t` counts from the last of them. `holes` is `has_holes(scene)`."""
+    if not holes:
+        return scene.ray_intersect(ray, active)
+    return _behind_holes(scene, mi.Ray3f(ray), mi.Bool(active))
+
+
+def _is_hole(si: Any, active: Any) -> Any:
+    found = active & si.is_valid()
+    return found & (si.bsdf().eval_null_transmission(si, found)[0] > 0.5)
+
+
 @dr.syntax
-def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache):  # type: ignore[no-untyped-def]
+def _behind_holes(scene, ray, active):  # type: ignore[no-untyped-def]
+    si = scene.ray_intersect(ray, active)
+    again = _is_hole(si, active)
+    while again:
+        ray = si.spawn_ray(ray.d)
+        si = scene.ray_intersect(ray, again)
+        again = _is_hole(si, again)
+    return si
+
+
+def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tuple[Any, Any]:
+    """Mitsuba's `sample_emitter_direction`: DirectionSample3f and what arrives over its density, 0 in shadow."""
+    if not holes:
+        return scene.sample_emitter_direction(si, u, True, active)  # type: ignore[no-any-return]
+    ds, value = scene.sample_emitter_direction(si, u, False, active)
+    lit = active & (ds.pdf > 0)
+    lit &= ~_blocked(scene, si.spawn_ray_to(ds.p), mi.Point3f(ds.p), mi.Bool(lit))
+    return ds, dr.select(lit, value, 0.0)
+
+
+@dr.syntax
+def _blocked(scene, ray, target, active):  # type: ignore[no-untyped-def]
+    si = scene.ray_intersect(ray, active)
+    blocked = active & si.is_valid()
+    again = _is_hole(si, active)
+    while again:
+        ray = si.spawn_ray_to(target)
+        si = scene.ray_intersect(ray, again)
+        blocked = si.is_valid()
+        again = _is_hole(si, again)
+    return blocked
+
+
+@dr.syntax
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
     result = dr.zeros(mi.Color3f, width)
     throughput = dr.ones(mi.Color3f, width)
@@ -65,7 +119,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache):  # type:
     active = dr.full(mi.Bool, True, width)
     ctx = mi.BSDFContext()
     while active:
-        si = scene.ray_intersect(ray, active)
+        si = intersect(scene, ray, active, holes)
         ds = mi.DirectionSample3f(scene, si, origin)
         emitter = si.emitter(scene)
         pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
@@ -76,7 +130,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache):  # type:
 
         bsdf = si.bsdf(ray)
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, value = scene.sample_emitter_direction(si, sampler.next_2d(lit), True, lit)
+        ds, value = sample_emitter(scene, si, sampler.next_2d(lit), lit, holes)
         lit &= ds.pdf > 0
         wo = si.to_local(ds.d)
         f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
@@ -129,7 +183,7 @@ def irradiance(
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = si.spawn_ray(si.to_world(local))
     arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth, cache)
-    ds, value = scene.sample_emitter_direction(si, u_emitter, True)
+    ds, value = sample_emitter(scene, si, u_emitter, mi.Bool(True), has_holes(scene))
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake import paths
+from lambent.bake.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
@@ -41,6 +42,7 @@ class LightMapCache:
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
         self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
         self._transmitted = mi.Color3f(np.array([m.kt_d for m in materials], np.float32).T / np.float32(np.pi))
+        self._textured = any(t.diffuse for t in builder.scene.textures.values())
         self._front = _texture(irradiance)
         self._back = _texture(irradiance_back) if irradiance_back is not None else None
 
@@ -56,7 +58,8 @@ class LightMapCache:
         coupled = dr.gather(mi.Bool, self._coupled, number, active)
         reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
         this_side, other_side = dr.select(outside, front, back), dr.select(outside, back, front)
-        return reflected * this_side + transmitted * other_side
+        light = reflected * this_side + transmitted * other_side
+        return light * si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active) if self._textured else light
 
 
 def _texture(image: Array) -> Any:
@@ -139,8 +142,9 @@ def _geometry(scene: Any, centre: Array, n: int) -> tuple[NDArray[np.float32], N
     """Distance and normal at the texels' centres."""
     w = normalize(face_directions(n)).reshape(-1, 3).T.astype(np.float32)
     direction = mi.Vector3f(np.ascontiguousarray(w))
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(*map(float, centre)), direction), mi.RayFlags.Minimal, True)
-    distance = dr.select(si.is_valid(), dr.minimum(si.t, FAR), FAR)
+    origin = mi.Point3f(*map(float, centre))
+    si = paths.intersect(scene, mi.Ray3f(origin, direction), mi.Bool(True), paths.has_holes(scene))
+    distance = dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - origin), FAR), FAR)
     normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
     normal = dr.select(si.is_valid(), normal, -direction)
     return np.array(distance).reshape(6, n, n), np.array(mi.Vector3f(normal)).T.reshape(6, n, n, 3).astype(np.float32)

@@ -34,8 +34,9 @@ class SolidTest:
     """Tells points within closed, opaque objects, by the inner sides their rays meet."""
 
     def __init__(self, builder: SceneBuilder, scene: Any) -> None:
-        materials = builder.scene.materials
-        solid = [is_closed(o.mesh) and not materials[o.material].transmits for o in builder.scene.objects]
+        materials, textures = builder.scene.materials, builder.scene.textures
+        open_ = {n for n, m in materials.items() if m.transmits} | {n for n, t in textures.items() if t.opacity}
+        solid = [is_closed(o.mesh) and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.engine import engine
-from lambent.bake.material_plugin import brushing_angle, turned
+from lambent.bake.material_plugin import Turned, brushing_angle
 from lambent.core.progress import Progress, silent
 from lambent.materials.measured import half_vector_grid
 from lambent.materials.measured.half_vector_grid import GridOps, GridShape, HalfVectorGrid, grid_of
@@ -84,7 +84,7 @@ def _register(variant: str) -> None:
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             angle = brushing_angle(si, active, self.anisotropic)
-            wo = turned(si.wi, angle)
+            wo = Turned(*angle).to_local(si.wi)
             wi = half_vector_grid.sample(wo, sample1, sample2.x, sample2.y, self.grid, ops)
             density = half_vector_grid.pdf(wi, wo, self.grid, ops)
             across = wi[2] * wo[2] < 0
@@ -92,7 +92,7 @@ def _register(variant: str) -> None:
             value = mi.Color3f(half_vector_grid.evaluate(wi, wo, self.grid, ops))
 
             bs = mi.BSDFSample3f()
-            bs.wo = mi.Vector3f(turned(wi, (angle[0], -angle[1])))
+            bs.wo = mi.Vector3f(Turned(*angle).to_world(wi))
             bs.pdf = dr.select(active, density, 0.0)
             bs.eta = 1.0
             bs.sampled_component = dr.select(across, mi.UInt32(1), mi.UInt32(0))
@@ -107,7 +107,7 @@ def _register(variant: str) -> None:
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             angle = brushing_angle(si, active, self.anisotropic)
-            viewer, light = turned(si.wi, angle), turned(wo, angle)
+            viewer, light = Turned(*angle).to_local(si.wi), Turned(*angle).to_local(wo)
             active &= self._enabled(ctx, viewer[2] * light[2] < 0)
             value = mi.Color3f(half_vector_grid.evaluate(light, viewer, self.grid, ops)) * dr.abs(light[2])
             density = half_vector_grid.pdf(light, viewer, self.grid, ops)

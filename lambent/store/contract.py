@@ -10,8 +10,8 @@
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] with OBJECT left out
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
-    texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures; row 0 is the
-                                           picture's top; the record says how it lies on uv
+    texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
+                                           row 0 is the top; the record says how it lies on uv
 
 The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings".
 """

@@ -1,0 +1,101 @@
+"""Pictures on surfaces as arrays: what is mixed when texels are averaged, and how a large picture becomes a small one.
+
+Texels are averaged as quantities that averages of which mean something: normals as slopes, directions, which have no
+sign, as the double of their angle. The path tracer interpolates the same quantities as the renderer.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.scenes.scene import MaterialTextures, Texture
+
+Floats = NDArray[np.floating]
+CHANNELS: Mapping[str, int] = {
+    "diffuse": 3, "specular": 3, "roughness": 1, "normal": 3, "direction": 2, "opacity": 1,
+}  # fmt: skip
+SIDE_MAX = 2048  # texels; larger pictures are halved until they fit
+STEEPEST = 8.0  # slope: normals that lean further, or below the surface, lean so far
+
+
+def parts(textures: MaterialTextures) -> dict[str, Texture]:
+    """The textures that are there, by the name of their field."""
+    found = {name: getattr(textures, name) for name in CHANNELS}
+    return {name: texture for name, texture in found.items() if texture is not None}
+
+
+def slopes(normals: Floats) -> NDArray[np.float32]:
+    """(..., 2) slopes n_t/n_n and n_b/n_n of normals (..., 3), which need not be unit."""
+    n = np.asarray(normals, np.float32)
+    across = np.abs(n[..., :2]).max(axis=-1)
+    return np.asarray(n[..., :2] / np.maximum(n[..., 2], np.maximum(across / STEEPEST, 1e-6))[..., None])
+
+
+def doubled_angle(directions: Floats) -> NDArray[np.float32]:
+    """(..., 2) cosine and sine of twice the angle of (cosine, sine) (..., 2): t and -t brush alike."""
+    c, s = np.moveaxis(np.asarray(directions, np.float32), -1, 0)
+    square = np.maximum(c * c + s * s, 1e-12)
+    return np.stack([(c * c - s * s) / square, 2 * c * s / square], axis=-1)
+
+
+def halved(texels: Floats) -> Floats:
+    """The next smaller picture (max(1, H//2), max(1, W//2), C): means of equal areas, also where a side is odd."""
+    return _halved_along(_halved_along(texels, 0), 1)
+
+
+def _halved_along(texels: Floats, axis: int) -> Floats:
+    x = np.moveaxis(texels, axis, 0)
+    n, m = len(x), len(x) // 2
+    if n == 1:
+        return texels
+    if n % 2 == 0:
+        mean = (x[0::2] + x[1::2]) * np.float32(0.5)
+    else:  # each covers 2 + 1/m texels
+        i = np.arange(m, dtype=np.float32)[:, None, None]
+        mean = ((m - i) * x[0:-1:2] + m * x[1::2] + (i + 1) * x[2::2]) / np.float32(n)
+    return np.asarray(np.moveaxis(mean, 0, axis))
+
+
+def bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
+    """Textures, checked, of at most SIDE_MAX texels per side; by material, as they came."""
+    smaller: dict[int, Texture] = {}  # one picture on many materials stays one
+    found = {}
+    for material, of_material in textures.items():
+        changed = {}
+        for part, texture in parts(of_material).items():
+            _check(material, part, texture)
+            if max(texture.texels.shape[:2]) > SIDE_MAX:
+                if id(texture.texels) not in smaller:
+                    smaller[id(texture.texels)] = replace(texture, texels=_reduced(texture.texels))
+                changed[part] = replace(texture, texels=smaller[id(texture.texels)].texels)
+        found[material] = replace(of_material, **changed)
+    return found
+
+
+def _reduced(texels: Floats) -> Floats:
+    values = texels.astype(np.float32)
+    while max(values.shape[:2]) > SIDE_MAX:
+        values = halved(values)
+    return values.astype(np.float16)
+
+
+def _check(material: str, part: str, texture: Texture) -> None:
+    shape = texture.texels.shape
+    field = f"{part} texture of {material}"
+    if len(shape) != 3 or shape[2] != CHANNELS[part] or 0 in shape:
+        raise UserError("texture has another shape", field=field, got=shape, expected=f"(H, W, {CHANNELS[part]})")
+    if not (np.isfinite(texture.texels).all() and np.isfinite(texture.uv_transform).all()):
+        raise UserError("texture holds numbers that are not finite", field=field)
+
+
+def digest(texture: Texture) -> str:
+    """Hash of what a texture shows and how it lies."""
+    h = hashlib.sha256(f"{texture.texels.shape} {texture.texels.dtype} {texture.uv_transform}".encode())
+    h.update(np.ascontiguousarray(texture.texels).tobytes())
+    return h.hexdigest()

@@ -1,0 +1,196 @@
+"""Textures in the path tracer: the right way round, the right numbers, and light through holes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lambent.bake.engine import engine
+from lambent.core.errors import UserError
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import Camera, DirectionalLight, MaterialTextures, PointLight, Scene, SceneObject, Texture
+from tests.bake.small_scenes import TINY
+
+LETTER = np.array(
+    [[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16
+)  # an F, row 0 at the top
+ABOVE = Camera("above", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0), fov_y_deg=float(np.degrees(2 * np.arctan(0.25))))
+GLOSS = Lobe(mx=0.3, my=0.1, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.4)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def path_tracer():
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+def wall(material: Material, textures: MaterialTextures, **more) -> Scene:
+    """A square of 1 m that faces +z; uv runs with x and y."""
+    mesh = patch((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+    return Scene("wall", (SceneObject("wall", mesh, "m"),), {"m": material}, textures={"m": textures}, **more)
+
+
+def constant(*values: float) -> Texture:
+    return Texture(np.array(values, np.float16)[None, None])
+
+
+def test_pictures_are_seen_unmirrored_and_upright() -> None:
+    from lambent.bake.reference import render_reference
+
+    picture = Texture(np.repeat(LETTER[..., None], 3, axis=2))
+    sun = DirectionalLight((0.0, 0.0, -1.0), (2 * np.pi,) * 3)
+    image, _ = render_reference(
+        wall(Material(kd=0.5), MaterialTextures(diffuse=picture), lights=(sun,)), ABOVE, 80, 80, 4
+    )
+    centres = (np.arange(5) * 16 + 8)[:, None], (np.arange(4) * 20 + 10)[None]
+    np.testing.assert_allclose(image[centres][..., 0], LETTER, atol=0.08)
+
+
+def test_a_uv_transform_repeats_and_shifts() -> None:
+    """The texel shown at (u, v) is the picture's at M (u, v, 1)."""
+    from lambent.bake.reference import render_reference
+
+    picture = np.zeros((2, 2, 3), np.float16)
+    picture[1, 0] = 1  # lower left
+    lies = Texture(picture, ((2.0, 0.0, 0.0), (0.0, 1.0, 0.5)))
+    sun = DirectionalLight((0.0, 0.0, -1.0), (2 * np.pi,) * 3)
+    image, _ = render_reference(wall(Material(kd=0.5), MaterialTextures(diffuse=lies), lights=(sun,)), ABOVE, 64, 64, 4)
+    shown = image[16::32, 8::16, 0]  # middles of texels: two across and twice over, v shifted by half
+    np.testing.assert_allclose(shown, [[1, 0, 1, 0], [0, 0, 0, 0]], atol=0.08)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_numbers_and_frame_equal_a_material_that_has_them(side: float) -> None:
+    """A textured material scatters like one of the multiplied numbers, in a frame leant and turned."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lambent.bake.material_plugin import material_dict, register_material_plugin
+
+    register_material_plugin()
+    material = Material(kd=(0.2, 0.3, 0.4), kt_d=0.1, lobes=(GLOSS,))
+    lean, turn = np.array([0.3, -0.2, 1.0]), np.radians(130)
+    textures = MaterialTextures(
+        constant(0.5, 1.0, 2.0),
+        constant(2.0, 1.0, 0.5),
+        constant(0.5),
+        constant(*lean),
+        constant(np.cos(turn), np.sin(turn)),
+    )
+    plugin = mi.load_dict(material_dict(material, textures))
+    same = Material(
+        kd=(0.1, 0.3, 0.8), kt_d=(0.05, 0.1, 0.2),
+        lobes=(GLOSS.model_copy(update={"mx": 0.15, "my": 0.05, "k": (1.0, 0.6, 0.35)}),),
+    )  # fmt: skip
+    n = lean.astype(np.float16) / np.linalg.norm(lean)
+    t = np.array([np.cos(turn), np.sin(turn), 0])
+    t = t - n * (n @ t)
+    t /= np.linalg.norm(t)
+    axes = np.stack([t, np.cross(n, t), n])
+    rng = np.random.default_rng(1)
+    wo = rng.normal(size=(256, 3))
+    wo[:, 2] = side * np.abs(wo[:, 2])
+    wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+    wo = wo[side * (wo @ n) > 0.12]  # a normal that turns from the viewer is bent back
+    wi = -wo * [1, 1, -1] + rng.normal(scale=0.2, size=wo.shape)
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
+    si.sh_frame, si.wi = mi.Frame3f(mi.Normal3f(0, 0, 1)), mi.Vector3f(wo.T)
+    got = np.array(plugin.eval(mi.BSDFContext(), si, mi.Vector3f(wi.T))).T
+    expected = MaterialBSDF(same).eval(wi @ axes.T, wo @ axes.T) * np.abs(wi @ n)[:, None]
+    possible = wi[:, 2] * (wi @ n) > 0
+    np.testing.assert_allclose(got[possible], expected[possible], rtol=5e-3, atol=1e-5)
+    assert not got[~possible].any()
+
+
+@pytest.mark.parametrize("part", ["kd", "gloss"])
+def test_bumpy_samples_follow_their_density(part: str) -> None:
+    """With a normal map, sampling and evaluation agree: importance sampled albedo equals uniformly sampled albedo."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lambent.bake.material_plugin import material_dict, register_material_plugin
+
+    register_material_plugin()
+    material = Material(kd=0.5) if part == "kd" else Material(lobes=(GLOSS,))
+    plugin = mi.load_dict(material_dict(material, MaterialTextures(normal=constant(0.5, 0.3, 1.0))))
+    n = 1 << 18
+    for theta in (0.2, 1.2, 1.5):
+        si = dr.zeros(mi.SurfaceInteraction3f, n)
+        si.sh_frame, si.wi = mi.Frame3f(mi.Normal3f(0, 0, 1)), mi.Vector3f(-math.sin(theta), 0, math.cos(theta))
+        u = np.random.default_rng(0).random((5, n)).astype(np.float32)
+        _, weight = plugin.sample(mi.BSDFContext(), si, mi.Float(u[0]), mi.Point2f(u[1], u[2]))
+        uniform = mi.warp.square_to_uniform_hemisphere(mi.Point2f(u[3], u[4]))
+        value = plugin.eval(mi.BSDFContext(), si, uniform)
+        np.testing.assert_allclose(np.array(weight)[1].mean(), np.array(value)[1].mean() * 2 * np.pi, rtol=0.03)
+
+
+SCREEN = np.zeros((8, 8, 1), np.float16)
+SCREEN[::2, ::2] = SCREEN[1::2, 1::2] = 1
+
+
+def screened(light, *, opaque: float = 0.0) -> Scene:
+    """A floor of 1 m below a screen whose checks, an eighth of a metre, let every second beam through."""
+    floor = SceneObject("floor", patch((-0.5, 0, 0.5), (1, 0, 0), (0, 0, -1)), "floor")
+    screen = SceneObject("screen", patch((-0.5, 0.5, 0.5), (1, 0, 0), (0, 0, -1)), "screen")
+    texels = np.repeat(np.repeat(np.maximum(SCREEN, np.float16(opaque)), 16, axis=0), 16, axis=1)
+    holes = {"screen": MaterialTextures(opacity=Texture(texels))}
+    black = {"floor": Material(), "screen": Material()}
+    return Scene("screened", (floor, screen), black, lights=(light,), textures=holes)
+
+
+def floor_map(scene: Scene, path, quality=TINY):
+    from lambent.bake.bake import bake
+
+    store = bake(scene, path, quality=quality, only={"light_map"})
+    return store, store.read("light_map/traced")[..., :3].sum(axis=0) / np.maximum(
+        store.read("light_map/traced")[..., 3:].sum(axis=0), 1
+    )
+
+
+def test_a_screen_casts_the_shadow_of_its_checks(tmp_path) -> None:
+    """Sun from straight above: the floor's irradiance is the sun's, or nothing, check by check."""
+    import mitsuba as mi
+
+    from lambent.bake import paths
+    from lambent.bake.mitsuba_scene import SceneBuilder
+
+    scene = SceneBuilder(screened(DirectionalLight((0.0, -1.0, 0.0), (3.0, 3.0, 3.0)))).build()
+    centre = (np.arange(8) + 0.5) / 8 - 0.5
+    x, z = (a.ravel() for a in np.meshgrid(centre, centre))  # rows follow z, which is down the picture
+    up = mi.Vector3f(0, 1, 0)
+    points = paths.Points(mi.Vector3f(x, np.zeros(64), z), up, up)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, 64)
+    e = paths.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 4)
+    np.testing.assert_allclose(np.array(e.x).reshape(8, 8), 3 * (1 - SCREEN[..., 0]), rtol=1e-5)
+
+
+def test_light_through_a_screen_is_half_and_a_whole_one_lets_none_through(tmp_path) -> None:
+    """Irradiance of a lamp high above, over the floor's middle: half of what it is without the screen."""
+    lamp = PointLight((0.0, 50.0, 0.0), (2500.0,) * 3)
+    _, half = floor_map(screened(lamp), tmp_path / "a", replace(TINY, light_map_samples=(16, 16)))
+    _, none = floor_map(screened(lamp, opaque=1.0), tmp_path / "b", replace(TINY, light_map_samples=(16, 16)))
+    lit = half[..., 1][half[..., 1] > 0]
+    assert none[..., 1].max() == pytest.approx(1.0, rel=0.05)  # the screen's own upper side
+    assert (none[..., 1] > 0).mean() < 0.6 * (half[..., 1] > 0).mean() + 0.2
+    assert lit.max() == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_changed_picture_bakes_light_again_and_geometry_not(tmp_path) -> None:
+    sun = DirectionalLight((0.0, -1.0, 0.0), (3.0, 3.0, 3.0))
+    scene = screened(sun)
+    quality = replace(TINY, light_map_samples=(2, 2))
+    first = {a.name: a.key for a in floor_map(scene, tmp_path, quality)[0].artefacts()}
+    changed = replace(scene, textures={"screen": MaterialTextures(opacity=constant(1.0))})
+    again = {a.name: a.key for a in floor_map(changed, tmp_path, quality)[0].artefacts()}
+    differ = {name for name in again if first.get(name) != again[name]}
+    assert not any(name.startswith("geometry") for name in differ)
+    assert {"texture/screen/opacity", "light_map/irradiance"} <= differ
