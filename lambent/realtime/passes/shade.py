@@ -75,5 +75,5 @@ class ShadePass:
 
     def _module(self, shader: str) -> Any:
         if shader not in self._modules:
-            self._modules[shader] = self._device.create_shader_module(code=assemble(shader, "shade.wgsl"))
+            self._modules[shader] = self._device.create_shader_module(code=assemble(shader, "probe_light.wgsl", "shade.wgsl"))
         return self._modules[shader]

@@ -23,7 +23,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy));
 }
 
-@fragment fn shade_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+fn surface_light(v: Varyings, front: bool) -> vec3f {
     let view = normalize(frame.eye.xyz - v.p_world);
     let s = shading_frame(v, select(-1.0, 1.0, front), view);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
@@ -35,10 +35,11 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let diffuse = diffuse_light(wo.z, e_here, e_beyond);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
-    var specular = vec3f(0.0);
-    for (var i = 0u; i < LOBES; i++) {
-        specular += integrate(i, wo, s);
-    }
+    let specular = specular_light(wo, s);
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
-    return vec4f(clamp(light, vec3f(0.0), vec3f(HALF_MAX)), 1.0);
+    return clamp(light, vec3f(0.0), vec3f(HALF_MAX));
+}
+
+@fragment fn shade_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    return vec4f(surface_light(v, front), 1.0);
 }
