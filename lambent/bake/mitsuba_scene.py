@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lambent.bake.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
 from lambent.core.images import read_image
 from lambent.scenes.scene import (
+    ConstantEnvironment,
     DirectionalLight,
     Environment,
     ImageEnvironment,
@@ -151,6 +152,8 @@ def environment_dict(environment: Environment) -> dict[str, Any]:
     """
     import mitsuba as mi
 
+    if isinstance(environment, ConstantEnvironment):
+        return {"type": "constant", "radiance": _rgb(environment.radiance)}
     if isinstance(environment, SunSky):
         from lambent.bake.sky import sky_picture
 

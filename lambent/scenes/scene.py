@@ -103,6 +103,13 @@ class ImageEnvironment:
 
 
 @dataclass(frozen=True)
+class ConstantEnvironment:
+    """The same radiance from everywhere."""
+
+    radiance: Triple
+
+
+@dataclass(frozen=True)
 class PointLight:
     """Radiant intensity W/sr; `direction` and cone half-angles make it a spot."""
 
@@ -122,7 +129,7 @@ class DirectionalLight:
 
 
 Light = PointLight | DirectionalLight
-Environment = SunSky | ImageEnvironment
+Environment = SunSky | ImageEnvironment | ConstantEnvironment
 
 
 @dataclass(frozen=True)

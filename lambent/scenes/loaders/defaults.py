@@ -17,17 +17,24 @@ FOV_Y_DEG = 45.0
 
 
 def with_defaults(name: str, parts: Parts) -> Scene:
-    """A scene of one geometry file under clear daylight; its own lights and cameras stay."""
+    """A scene of one geometry file; its own lights, cameras and environment stay.
+
+    Clear daylight is added where the file does not tell how its scene is lit, or tells of nothing that shines.
+    """
+    shines = bool(parts.environment or parts.lights or any(any(o.emission) for o in parts.objects))
+    own_light = parts.environment is not None or (parts.tells_its_light and shines)
+    said = ("nothing in it gives light: it is under daylight",) if parts.tells_its_light and not own_light else ()
     scene = Scene(
         name=name,
         objects=parts.objects,
         materials=parts.materials,
-        environment=DAYLIGHT,
+        environment=parts.environment if own_light else DAYLIGHT,
         lights=parts.lights,
         cameras=parts.cameras,
-        exposure_ev=EXPOSURE_EV,
+        exposure_ev=0.0 if own_light else EXPOSURE_EV,
         sources=parts.sources,
-        warnings=parts.warnings,
+        warnings=(*parts.warnings, *said),
+        textures=parts.textures,
     )
     if parts.cameras:
         return scene

@@ -48,7 +48,7 @@ class _Reading:
     triangles: int = 0
 
 
-def read_gltf(path: Path) -> Parts:
+def read_gltf(path: Path, root: Path | None = None) -> Parts:
     """Parts of a .glb or .gltf file.
 
     Names are the nodes' (made unique, which is said in the warnings); a mesh of several materials becomes an object

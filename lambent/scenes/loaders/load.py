@@ -12,6 +12,8 @@ from lambent.scenes.builtin.box import box
 from lambent.scenes.builtin.room import room
 from lambent.scenes.loaders.defaults import with_defaults
 from lambent.scenes.loaders.gltf import read_gltf
+from lambent.scenes.loaders.mitsuba.scene import read_mitsuba
+from lambent.scenes.loaders.obj import read_obj
 from lambent.scenes.loaders.parts import Parts
 from lambent.scenes.loaders.toml import inside_scene, load_toml
 from lambent.scenes.scene import Scene, SceneObject
@@ -19,7 +21,9 @@ from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
 BUILTIN: dict[str, Callable[[], tuple[SceneObject, ...]]] = {"room": room, "box": box}
-READERS: dict[str, Callable[[Path], Parts]] = {".glb": read_gltf, ".gltf": read_gltf}
+READERS: dict[str, Callable[[Path, Path | None], Parts]] = {
+    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".xml": read_mitsuba
+}  # fmt: skip
 
 
 def load_scene(path_or_builtin: str | Path) -> Scene:
@@ -28,8 +32,8 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml, .glb or .gltf; a bare glTF file gets daylight and,
-        where it has none, a camera.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj or Mitsuba's .xml; what such a
+        file does not tell, light and a camera, it gets.
 
     Raises
     ------
@@ -49,7 +53,7 @@ def _load(path_or_builtin: str | Path) -> Scene:
     path = Path(path_or_builtin)
     if path.suffix.lower() == ".toml":
         return load_toml(path, read_geometry)
-    return with_defaults(path.stem, _reader(path)(path))
+    return with_defaults(path.stem, _reader(path)(path, None))
 
 
 def read_geometry(name: str, scene_file: Path) -> Parts:
@@ -57,10 +61,10 @@ def read_geometry(name: str, scene_file: Path) -> Parts:
     if name.startswith(BUILTIN_PREFIX):
         return Parts(_builtin(name.removeprefix(BUILTIN_PREFIX))())
     path = inside_scene(scene_file, "geometry", name)
-    return _reader(path)(path)
+    return _reader(path)(path, scene_file.resolve().parent)
 
 
-def _reader(path: Path) -> Callable[[Path], Parts]:
+def _reader(path: Path) -> Callable[[Path, Path | None], Parts]:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         expected = ", ".join([*READERS, ".toml"])

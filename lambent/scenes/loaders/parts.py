@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lambent.materials.document import Material
-from lambent.scenes.scene import Camera, Light, MaterialTextures, SceneObject
+from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject, Triple
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,10 @@ class Parts:
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
+    environment: Environment | None = None
+    tells_its_light: bool = False  # a scene of this file alone gets daylight where it is False, or where nothing shines
+    variants: Mapping[str, Mapping[str, tuple[str, Triple]]] = field(default_factory=dict)
+    # variant -> object -> its material there and the radiance it then emits; `materials` holds those of all variants
 
 
 def unique_name(name: str, taken: set[str]) -> str:

@@ -55,12 +55,13 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         Where the file is not TOML, says something unknown or impossible, or names what is not there.
     """
     document = _parse(path)
-    environment = _environment(document, path)
     parts = [_geometry(entry, path, read_geometry) for entry in document.geometry]
+    environment = _environment(document, path) or next((p.environment for p in parts if p.environment), None)
     objects = _gather(parts)
     materials = {name: m for p in parts for name, m in p.materials.items()}
     named, sources = _materials(document, path)
     materials |= named
+    textures = {name: t for p in parts for name, t in p.textures.items() if name not in named}
     objects, centres, planes = _apply(document, objects, path)
     for o in objects:
         if o.material not in materials:
@@ -87,6 +88,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         exposure_ev=document.exposure_ev,
         sources=(path, *(s for p in parts for s in p.sources), *sources),
         warnings=tuple(w for p in parts for w in p.warnings),
+        textures=textures,
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),

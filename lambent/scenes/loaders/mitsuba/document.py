@@ -1,0 +1,186 @@
+"""Mitsuba's XML as a tree: read by events, parameters put in, other files included, names of 0.6 turned into 3's.
+
+The file is untrusted. A document type declaration is refused, and with it every entity of the file's own; elements,
+depth, included files and what parameters may grow to are limited. Files lie below the folder of the first.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.files import read_bytes
+from lambent.scenes.loaders.place import named
+
+LIMIT_BYTES = 256 << 20
+ELEMENTS_MAX, DEPTH_MAX, FILES_MAX, TEXT_MAX = 1_000_000, 64, 64, 1 << 20
+OLD_TAGS = {"camera": "sensor", "luminaire": "emitter", "lookAt": "lookat"}
+OLD_NAMES = {"int_i_o_r": "int_ior", "ext_i_o_r": "ext_ior"}
+_PARAMETER = re.compile(r"\$(\w+)")
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+
+
+@dataclass
+class Element:
+    """A tag with its attributes; `name` is the attribute of that name, as version 3 spells it."""
+
+    tag: str
+    attributes: dict[str, str]
+    file: Path
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return snake(self.attributes.get("name", ""))
+
+    @property
+    def id(self) -> str | None:
+        return self.attributes.get("id")
+
+    @property
+    def type(self) -> str:
+        return self.attributes.get("type", "").lower()
+
+    def error(self, message: str, *, got: object = None, expected: object = None, hint: str | None = None) -> UserError:
+        what = self.attributes.get("name") or self.attributes.get("id") or self.attributes.get("type") or ""
+        place = f"line {self.line} <{self.tag}> {what}".rstrip()
+        return UserError(message, file=self.file, field=place, got=got, expected=expected, hint=hint)
+
+
+@dataclass
+class Document:
+    """What a scene file holds, includes within it; `ids` are the elements by their id."""
+
+    path: Path
+    root: Path
+    version: str
+    elements: list[Element]
+    ids: dict[str, Element]
+    sources: list[Path]
+
+
+def snake(name: str) -> str:
+    """The name version 3 has for a parameter of version 0.6: toWorld -> to_world."""
+    return _HUMP.sub("_", name).lower()
+
+
+def is_scene(head: bytes) -> bool:
+    """Whether a file that begins with `head` is a Mitsuba scene."""
+    plain = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    return plain.startswith(b"<") and re.search(rb"<scene[\s>/]", plain) is not None
+
+
+def load(path: Path, root: Path) -> Document:
+    """The document of a file.
+
+    Raises
+    ------
+    UserError
+        Where it is not XML, not a scene, names files that are not there, or parameters that nobody set.
+    """
+    files = _Files(root)
+    scene = files.scene(path)
+    parameters = files.parameters
+    ids: dict[str, Element] = {}
+    stack = list(scene.children)
+    while stack:
+        element = stack.pop()
+        element.attributes = {k: _filled(v, parameters, element) for k, v in element.attributes.items()}
+        if element.id is not None and element.tag not in ("ref", "alias"):
+            if element.id in ids:
+                raise element.error("id is used twice", got=element.id)
+            ids[element.id] = element
+        stack += element.children
+    for element in scene.children:
+        if element.tag == "alias":
+            wanted, new = element.id or "", element.attributes.get("as", "")
+            if wanted not in ids:
+                raise element.error("unknown id", got=wanted, hint=did_you_mean(wanted, ids))
+            ids[new] = ids[wanted]
+    return Document(path, root, scene.attributes.get("version", ""), scene.children, ids, files.sources)
+
+
+def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
+    """`text` with its $parameters; the longest known name counts."""
+    if "$" not in text:
+        return text
+
+    def value(match: re.Match[str]) -> str:
+        word = match[1]
+        for end in range(len(word), 0, -1):
+            if word[:end] in parameters:
+                return parameters[word[:end]] + word[end:]
+        hint = did_you_mean(word, parameters) or f'add <default name="{word}" value="..."/>'
+        raise element.error("parameter is not set", got=f"${word}", hint=hint)
+
+    filled = _PARAMETER.sub(value, text)
+    if len(filled) > TEXT_MAX:
+        raise element.error("parameters make it too long", got=f"{len(filled)} characters", expected=TEXT_MAX)
+    return filled
+
+
+class _Files:
+    """Reads a scene file and those it includes."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.parameters: dict[str, str] = {}
+        self.sources: list[Path] = []
+        self._elements = 0
+        self._open: list[Path] = []
+
+    def scene(self, path: Path) -> Element:
+        if path in self._open:
+            raise UserError("includes itself", file=path)
+        if len(self.sources) >= FILES_MAX:
+            raise UserError("too many included files", file=path, expected=f"at most {FILES_MAX}")
+        self._open.append(path)
+        self.sources.append(path)
+        scene = self._parse(path)
+        children: list[Element] = []
+        for element in scene.children:
+            if element.tag == "default":
+                self.parameters.setdefault(element.attributes.get("name", ""), element.attributes.get("value", ""))
+            elif element.tag == "include":
+                name = _filled(element.attributes.get("filename", ""), self.parameters, element)
+                children += self.scene(named(name, path, self.root, f"line {element.line} <include>")).children
+            elif element.tag != "path":
+                children.append(element)
+        scene.children = children
+        self._open.pop()
+        return scene
+
+    def _parse(self, path: Path) -> Element:
+        top = Element("", {}, path, 0)
+        stack = [top]
+        parser = expat.ParserCreate()
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            self._elements += 1
+            if self._elements > ELEMENTS_MAX or len(stack) > DEPTH_MAX:
+                what = "elements" if self._elements > ELEMENTS_MAX else "levels"
+                line = f"line {parser.CurrentLineNumber}"
+                most = ELEMENTS_MAX if what == "elements" else DEPTH_MAX
+                raise UserError(f"too many {what}", file=path, field=line, expected=f"at most {most}")
+            element = Element(OLD_TAGS.get(tag, tag), attributes, path, parser.CurrentLineNumber)
+            stack[-1].children.append(element)
+            stack.append(element)
+
+        def refuse(*_: object) -> None:
+            raise UserError("document type declarations are not read", file=path, hint="remove the <!DOCTYPE ...>")
+
+        parser.StartElementHandler = start
+        parser.EndElementHandler = lambda _: stack.pop()
+        parser.StartDoctypeDeclHandler = refuse
+        try:
+            parser.Parse(read_bytes(path, LIMIT_BYTES), True)
+        except (expat.ExpatError, UnicodeError, ValueError) as error:
+            raise UserError(f"not XML ({error})", file=path) from error
+        if not top.children or top.children[0].tag != "scene":
+            got = f"<{top.children[0].tag}>" if top.children else "nothing"
+            raise UserError("not a Mitsuba scene", file=path, got=got, expected="<scene>")
+        return top.children[0]

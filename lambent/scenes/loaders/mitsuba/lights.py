@@ -1,0 +1,193 @@
+"""Mitsuba's emitters and sensors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from lambent.core.frames import Floats, normalize
+from lambent.scenes.loaders.mitsuba.textures import colour
+from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.surface import triple
+from lambent.scenes.scene import (
+    Camera,
+    ConstantEnvironment,
+    DirectionalLight,
+    Environment,
+    ImageEnvironment,
+    Light,
+    PointLight,
+    SunSky,
+    Triple,
+)
+
+ENVIRONMENTS = ("envmap", "constant", "sunsky", "sky", "sun")
+UPRIGHT = 0.9995  # cosine of a tilt that does not matter
+NOON: Triple = (0.4558, 0.7597, 0.4637)
+OLD_TO_DEGREES = 180 / math.pi
+
+
+def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
+    """The environment an emitter gives; `world` (4, 4) turns the file's world into ours."""
+    matrix = world @ plugin.transform()
+    made: Environment | None
+    if plugin.type == "constant":
+        made = ConstantEnvironment(triple(colour(plugin, "radiance", 1.0).mean))
+    elif plugin.type == "envmap":
+        made = _picture(plugin, matrix)
+    else:
+        made = _daylight(plugin, world, matrix)
+    plugin.say_unread()
+    return made
+
+
+def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
+    """Mitsuba's pictures have +y on top and -z in the middle, as ours."""
+    path = plugin.file()
+    if not path.is_file():
+        plugin.say(f"picture {plugin.text('filename')} is not there: left out")
+        return None
+    if path not in plugin.reading.sources:
+        plugin.reading.sources.append(path)
+    axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+    if axes[1, 1] < UPRIGHT:
+        plugin.say("its picture is tilted: it stands upright here")
+    if np.linalg.det(axes) < 0:
+        plugin.say("its picture is mirrored: it is not here")
+    gamma = plugin.number("gamma", 0.0)
+    if gamma > 0:
+        plugin.say("its gamma is not read")
+    rotation_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
+    return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4))
+
+
+def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:
+    """sunsky, sky or sun; in version 3 its own up is z, in 0.6 y."""
+    old = plugin.reading.document.version.startswith("0.")
+    up = normalize(matrix[:3, :3] @ ([0.0, 1.0, 0.0] if old else [0.0, 0.0, 1.0]))
+    if up[1] < UPRIGHT:
+        plugin.say("its sky is tilted: it stands upright here")
+    given = plugin.vector("sun_direction")
+    if given is not None and given.any():
+        towards = normalize(world[:3, :3] @ given)
+    else:
+        plugin.say("place and time are not read: the sun stands where Lambent's daylight has it")
+        plugin.ignore("latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second")
+        towards = np.array(NOON)
+    if towards[1] < 0:
+        plugin.say("its sun is below the horizon: it stands on it")
+        towards = normalize(np.array([towards[0] + 1e-9, 0.0, towards[2]]))
+    scale = plugin.number("scale", 1.0)
+    plugin.ignore("resolution", "sun_radius_scale", "stretch", "sun_aperture")
+    return SunSky(
+        triple(towards),
+        turbidity=min(max(plugin.number("turbidity", 3.0), 1.0), 10.0),
+        albedo=float(np.clip(colour(plugin, "albedo", 0.3).mean.mean(), 0, 1)),
+        sun_scale=0.0 if plugin.type == "sky" else scale * plugin.number("sun_scale", 1.0),
+        sky_scale=0.0 if plugin.type == "sun" else scale * plugin.number("sky_scale", 1.0),
+    )
+
+
+def light_of(plugin: Plugin, world: Floats) -> Light | None:
+    """A light without extent; None, and a warning, where its kind is unknown."""
+    matrix = world @ plugin.transform()
+    scale = plugin.number("scale", 1.0)
+    made: Light | None = None
+    if plugin.type == "point":
+        position = plugin.vector("position")
+        at = matrix[:3, 3] if position is None else _point(matrix, position)
+        made = PointLight(triple(at), triple(scale * colour(plugin, "intensity", 1.0).mean))
+    elif plugin.type == "spot":
+        outer = min(max(plugin.number("cutoff_angle", 20.0), 0.01), 90.0)
+        inner = min(max(plugin.number("beam_width", outer * 0.75), 0.0), outer)
+        direction = triple(normalize(matrix[:3, 2]))
+        intensity = triple(scale * colour(plugin, "intensity", 1.0).mean)
+        made = PointLight(triple(matrix[:3, 3]), intensity, direction, inner, outer)
+    elif plugin.type == "directional":
+        given = plugin.vector("direction")
+        way = matrix[:3, 2] if given is None else matrix[:3, :3] @ given
+        if not way.any():
+            raise plugin.element.error("direction is zero")
+        made = DirectionalLight(triple(normalize(way)), triple(scale * colour(plugin, "irradiance", 1.0).mean))
+    else:
+        plugin.say("left out, an emitter of an unknown kind")
+        return None
+    plugin.say_unread()
+    return made
+
+
+def emission_of(shape: Plugin) -> Triple:
+    """Radiance of a shape's area emitter."""
+    emitters = shape.objects("emitter")
+    if not emitters:
+        return 0.0, 0.0, 0.0
+    plugin = emitters[0]
+    if plugin.type != "area":
+        plugin.say("left out, only area emitters are read on shapes")
+        return 0.0, 0.0, 0.0
+    radiance = colour(plugin, "radiance", 1.0)
+    if radiance.is_picture:
+        plugin.say("its radiance is averaged over its picture")
+    scale = plugin.number("scale", 1.0)
+    plugin.say_unread()
+    return triple(scale * radiance.mean)
+
+
+def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
+    """A perspective camera; None, and a warning, where it is of another kind."""
+    if plugin.type not in ("perspective", "thinlens"):
+        plugin.say("left out, only perspective cameras are read")
+        return None
+    if plugin.type == "thinlens":
+        plugin.say("its depth of field is not read")
+        plugin.ignore("aperture_radius", "focus_distance")
+    if plugin.has("principal_point_offset_x", "principal_point_offset_y"):
+        plugin.say("its principal point is in the middle here")
+        plugin.ignore("principal_point_offset_x", "principal_point_offset_y")
+    film = next(iter(plugin.objects("film")), None)
+    width, height = (film.number(n, d) if film else d for n, d in (("width", 768.0), ("height", 576.0)))
+    if min(width, height) <= 0:
+        raise plugin.element.error("film has no size", got=f"{width} x {height}")
+    matrix = world @ plugin.transform()
+    if np.linalg.det(matrix[:3, :3]) < 0:
+        plugin.say("its picture is mirrored: it is not here")
+    fov_y_deg = min(max(_fov_y_deg(plugin, width / height), 1.0), 150.0)
+    plugin.objects("sampler")
+    plugin.ignore("focus_distance")
+    plugin.say_unread()
+    position, ahead, up = matrix[:3, 3], normalize(matrix[:3, 2]), normalize(matrix[:3, 1])
+    return Camera(name, triple(position), triple(position + ahead), triple(up), fov_y_deg)
+
+
+def _fov_y_deg(plugin: Plugin, aspect: float) -> float:
+    """Full vertical field of view; Mitsuba's is horizontal where nothing is said."""
+    length = plugin.text("focal_length", "50mm")
+    axis = plugin.text("fov_axis", "x").lower()
+    if plugin.has("fov"):
+        fov_deg = plugin.number("fov", 45.0)
+        if not 0 < fov_deg < 180:
+            raise plugin.element.error("field of view is impossible", got=fov_deg, expected="between 0 and 180")
+        half = math.tan(math.radians(fov_deg) / 2)
+    else:  # of a 35 mm film, along its diagonal
+        try:
+            half = math.hypot(36, 24) / 2 / float(length.lower().removesuffix("mm"))
+        except (ValueError, ZeroDivisionError) as error:
+            raise plugin.element.error("not a focal length", got=length, expected='such as "50mm"') from error
+        axis = "diagonal"
+    if axis == "smaller":
+        axis = "x" if aspect < 1 else "y"
+    elif axis == "larger":
+        axis = "y" if aspect < 1 else "x"
+    if axis == "diagonal":
+        half = half / math.hypot(aspect, 1)
+    elif axis == "x":
+        half = half / aspect
+    elif axis != "y":
+        raise plugin.element.error("unknown fov_axis", got=axis, expected="x, y, diagonal, smaller or larger")
+    return math.degrees(2 * math.atan(half))
+
+
+def _point(matrix: Floats, position: Floats) -> Floats:
+    moved: Floats = matrix[:3, :3] @ position + matrix[:3, 3]
+    return moved

@@ -1,0 +1,220 @@
+"""A Mitsuba scene file, versions 0.6 and 3, as parts of a scene.
+
+What is read becomes objects, materials, textures, lights, cameras and an environment; whatever is not is dropped and
+said. A scene whose cameras stand upright along another axis than y is turned until they stand along y.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats, normalize
+from lambent.materials.document import Material
+from lambent.scenes.loaders.mitsuba import lights
+from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
+from lambent.scenes.loaders.mitsuba.document import load
+from lambent.scenes.loaders.mitsuba.shapes import mesh_of_shape, stem_of
+from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of, floats_of
+from lambent.scenes.loaders.parts import Parts, unique_name
+from lambent.scenes.loaders.surface import finished
+from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject
+
+TRIANGLES_MAX = 20_000_000
+GROUPS = ("shapegroup", "merge")
+LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
+UNREAD = {"medium": "participating media are not read", "volume": "volumes are not read",
+          "subsurface": "subsurface scattering is not read"}  # fmt: skip
+
+
+def read_mitsuba(path: Path, root: Path | None = None) -> Parts:
+    """Parts of a Mitsuba scene.
+
+    Raises
+    ------
+    UserError
+        Where the file, or a mesh it names, cannot be used, or there is nothing to see.
+    """
+    root = path.resolve().parent if root is None else root
+    return _Scene(Reading(load(path, root)), path).parts()
+
+
+class _Scene:
+    """One scene on its way to parts."""
+
+    def __init__(self, reading: Reading, path: Path) -> None:
+        self._reading, self._path = reading, path
+        self._world = np.eye(4)
+        self._objects: list[SceneObject] = []
+        self._materials: dict[str, Material] = {}
+        self._textures: dict[str, MaterialTextures] = {}
+        self._by_element: dict[int, str] = {}
+        self._names: set[str] = set()
+        self._material_names: set[str] = set()
+        self._triangles = 0
+        self._warnings: list[str] = []
+
+    def parts(self) -> Parts:
+        document = self._reading.document
+        sensors = list(children_of(document, self._reading, "sensor"))
+        self._world, turned = _upright(sensors)
+        if turned:
+            self._warnings.append(f"its cameras have {turned} up: the scene is turned to have y up")
+        for shape in children_of(document, self._reading, "shape"):
+            self._add_shape(shape, self._world)
+        if not self._objects:
+            raise UserError("holds no triangles", file=self._path, hint="; ".join(self._said()) or None)
+        environment, point_lights = self._lights()
+        cameras = self._cameras(sensors)
+        self._say_the_rest()
+        return Parts(
+            tuple(self._objects),
+            self._materials,
+            tuple(point_lights),
+            tuple(cameras),
+            tuple(self._reading.sources),
+            tuple(self._said()),
+            self._textures,
+            environment,
+            tells_its_light=True,
+        )
+
+    def _said(self) -> list[str]:
+        return self._warnings + self._reading.said + self._reading.pictures.said
+
+    def _add_shape(self, shape: Plugin, world: Floats) -> None:
+        if shape.type == "instance":
+            self._add_instance(shape, world)
+            return
+        if shape.type == "shapegroup":
+            return  # what instances show
+        if shape.type == "merge":
+            for inner in shape.objects("shape"):
+                self._add_shape(inner, world)
+            return
+        emission = lights.emission_of(shape)
+        bsdf = next(iter(shape.objects("bsdf")), None)
+        for what, words in UNREAD.items():
+            if shape.objects(what):
+                self._reading.say(words)
+        if bsdf is not None and is_nothing(bsdf) and not any(emission):
+            shape.say("left out, it has no surface (null)")
+            return
+        wanted = stem_of(shape)
+        mesh, said = mesh_of_shape(shape, wanted, world)
+        self._warnings += said
+        if mesh is None:
+            return
+        shape.objects("sensor")
+        shape.say_unread(but=("max_smooth_angle", "name", "id"))
+        self._triangles += len(mesh.faces)
+        if self._triangles > TRIANGLES_MAX:
+            got, most = f"{self._triangles} triangles", f"at most {TRIANGLES_MAX}"
+            raise UserError("scene is too large", file=self._path, got=got, expected=most)
+        material = self._material(bsdf, wanted)
+        self._objects.append(SceneObject(unique_name(wanted, self._names), mesh, material, emission))
+
+    def _add_instance(self, shape: Plugin, world: Floats) -> None:
+        """A group's shapes once more, at another place."""
+        placed = world @ shape.transform()
+        for group in shape.objects("shape"):
+            if group.type != "shapegroup":
+                shape.say("its shape is not a shapegroup")
+            for inner in group.objects("shape"):
+                self._add_shape(inner, placed)
+        shape.say_unread()
+
+    def _material(self, bsdf: Plugin | None, shape: str) -> str:
+        """The name of a BSDF's material, made when it is first met."""
+        key = id(bsdf.element) if bsdf is not None else 0
+        if key not in self._by_element:
+            wanted = "default" if bsdf is None else bsdf.element.id or f"{shape}_{bsdf.type}"
+            name = unique_name(wanted, self._material_names)
+            said: list[str] = []
+            surface = grey() if bsdf is None else surface_of(bsdf)
+            self._materials[name], textures = finished(name, surface, said)
+            if textures is not None:
+                self._textures[name] = textures
+            self._warnings += [f"material {name}: {text}" for text in dict.fromkeys(said)]
+            self._by_element[key] = name
+        return self._by_element[key]
+
+    def _lights(self) -> tuple[Environment | None, list[Light]]:
+        environment: Environment | None = None
+        found: list[Light] = []
+        for plugin in children_of(self._reading.document, self._reading, "emitter"):
+            if plugin.type not in lights.ENVIRONMENTS:
+                light = lights.light_of(plugin, self._world)
+                found += [light] if light is not None else []
+            elif environment is not None:
+                plugin.say("left out, a scene has one environment")
+            else:
+                environment = lights.environment_of(plugin, self._world)
+        return environment, found
+
+    def _cameras(self, sensors: list[Plugin]) -> list[Camera]:
+        names: set[str] = set()
+        cameras = []
+        for plugin in sensors:
+            camera = lights.camera_of(plugin, plugin.element.id or "camera", self._world)
+            if camera is not None:
+                cameras.append(Camera(unique_name(camera.name, names), *_fields(camera)))
+        return cameras
+
+    def _say_the_rest(self) -> None:
+        """What stands at the top of the file and nobody looked at."""
+        kinds = Counter(e.tag for e in self._reading.document.elements)
+        for tag, words in UNREAD.items():
+            if kinds[tag]:
+                self._reading.say(words)
+        known = {"shape", "sensor", "emitter", "bsdf", "texture", "integrator", "sampler", "film", "rfilter", "alias"}
+        left = [tag for tag in kinds if tag not in known | set(UNREAD)]
+        if left:
+            self._reading.say(f"not read: {', '.join(f'<{tag}>' for tag in left)}")
+        integrators = [e.type for e in self._reading.document.elements if e.tag == "integrator"]
+        if integrators:
+            self._reading.say(f"its integrator ({integrators[0]}) is not read: Lambent has its own")
+
+
+def _fields(camera: Camera) -> tuple:  # type: ignore[type-arg]
+    return camera.position, camera.target, camera.up, camera.fov_y_deg
+
+
+def _upright(sensors: list[Plugin]) -> tuple[Floats, str | None]:
+    """Rotation (4, 4) that turns the axis along which most cameras stand to +y, and that axis where it is another."""
+    votes = Counter(axis for axis in map(_up_axis, sensors) if axis is not None)
+    if not votes:
+        return np.eye(4), None
+    index, sign = votes.most_common(1)[0][0]
+    if (index, sign) == (1, 1):
+        return np.eye(4), None
+    up = np.eye(3)[index] * sign
+    world = np.eye(4)
+    if index == 1:
+        world[:3, :3] = np.diag([1.0, -1.0, -1.0])
+    else:  # the shortest turn from `up` to y, about up x y
+        axis = np.cross(up, [0.0, 1.0, 0.0])
+        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+        world[:3, :3] = np.eye(3) + cross + cross @ cross
+    return world, f"{'-' if sign < 0 else ''}{'xyz'[index]}"
+
+
+def _up_axis(sensor: Plugin) -> tuple[int, int] | None:
+    """The signed world axis along which a camera stands upright; None where that cannot be said."""
+    element = sensor.transform_element("to_world")
+    if element is None:
+        return None
+    if len(element.children) == 1 and element.children[0].tag == "lookat" and "up" in element.children[0].attributes:
+        up = np.array(floats_of(element.children[0], 3, "up"))
+        index = int(np.argmax(np.abs(up)))
+        return index, 1 if up[index] >= 0 else -1
+    matrix = sensor.transform()
+    left, up, ahead = (normalize(matrix[:3, i]) for i in range(3))
+    level = [i for i in range(3) if abs(left[i]) < LEVEL and abs(ahead[i]) < 0.95]
+    if not level:
+        return None
+    index = max(level, key=lambda i: abs(up[i]))
+    return (index, 1 if up[index] > 0 else -1) if abs(up[index]) > 0.3 else None

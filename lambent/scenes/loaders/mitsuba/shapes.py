@@ -1,0 +1,192 @@
+"""Mitsuba's shapes as meshes in world space, with Mitsuba's texture coordinates (v turned to point up)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.files import read_bytes
+from lambent.core.frames import Floats, basis, normalize
+from lambent.scenes.geometry import grid, merge, transformed
+from lambent.scenes.loaders import obj, obj_text, ply
+from lambent.scenes.loaders.mitsuba import serialized
+from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.polygons import Ints, smooth_normals
+from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.scene import Mesh
+
+AROUND, ROWS = 96, 48  # quads of a sphere
+UNSCALED = 1e-18  # determinant of a transform that leaves nothing
+
+
+def mesh_of_shape(plugin: Plugin, name: str, world: Floats) -> tuple[Mesh | None, list[str]]:
+    """Mesh of a shape under `world` (4, 4) and what was repaired; None where nothing is left."""
+    make = KINDS.get(plugin.type)
+    if make is None:
+        return None, [f"{plugin.label}: left out, a shape of an unknown kind"]
+    to_world = world @ plugin.transform()
+    local, said = make(plugin, name)
+    if local is None:
+        return None, said
+    if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
+        return None, [*said, f"{name}: left out, its transform is flat"]
+    mesh = transformed(local, to_world)
+    return (flipped(mesh) if plugin.flag("flip_normals", False) else mesh), said
+
+
+def flipped(mesh: Mesh) -> Mesh:
+    """`mesh` with its other side outside."""
+    return replace(mesh, normals=-mesh.normals, faces=mesh.faces[:, ::-1].copy())
+
+
+def stem_of(plugin: Plugin) -> str:
+    """The name of a shape: its id, its file's, or its kind."""
+    written = plugin.text("filename").replace("\\", "/")
+    return plugin.element.id or Path(written).stem or plugin.type
+
+
+def _obj(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    path = _file(plugin)
+    text = obj_text.parse(read_bytes(path, obj.LIMIT_BYTES), path)
+    if not plugin.flag("flip_tex_coords", True):
+        text = replace(text, vt=_turned(text.vt))
+    faceted = plugin.flag("face_normals", False)
+    plugin.ignore("collapse", "load_materials", "shape_index")
+    triangles = obj.triangles_of(text, path)
+    return obj.mesh_of_triangles(text, triangles, name, path, faceted=faceted)
+
+
+def _ply(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    path = _file(plugin)
+    arrays = ply.read(path)
+    plugin.ignore("srgb")
+    return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
+
+
+def _serialized(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    path = _file(plugin)
+    arrays = serialized.read(path, int(plugin.number("shape_index", 0)))
+    return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
+
+
+def _from_arrays(
+    plugin: Plugin, name: str, path: Path, positions: Floats, normals: Floats | None, uv: Floats | None, faces: Ints
+) -> tuple[Mesh | None, list[str]]:
+    """A mesh whose v points down, unless flip_tex_coords says that it does not."""
+    if uv is not None and not plugin.flag("flip_tex_coords", False):
+        uv = _turned(uv)
+    plugin.ignore("flip_tex_coords")
+    if plugin.flag("face_normals", False):
+        normals = None
+    elif normals is None and len(faces) and int(faces.max()) < len(positions):
+        normals = np.zeros_like(positions)
+        made = smooth_normals(positions, faces, faces)
+        normals[: len(made)] = made
+    return mesh_of(positions, faces, normals, uv, None, name=name, file=path)
+
+
+def _turned(uv: Floats) -> Floats:
+    return uv * (1, -1) + (0, 1)
+
+
+def _file(plugin: Plugin) -> Path:
+    path = plugin.file()
+    if not path.is_file():
+        raise plugin.element.error("file not found", got=plugin.text("filename"))
+    return _remembered(plugin, path)
+
+
+def _remembered(plugin: Plugin, path: Path) -> Path:
+    if path not in plugin.reading.sources:
+        plugin.reading.sources.append(path)
+    return path
+
+
+def _rectangle(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    return _sheet(np.array([0.0, 0.0, 1.0]), lambda x, y: (x, y, 0 * x)), []
+
+
+def _sheet(normal: Floats, place: Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]) -> Mesh:
+    """A square whose uv run with the parameters x, y in [-1, 1] of `place`."""
+    x, y = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
+    positions = np.stack(place(x, y), axis=-1)
+    along = positions[0, 1] - positions[0, 0]
+    uv = np.stack([(x + 1) / 2, 1 - (y + 1) / 2], axis=-1)
+    return grid(positions, np.broadcast_to(normal, positions.shape), along, uv)
+
+
+def _cube(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    """Each side as Mitsuba has it: which way u (x here) and v (y here) run on it."""
+    one = np.ones((2, 2))
+    sides = (
+        ((0, 0, 1), lambda x, y: (y, x, one)), ((0, 0, -1), lambda x, y: (y, -x, -one)),
+        ((1, 0, 0), lambda x, y: (one, x, -y)), ((-1, 0, 0), lambda x, y: (-one, x, y)),
+        ((0, 1, 0), lambda x, y: (-x, one, -y)), ((0, -1, 0), lambda x, y: (y, -one, x)),
+    )  # fmt: skip
+    return merge([_sheet(np.array(n, float), place) for n, place in sides]), []
+
+
+def _sphere(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    centre, radius = plugin.vector("center"), plugin.number("radius", 1.0)
+    theta = np.linspace(0, np.pi, ROWS + 1)[:, None]
+    phi, cos_phi, sin_phi = _circle(AROUND)
+    sin_theta = np.where(np.isin(np.arange(ROWS + 1), (0, ROWS))[:, None], 0.0, np.sin(theta))
+    normals = _stacked(sin_theta * cos_phi, sin_theta * sin_phi, np.cos(theta))
+    uv = np.stack(np.broadcast_arrays(phi / (2 * np.pi), 1 - theta / np.pi), axis=-1)
+    mesh = grid(abs(radius) * normals, normals, _stacked(-sin_phi, cos_phi, 0 * theta), uv)
+    return transformed(mesh, _moved(np.zeros(3) if centre is None else centre)), []
+
+
+def _disk(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    r = np.linspace(0, 1, 2)[:, None]
+    phi, cos_phi, sin_phi = _circle(AROUND)
+    positions = _stacked(r * cos_phi, r * sin_phi, 0 * r)
+    normals = np.broadcast_to([0.0, 0.0, 1.0], positions.shape)
+    uv = np.stack(np.broadcast_arrays(r, 1 - phi / (2 * np.pi)), axis=-1)
+    return grid(positions, normals, _stacked(cos_phi, sin_phi, 0 * r), uv), []
+
+
+def _cylinder(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+    """Open at both ends."""
+    p0, p1 = plugin.vector("p0"), plugin.vector("p1")
+    p0, p1 = np.zeros(3) if p0 is None else p0, np.array([0.0, 0.0, 1.0]) if p1 is None else p1
+    radius, length = plugin.number("radius", 1.0), float(np.linalg.norm(p1 - p0))
+    if length == 0:
+        return None, [f"{name}: left out, its ends are one point"]
+    z = np.linspace(0, 1, 2)[:, None]
+    phi, cos_phi, sin_phi = _circle(AROUND)
+    normals = _stacked(cos_phi, sin_phi, 0 * z)
+    positions = _stacked(radius * cos_phi, radius * sin_phi, length * z)
+    uv = np.stack(np.broadcast_arrays(phi / (2 * np.pi), 1 - z), axis=-1)
+    mesh = grid(positions, normals, _stacked(-sin_phi, cos_phi, 0 * z), uv)
+    t, b = basis(normalize(p1 - p0))
+    matrix = _moved(p0)
+    matrix[:3, :3] = np.stack([t, b, normalize(p1 - p0)], axis=-1)
+    return transformed(mesh, matrix), []
+
+
+def _circle(around: int) -> tuple[Floats, Floats, Floats]:
+    """phi, its cosine and its sine (1, around + 1), closed exactly."""
+    phi = np.linspace(0, 2 * np.pi, around + 1)[None, :]
+    cos_phi, sin_phi = np.cos(phi), np.sin(phi)
+    cos_phi[:, -1], sin_phi[:, -1] = 1.0, 0.0
+    return phi, cos_phi, sin_phi
+
+
+def _stacked(x: Floats, y: Floats, z: Floats) -> Floats:
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+
+def _moved(to: Floats) -> Floats:
+    matrix = np.eye(4)
+    matrix[:3, 3] = to
+    return matrix
+
+
+KINDS: dict[str, Callable[[Plugin, str], tuple[Mesh | None, list[str]]]] = {
+    "obj": _obj, "ply": _ply, "serialized": _serialized, "rectangle": _rectangle, "cube": _cube, "sphere": _sphere,
+    "disk": _disk, "cylinder": _cylinder,
+}  # fmt: skip

@@ -1,0 +1,267 @@
+"""The text of an OBJ file as arrays: whole blocks of lines at a time, never line by line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.frames import Floats
+
+BLOCK_BYTES = 8 << 20
+INDICES_MAX = 240_000_000
+Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+WIDTHS = {"v": 3, "vt": 2, "vn": 3}
+# Slashes per corner, and how many of its pairs are double: which of v, vt, vn the corner names.
+FORMS = {(0, 0): (0,), (1, 0): (0, 1), (2, 1): (0, 2), (2, 0): (0, 1, 2)}
+
+
+@dataclass(frozen=True)
+class ObjText:
+    """What an OBJ file says.
+
+    Attributes
+    ----------
+    v, vt, vn : (N, 3), (N, 2), (N, 3)
+        As written; absent numbers of vt are 0.
+    corners : (C, 3) int64
+        Places in v, vt and vn of every corner of every face, -1 where it names none.
+    sizes, lines : (F,) int64
+        Corners of each face, and the line of the file it stands on.
+    words : list of (line, keyword, rest)
+        Every other line.
+    """
+
+    v: Floats
+    vt: Floats
+    vn: Floats
+    corners: Ints
+    sizes: Ints
+    lines: Ints
+    words: list[tuple[int, str, str]]
+
+
+def parse(data: bytes, file: Path) -> ObjText:
+    """Arrays of a file's content.
+
+    Raises
+    ------
+    UserError
+        Where a number cannot be read, or a corner names what is not there; with the line.
+    """
+    values: dict[str, list[Floats]] = {kind: [np.zeros((0, width))] for kind, width in WIDTHS.items()}
+    counts = dict.fromkeys(WIDTHS, 0)
+    corners, sizes, lines = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    words: list[tuple[int, str, str]] = []
+    total = 0
+    for first_line, block in _blocks(data):
+        text = _Block(block, first_line, file)
+        seen = {}
+        for kind, width in WIDTHS.items():
+            at = text.lines_of(kind)
+            values[kind].append(text.numbers(at, kind, width))
+            seen[kind] = counts[kind] + np.searchsorted(at, np.arange(len(text.starts)))
+            counts[kind] += len(at)
+        for part in text.faces(seen):
+            corners.append(part[0])
+            sizes.append(part[1])
+            lines.append(part[2])
+            total += len(part[0])
+        if total > INDICES_MAX:
+            raise UserError("scene is too large", file=file, got=f"over {INDICES_MAX} corners")
+        words += text.words()
+    all_corners = np.concatenate(corners)
+    all_sizes, all_lines = np.concatenate(sizes), np.concatenate(lines)
+    for column, kind in enumerate(WIDTHS):
+        over = np.flatnonzero(all_corners[:, column] >= counts[kind])
+        if len(over):
+            line = np.repeat(all_lines, all_sizes)[over[0]]
+            got, most = int(all_corners[over[0], column]) + 1, f"at most {counts[kind]}"
+            raise UserError(f"corner names a {kind} that is not there", file=file, field=f"line {line}", got=got,
+                            expected=most)  # fmt: skip
+    v, vt, vn = (np.concatenate(values[kind]) for kind in WIDTHS)
+    return ObjText(v, vt, vn, all_corners, all_sizes, all_lines, words)
+
+
+def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Whole lines of the file, some megabytes at a time, with the number of the first."""
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    start, line = 0, 1
+    while start < len(data):
+        end = data.find(b"\n", min(start + BLOCK_BYTES, len(data) - 1))
+        while end > 0 and data[end - 1 : end] == b"\\":  # a line goes on in the next
+            end = data.find(b"\n", end + 1)
+        end = len(data) if end < 0 else end + 1
+        block = data[start:end]
+        yield line, block
+        line += block.count(b"\n")
+        start = end
+
+
+class _Block:
+    """A block of lines, and where its lines begin and end."""
+
+    def __init__(self, block: bytes, first_line: int, file: Path) -> None:
+        if b"\\\n" in block:  # the line numbers stay: an empty line for each that went on
+            block = re.sub(rb"(?:[^\n]*\\\n)+[^\n]*\n?", _joined, block)
+        block = block.translate(_BLANKS)
+        if block.startswith(b" ") or b"\n " in block:
+            block = re.sub(rb"(?m)^ +", b"", block)
+        self.bytes: Bytes = np.frombuffer(block + b"\n\n\n", np.uint8)
+        self.ends = np.flatnonzero(self.bytes == 10)
+        self.starts = np.concatenate([[0], self.ends[:-1] + 1])
+        self.first_line, self.file = first_line, file
+        here, after = self.starts[:-2], len(self.bytes) - 1
+        self._head = [self.bytes[np.minimum(here + i, after)] for i in range(3)]
+        self._kinds = {
+            "v": self._begins(b"v "), "vt": self._begins(b"vt "), "vn": self._begins(b"vn "), "f": self._begins(b"f ")
+        }  # fmt: skip
+
+    def _begins(self, word: bytes) -> Ints:
+        matches = np.logical_and.reduce([self._head[i] == c for i, c in enumerate(word)])
+        return np.flatnonzero(matches)
+
+    def lines_of(self, kind: str) -> Ints:
+        return self._kinds[kind]
+
+    def _text(self, lines: Ints, kind: str) -> bytes:
+        """The lines without their keyword and without comments, each ended."""
+        breaks = np.flatnonzero(np.diff(lines) > 1) + 1  # lines of one kind mostly stand together
+        first, last = lines[np.concatenate([[0], breaks])], lines[np.concatenate([breaks, [len(lines)]]) - 1]
+        whole = self.bytes.data
+        text = b"".join([whole[a:b] for a, b in zip(self.starts[first], self.ends[last] + 1, strict=True)])
+        text = text.replace(kind.encode() + b" ", b"")
+        return re.sub(rb"#[^\n]*", b"", text) if b"#" in text else text
+
+    def numbers(self, lines: Ints, kind: str, width: int) -> Floats:
+        """(N, width) numbers of lines of one kind; more than `width` on a line are passed over."""
+        if not len(lines):
+            return np.zeros((0, width))
+        text = self._text(lines, kind)
+        per_line = _tokens(text)
+        least = 1 if kind == "vt" else width
+        if (per_line < least).any():
+            raise self._error(f"{kind} with too few numbers", lines[int(np.argmax(per_line < least))])
+        values = self._parsed(text, float, lines)
+        if (per_line == width).all():
+            return values.reshape(-1, width)
+        starts = np.cumsum(per_line) - per_line
+        held = np.minimum(per_line, width)
+        array = np.zeros((len(lines), width))
+        for i in range(width):
+            with_it = held > i
+            array[with_it, i] = values[starts[with_it] + i]
+        return array
+
+    def faces(self, seen: dict[str, Ints]) -> Iterator[tuple[Ints, Ints, Ints]]:
+        """Corners, sizes and lines of the faces, in the file's order; `seen` counts v, vt and vn before each line."""
+        lines = self.lines_of("f")
+        if not len(lines):
+            return
+        text = self._text(lines, "f")
+        flat = np.frombuffer(text, np.uint8)
+        ends = np.flatnonzero(flat == 10)
+        sizes = _tokens(text)
+        slash = flat == 47
+        slashes = _per_line(slash, ends)
+        doubles = _per_line(slash & np.concatenate([slash[1:], [False]]), ends)
+        n = np.maximum(sizes, 1)
+        form = np.full(len(lines), -1)
+        for code, (single, double) in enumerate(FORMS):
+            form[(slashes == single * n) & (doubles == double * n)] = code
+        if (form < 0).any():
+            raise self._error("face that cannot be read", lines[int(np.argmax(form < 0))])
+        made = [self._of_form(lines[form == code], FORMS[key], sizes[form == code], seen)
+                for code, key in enumerate(FORMS) if (form == code).any()]  # fmt: skip
+        corners, count, where = (np.concatenate(parts) for parts in zip(*made, strict=True))
+        if len(made) > 1:
+            order = np.argsort(where, kind="stable")
+            starts = (np.cumsum(count) - count)[order]
+            picked = np.repeat(starts, count[order]) + _ranges(count[order])
+            corners, count, where = corners[picked], count[order], where[order]
+        yield corners, count, where + self.first_line
+
+    def _of_form(
+        self, lines: Ints, columns: tuple[int, ...], sizes: Ints, seen: dict[str, Ints]
+    ) -> tuple[Ints, Ints, Ints]:
+        text = self._text(lines, "f").replace(b"/", b" ")
+        values = self._parsed(text, np.int64, lines)
+        if len(values) != len(columns) * int(sizes.sum()):
+            raise self._error("face that cannot be read", lines[0])
+        corners = np.full((int(sizes.sum()), 3), -1, np.int64)
+        kinds = list(WIDTHS)
+        for i, column in enumerate(columns):
+            index = values[i :: len(columns)]
+            before = np.repeat(seen[kinds[column]][lines], sizes)
+            place = np.where(index > 0, index - 1, before + index)
+            bad = (index == 0) | (place < 0)
+            if bad.any():
+                at = int(np.argmax(bad))
+                raise self._error(f"corner names a {kinds[column]} that is not there", np.repeat(lines, sizes)[at],
+                                  int(index[at]))  # fmt: skip
+            corners[:, column] = place
+        return corners, sizes, lines
+
+    def words(self) -> list[tuple[int, str, str]]:
+        """(line, keyword, rest) of every line that is none of these and no comment."""
+        other = np.ones(len(self._head[0]), bool)
+        for lines in self._kinds.values():
+            other[lines] = False
+        other &= (self._head[0] != ord("#")) & (self._head[0] != 10)
+        said = []
+        for i in np.flatnonzero(other):
+            line = self.bytes[self.starts[i] : self.ends[i]].tobytes().decode("utf-8", "replace")
+            word, _, rest = line.partition(" ")
+            said.append((int(i) + self.first_line, word, rest.strip()))
+        return said
+
+    def _parsed(self, text: bytes, kind: type, lines: Ints) -> NDArray[np.generic]:
+        try:
+            return np.fromstring(text, dtype=kind, sep=" ")  # type: ignore[call-overload]
+        except ValueError:
+            pass  # which line it is, is found out below
+        for line, words in zip(lines, text.split(b"\n"), strict=False):
+            for word in words.split():
+                try:
+                    (int if kind is np.int64 else float)(word)
+                except ValueError:
+                    raise self._error("not a number", line, word.decode("utf-8", "replace")) from None
+        raise self._error("not a number", lines[0])
+
+    def _error(self, message: str, line: int, got: object = None) -> UserError:
+        return UserError(message, file=self.file, field=f"line {int(line) + self.first_line}", got=got)
+
+
+_BLANKS = bytes(32 if c in b"\t\v\f\0" else c for c in range(256))
+
+
+def _joined(match: re.Match[bytes]) -> bytes:
+    """Lines that go on as one, and as many empty ones as keep the count."""
+    return match[0].replace(b"\\\n", b" ").rstrip(b"\n") + b"\n" * match[0].count(b"\n")
+
+
+def _per_line(marks: NDArray[np.bool_], ends: Ints) -> Ints:
+    """How many marks lie on each line, whose ends are given."""
+    return np.diff(np.searchsorted(np.flatnonzero(marks), ends), prepend=0)
+
+
+def _tokens(text: bytes) -> Ints:
+    """Words on each line."""
+    flat = np.frombuffer(text, np.uint8)
+    blank = flat <= 32
+    first = ~blank & np.concatenate([[True], blank[:-1]])
+    return _per_line(first, np.flatnonzero(flat == 10))
+
+
+def _ranges(counts: Ints) -> Ints:
+    """0..c-1 for each c of counts, one after the other."""
+    starts = np.cumsum(counts) - counts
+    return np.arange(int(counts.sum())) - np.repeat(starts, counts)

@@ -1,0 +1,147 @@
+"""A surface as a file describes it, on its way to a material and its textures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from lambent.core.frames import Floats
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.loaders.varying import Varying, combined, constant, relative
+from lambent.scenes.scene import MaterialTextures, Texture, Triple
+
+ROUGHNESS_MIN, ROUGHNESS_MAX = 0.003, 4.0  # slopes; below the first single precision loses the lobe
+BLACK = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Gloss:
+    """One lobe: slope roughness `m` along t, times `aspect` across; coefficient k; r0, at normal incidence."""
+
+    m: Varying
+    k: Varying
+    r0: Floats
+    aspect: float = 1.0
+    side: Literal["reflection", "transmission"] = "reflection"
+    distribution: Literal["beckmann", "ggx"] = "ggx"
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Diffuse reflection (coupled to Fresnel or not), diffuse transmission, lobes, and what modulates them."""
+
+    kd: Varying = field(default_factory=lambda: constant(BLACK))
+    coupled: bool = False
+    kt_d: Varying = field(default_factory=lambda: constant(BLACK))
+    glosses: tuple[Gloss, ...] = ()
+    normal: Texture | None = None
+    direction: Texture | None = None
+    opacity: Texture | None = None
+    cutoff: float = 0.5
+    emission: Triple = (0.0, 0.0, 0.0)
+
+
+def finished(name: str, surface: Surface, said: list[str]) -> tuple[Material, MaterialTextures | None]:
+    """Material document and textures of a surface; None where nothing varies.
+
+    The document holds the means, so that it is right without its textures. Lobes share a texture of their coefficients
+    and one of their roughness: where theirs differ the first holds, and `said` is told.
+    """
+    kd, diffuse = relative(surface.kd, surface.opacity)
+    kt_d, through = relative(surface.kt_d, surface.opacity)
+    if diffuse is not None and through is not None and not _same(diffuse, through):
+        said.append("its diffuse transmission varies as its diffuse reflection does")
+    lobes, shades, slopes = [], [], []
+    for gloss in surface.glosses:
+        k, shade = relative(gloss.k, surface.opacity)
+        m, slope = relative(gloss.m, surface.opacity)
+        shades.append(shade)
+        slopes.append(slope)
+        mx, my = (min(max(float(v), ROUGHNESS_MIN), ROUGHNESS_MAX) for v in (m[0], m[0] * gloss.aspect))
+        form = {"side": gloss.side, "distribution": gloss.distribution, "alpha": cosine_power(max(mx, my))}
+        lobes.append(Lobe(k=triple(k), mx=mx, my=my, r0=triple(np.clip(gloss.r0, 0, 1)), **form))
+    textures = MaterialTextures(
+        diffuse=_rgb(diffuse or through),
+        specular=_rgb(_shared(shades, "colours", said)),
+        roughness=_shared(slopes, "roughness", said),
+        normal=surface.normal,
+        direction=surface.direction,
+        opacity=surface.opacity,
+        cutoff=surface.cutoff,
+    )
+    coupled = surface.coupled and any(kd)
+    material = Material(name=name, kd=triple(kd), kd_coupled=coupled, kt_d=triple(kt_d), lobes=tuple(lobes))
+    varies = textures != MaterialTextures(cutoff=textures.cutoff)
+    return material, textures if varies else None
+
+
+def cosine_power(m: float) -> float:
+    """Exponent of (cos_i cos_o): 1/2 on smooth surfaces, less on rough ones, where 1/2 would return too much light."""
+    return 0.5 * min(1.0, math.sqrt(0.25 / m))
+
+
+def seen_through(surface: Surface, opacity: Floats) -> Surface:
+    """A surface that covers a share (3,) of what is behind it; the rest goes straight through."""
+    held = constant(opacity)
+
+    def part(v: Varying) -> Varying:
+        return combined(lambda a, b: a * b, v, held, said=[])
+
+    glosses = tuple(replace(g, k=part(g.k)) for g in surface.glosses)
+    return replace(
+        surface, kd=part(surface.kd), kt_d=part(surface.kt_d), glosses=(*glosses, straight_through(1 - opacity))
+    )
+
+
+def straight_through(k: Floats) -> Gloss:
+    """Light that goes on as it came, a share k (3,) of it: the narrowest lobe there is."""
+    return Gloss(constant(ROUGHNESS_MIN), constant(k), BLACK, side="transmission")
+
+
+def blended(parts: Sequence[tuple[Surface, float]], said: list[str]) -> Surface:
+    """Sum of surfaces, each with its share; the first normal map and mask hold."""
+    first = parts[0][0]
+    kd, kt_d = constant(BLACK), constant(BLACK)
+    glosses: list[Gloss] = []
+    coupled = 0.0
+    for surface, share in parts:
+
+        def weighed(v: Varying, share: float = share) -> Varying:
+            return Varying(v.values * share, v.uv_transform)
+
+        kd = combined(np.add, weighed(surface.kd), kd, said=said)
+        kt_d = combined(np.add, weighed(surface.kt_d), kt_d, said=said)
+        glosses += [replace(g, k=weighed(g.k)) for g in surface.glosses]
+        coupled += float(surface.kd.mean.mean()) * share * (1 if surface.coupled else -1)
+    return replace(first, kd=kd, kt_d=kt_d, coupled=coupled > 0, glosses=tuple(glosses))
+
+
+def _shared(found: Sequence[Texture | None], what: str, said: list[str]) -> Texture | None:
+    """The texture of all lobes."""
+    textures = [t for t in found if t is not None]
+    if not textures:
+        return None
+    if any(t is None or not _same(t, textures[0]) for t in found):
+        said.append(f"the {what} of its lobes vary in different ways: all follow the first that does")
+    return textures[0]
+
+
+def _rgb(texture: Texture | None) -> Texture | None:
+    if texture is None or texture.texels.shape[-1] == 3:
+        return texture
+    return replace(texture, texels=np.repeat(texture.texels, 3, axis=-1))
+
+
+def _same(a: Texture, b: Texture) -> bool:
+    if a.uv_transform != b.uv_transform or a.texels.shape != b.texels.shape:
+        return False
+    return a.texels is b.texels or bool(np.array_equal(a.texels, b.texels))
+
+
+def triple(values: Floats) -> Triple:
+    r, g, b = (float(v) for v in np.broadcast_to(values, 3))
+    return r, g, b
