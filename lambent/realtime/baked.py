@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.realtime.cube_mips import finite
+from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.contract import ObjectRecord, SceneRecord
 from lambent.store.store import Store
+from lambent.store.textures import read_textures
 
 Array = NDArray[np.floating]
 
@@ -42,6 +44,8 @@ class BakedScene:
     environment: Array | None = None
     probes: Mapping[str, Probe] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+    uv: Array | None = None
+    textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -73,7 +77,10 @@ def read_baked(store: Store) -> BakedScene:
             missing.append(f"{name}: {bad} values are negative or not finite and were set to 0")
         return values
 
-    two_sided = any(contract.is_two_sided(record.materials[o.material]) for o in record.objects)
+    masked = {name for name, textures in record.textures.items() if "opacity" in textures.parts}
+    two_sided = any(
+        contract.is_two_sided(record.materials[o.material], masked=o.material in masked) for o in record.objects
+    )
     probes = {}
     for obj in record.objects:
         name = contract.probe_name(obj.name, "radiance")
@@ -93,6 +100,8 @@ def read_baked(store: Store) -> BakedScene:
         light("environment/radiance", None),
         probes,
         tuple(missing),
+        uv=store.read("geometry/uv"),
+        textures=read_textures(store, record),
     )
 
 

@@ -27,7 +27,10 @@ from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.integrators import INTEGRATORS, integrator
 from lambent.realtime.passes.accumulate import AccumulatePass
+from lambent.realtime.mirror import mirror_views
+from lambent.realtime.mirror_integrators import AUTO, planar_integrator
 from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.planar import MOST_MIRRORS, PlanarPass
 from lambent.realtime.passes.shade import Draw, ShadePass
 from lambent.realtime.passes.sky import SkyPass
 from lambent.realtime.passes.smooth import SmoothPass
@@ -35,6 +38,7 @@ from lambent.realtime.passes.tonemap import FALSE_COLOUR, VIEW_TRANSFORMS, Tonem
 from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.resources import Layouts, SceneResources
 from lambent.realtime.targets import PassTimer, Targets
+from lambent.realtime.textures import bits_that_show
 from lambent.store.contract import CameraRecord
 from lambent.store.store import Store
 
@@ -74,6 +78,8 @@ class FrameState:
         How a direction finds its light in a probe: auto, plain, planes or distance.
     lookups : mapping
         The same for single objects, by name.
+    planar : str
+        How planar reflectors are drawn: auto, off (by their probes), or a way of `mirror_integrators`.
     show : str
         full, diffuse, specular, or light-map: the irradiance, W/m^2.
     accumulate : int, optional
@@ -96,6 +102,7 @@ class FrameState:
     materials: Mapping[str, Material] = field(default_factory=dict)
     lookup: str = "auto"
     lookups: Mapping[str, str] = field(default_factory=dict)
+    planar: str = AUTO
     show: str = "full"
     accumulate: int | None = None
     antialias: bool = True
@@ -104,6 +111,7 @@ class FrameState:
     def check(self) -> None:
         """Raise `UserError` for a value that no frame can have."""
         integrator(self.integrator)
+        planar_integrator(self.integrator, self.planar)
         if self.n is not None and not 1 <= self.n <= N_MAX:
             raise UserError("sample count is out of range", field="n", got=self.n, expected=f"1 to {N_MAX}")
         if self.view_transform not in VIEW_TRANSFORMS:
@@ -118,9 +126,9 @@ class FrameState:
             size = f"{self.width}x{self.height}"
             raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
 
-    def samples(self, material: Material) -> int:
-        """Samples per lobe of a material in this frame."""
-        return self.n or (QMC_N if self.integrator == "qmc" else automatic_n(material))
+    def samples(self, material: Material, roughness: float = 1.0) -> int:
+        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
+        return self.n or (QMC_N if self.integrator == "qmc" else automatic_n(material, roughness))
 
 
 class Renderer:
@@ -140,7 +148,9 @@ class Renderer:
         self.missing = self.scene.missing
         self._layouts = beside._layouts if beside else Layouts(device)
         self.resources = beside.resources if beside else SceneResources(device, self.scene, self._layouts)
-        self._depth, self._shade = DepthPass(device, self._layouts), ShadePass(device, self._layouts)
+        self._depth = DepthPass(device, self._layouts)
+        self._planar = PlanarPass(device, self._layouts, self.resources, self._depth)
+        self._shade = ShadePass(device, self._layouts, planar_layout=self._planar.shown_layout)
         self._sky, self._accumulate = SkyPass(device, self._layouts), AccumulatePass(device)
         self._tonemap = TonemapPass(device, self._layouts)
         self._smooth = SmoothPass(device, self._layouts, self.resources.sampler)
@@ -242,13 +252,15 @@ class Renderer:
             material = state.materials.get(name, self.scene.record.materials[name])
             lobes = len(material.lobes) if wanted.specular else 0
             how = wanted if lobes else INTEGRATORS["diffuse"]
-            n = how.rows or (state.samples(material) if lobes else 1)
+            n = how.rows or (state.samples(material, buffers.pictures.rough) if lobes else 1)
             buffers.update(material, how, n)
-            groups[name] = (how, lobes, n, buffers.group)
+            anisotropic = any(lobe.mx != lobe.my for lobe in material.lobes)
+            bits = bits_that_show(buffers.pictures.bits, lobes, anisotropic)
+            groups[name] = (how, lobes, n, buffers.group, bits)
         for item in self.resources.objects:
-            how, lobes, n, group = groups[item.record.material]
+            how, lobes, n, group, bits = groups[item.record.material]
             lookup = item.light.lookup(state.lookups.get(item.record.name, state.lookup)) if lobes else "plain"
-            draws.append(Draw(item, how, lobes, n, lookup, group))
+            draws.append(Draw(item, how, lobes, n, lookup, group, bits))
         return draws
 
     def _frame_data(self, state: FrameState) -> NDArray[np.void]:

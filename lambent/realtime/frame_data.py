@@ -10,6 +10,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.patterns import border
 from lambent.realtime.split_sum import roughness_level
+from lambent.realtime.textures import PARTS, MaterialPictures
 
 FRAME_DTYPE = np.dtype(  # Frame in shaders/frame.wgsl
     [
@@ -21,7 +22,12 @@ FRAME_DTYPE = np.dtype(  # Frame in shaders/frame.wgsl
 LOBE_DTYPE = np.dtype(  # PlacedLobe in shaders/surface.wgsl
     [("lobe", shader_layout.LOBE_DTYPE), ("border", "f4", 2), ("level", "f4"), ("unused", "f4")]
 )
-MATERIAL_DTYPE = np.dtype([("kd", "f4", 4), ("kt_d", "f4", 4)])
+MATERIAL_DTYPE = np.dtype(  # Material in shaders/material.wgsl
+    [
+        ("kd", "f4", 4), ("kt_d", "f4", 4), ("diffuse_scale", "f4", 4), ("specular_scale", "f4", 4),
+        ("lie", "f4", (2 * len(PARTS), 4)),
+    ]
+)  # fmt: skip
 OBJECT_DTYPE = np.dtype([("centre", "f4", 4), ("emission", "f4", 4)])
 
 
@@ -42,7 +48,10 @@ def sample_data(lobes: tuple[Lobe, ...], how: Integrator, n: int) -> NDArray[np.
     return np.concatenate([how.table(lobe, n) for lobe in lobes]).astype(np.float32)
 
 
-def material_data(material: Material) -> NDArray[np.void]:
+def material_data(material: Material, pictures: MaterialPictures) -> NDArray[np.void]:
     data = np.zeros(1, MATERIAL_DTYPE)
     data["kd"][0], data["kt_d"][0, :3] = (*material.kd, material.kd_coupled), material.kt_d
+    data["diffuse_scale"][0] = (*pictures.scale("diffuse"), pictures.cutoff)
+    data["specular_scale"][0, :3] = pictures.scale("specular")
+    data["lie"][0] = pictures.lie
     return data

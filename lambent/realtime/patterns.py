@@ -174,8 +174,8 @@ def border(lobe: Lobe) -> Floats:
     return float(radius(1 - BORDER_MASS, lobe.distribution == "ggx")) * np.array([lobe.mx, lobe.my])
 
 
-def automatic_n(material: Material) -> int:
-    """Samples that a material needs: few for mirrors, more the wider its widest lobe."""
-    m = max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
+def automatic_n(material: Material, roughness: float = 1.0) -> int:
+    """Samples that a material needs: few for mirrors, more the wider its widest lobe, `roughness` times as wide."""
+    m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
     return next((n for limit, n in steps if m <= limit), 19)

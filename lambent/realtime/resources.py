@@ -16,12 +16,13 @@ from lambent.realtime.device import WEBGPU_LIMITS
 from lambent.realtime.frame_data import OBJECT_DTYPE, lobe_data, material_data, sample_data
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.split_sum import prefiltered_cube
+from lambent.realtime.textures import PARTS, MaterialPictures, Pictures, material_pictures
 from lambent.store.contract import HALF_MAX, ObjectRecord
 
 Floats = NDArray[np.floating]
 LOOKUPS = {"plain": 0, "planes": 1, "distance": 2}
 PLANE_STEP = 6  # plane counts are padded to multiples of this: each count is a pipeline of its own
-VERTEX_FLOATS = 11  # position, normal, tangent, uv2
+VERTEX_FLOATS = 13  # position, normal, tangent, uv2, uv
 
 _FRAGMENT = wgpu.ShaderStage.FRAGMENT
 _BOTH = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
@@ -46,7 +47,7 @@ class Layouts:
     def __init__(self, device: Any) -> None:
         self._device = device
         self.frame = self._make(_BOTH, _UNIFORM, _SAMPLER)
-        self.material = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _STORAGE)
+        self.material = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _STORAGE, _SAMPLER, *[_FLAT] * len(PARTS))
         self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE)
         self.light = self._make(_FRAGMENT, _FLAT, _FLAT)
         self.cube = self._make(_FRAGMENT, _CUBE)
@@ -153,25 +154,31 @@ class Light:
 class MaterialBuffers:
     """A material's uniforms and samples; written again only when the material, the integrator or n changes."""
 
-    def __init__(self, device: Any, layouts: Layouts) -> None:
+    def __init__(self, device: Any, layouts: Layouts, sampler: Any, pictures: MaterialPictures) -> None:
         self._device, self._layouts = device, layouts
+        self.pictures = pictures
+        self._bound = (sampler, *(picture.view for picture in pictures.pictures))
         self._written: tuple[Any, ...] = ()
         self._buffers: list[Any] = []
         self.group: Any = None
+
+    def twin(self) -> MaterialBuffers:
+        """Buffers of the same material for another pass, with another integrator or n."""
+        return MaterialBuffers(self._device, self._layouts, self._bound[0], self.pictures)
 
     def update(self, material: Material, how: Integrator, n: int) -> None:
         if self._written == (material, id(how), n):
             return
         self._written = (material, id(how), n)
         lobes = material.lobes if how.specular else ()
-        data = [material_data(material), lobe_data(lobes), sample_data(lobes, how, n)]
+        data = [material_data(material, self.pictures), lobe_data(lobes), sample_data(lobes, how, n)]
         if [d.nbytes for d in data] != [b.size for b in self._buffers]:
             usages = [wgpu.BufferUsage.UNIFORM, wgpu.BufferUsage.STORAGE, wgpu.BufferUsage.STORAGE]
             self._buffers = [
                 self._device.create_buffer(size=d.nbytes, usage=usage | wgpu.BufferUsage.COPY_DST)
                 for d, usage in zip(data, usages, strict=True)
             ]
-            self.group = self._layouts.group(self._layouts.material, *self._buffers)
+            self.group = self._layouts.group(self._layouts.material, *self._buffers, *self._bound)
         for buffer, values in zip(self._buffers, data, strict=True):
             self._device.queue.write_buffer(buffer, 0, values.tobytes())
 
@@ -208,7 +215,8 @@ class SceneResources:
             mag_filter="linear", min_filter="linear", mipmap_filter="linear",
             address_mode_u="clamp-to-edge", address_mode_v="clamp-to-edge", address_mode_w="clamp-to-edge",
         )  # fmt: skip
-        vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2], axis=1)
+        uv = np.zeros_like(scene.uv2) if scene.uv is None else scene.uv
+        vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = device.create_buffer_with_data(
             data=np.ascontiguousarray(np.nan_to_num(vertices), np.float32), usage=wgpu.BufferUsage.VERTEX
         )
@@ -216,7 +224,8 @@ class SceneResources:
             data=np.ascontiguousarray(scene.faces, np.uint32), usage=wgpu.BufferUsage.INDEX
         )
         self._light_maps = [flat_texture(device, scene.irradiance), flat_texture(device, scene.irradiance_back)]
-        self.light_group = layouts.group(layouts.light, *(t.create_view() for t in self._light_maps))
+        self.light_map_views = [texture.create_view() for texture in self._light_maps]
+        self.light_group = layouts.group(layouts.light, *self.light_map_views)
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
         self._environment = cube_texture(device, [environment])
         self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
@@ -227,4 +236,24 @@ class SceneResources:
             if probe not in lights:
                 lights[probe] = Light(device, probe, self.sampler)
             self.objects.append(ObjectResources(device, layouts, record, lights[probe]))
-        self.materials = {name: MaterialBuffers(device, layouts) for name in scene.record.materials}
+        pictures = Pictures(device)
+        self.materials = {
+            name: MaterialBuffers(
+                device, layouts, pictures.sampler, material_pictures(pictures, scene.textures.get(name))
+            )
+            for name in scene.record.materials
+        }
+        records = scene.record.objects
+        self.cut_out = [record for record in records if self.materials[record.material].pictures.masked]
+        self.whole_ranges = _ranges([record for record in records if record not in self.cut_out])
+
+
+def _ranges(records: list[ObjectRecord]) -> list[tuple[int, int]]:
+    """(first, count) of the faces of objects, neighbours together."""
+    ranges: list[tuple[int, int]] = []
+    for record in records:
+        if ranges and sum(ranges[-1]) == record.first_face:
+            ranges[-1] = (ranges[-1][0], ranges[-1][1] + record.face_count)
+        else:
+            ranges.append((record.first_face, record.face_count))
+    return ranges

@@ -59,6 +59,7 @@ def unbaked_scene(
     return BakedScene(
         record, whole.positions, whole.normals, whole.tangents, np.full((len(whole.positions), 2), 0.5, np.float32),
         whole.faces, np.full((4, 4, 3), irradiance, np.float32), None, environment, dict.fromkeys(meshes, probe),
+        uv=whole.uv,
     )  # fmt: skip
 
 
@@ -89,6 +90,7 @@ def with_diffuse_light(scene: BakedScene) -> BakedScene:
         normals=scene.normals[corners],
         tangents=scene.tangents[corners],
         uv2=uv2.reshape(-1, 2).astype(np.float32),
+        uv=None if scene.uv is None else scene.uv[corners],
         faces=np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
         irradiance=maps[0],
         irradiance_back=maps[1],

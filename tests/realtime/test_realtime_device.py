@@ -61,7 +61,7 @@ def test_a_large_scene_asks_for_what_it_needs(device) -> None:
     scene = wall_scene(GLOSS, np.ones((6, 2, 2, 3)))
     assert device_needs(scene) == {}
     large = type(scene)(**{**vars(scene), "positions": np.broadcast_to(np.float32(0), (7_000_000, 3))})
-    assert device_needs(large) == {"max-buffer-size": 7_000_000 * 44}
+    assert device_needs(large) == {"max-buffer-size": 7_000_000 * 52}
 
 
 def test_includes_come_once_and_in_order(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:

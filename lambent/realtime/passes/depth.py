@@ -14,7 +14,7 @@ VERTEX_BUFFERS = [
         "attributes": [
             {"format": format, "offset": offset * 4, "shader_location": location}
             for location, (format, offset) in enumerate(
-                [("float32x3", 0), ("float32x3", 3), ("float32x3", 6), ("float32x2", 9)]
+                [("float32x3", 0), ("float32x3", 3), ("float32x3", 6), ("float32x2", 9), ("float32x2", 11)]
             )
         ],
     }
@@ -23,21 +23,43 @@ TRIANGLES = {"topology": "triangle-list", "front_face": "ccw", "cull_mode": "non
 
 
 class DepthPass:
-    """Draws the depth (reversed: near/z) of all objects."""
+    """Draws the depth (reversed: near/z) of all objects; where a picture leaves a hole, of what is behind it."""
 
     def __init__(self, device: Any, layouts: Layouts) -> None:
-        module = device.create_shader_module(code=assemble("vertex.wgsl"))
-        self._pipeline = device.create_render_pipeline(
-            layout=device.create_pipeline_layout(bind_group_layouts=[layouts.frame]),
-            vertex={"module": module, "entry_point": "vertex_main", "buffers": VERTEX_BUFFERS},
-            primitive=TRIANGLES,
-            depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": True, "depth_compare": "greater"},
+        whole = device.create_shader_module(code=assemble("vertex.wgsl"))
+        cut_out = device.create_shader_module(code=assemble("mask.wgsl"))
+        groups = [layouts.frame, layouts.material]
+        self._whole = _pipeline(device, groups[:1], whole)
+        self._cut_out = _pipeline(
+            device, groups, cut_out, {"module": cut_out, "entry_point": "mask_main", "targets": []}
         )
 
     def draw(self, target: Any, resources: SceneResources) -> int:
-        """Encode into the render pass `target`, whose group 0 is set; returns the draw calls."""
-        target.set_pipeline(self._pipeline)
+        """Encode into the render pass `target`, whose group 0 is set; returns the draw calls.
+
+        The materials' bind groups must be there. The pass that follows shades where depths are equal, and so need not
+        look for holes again.
+        """
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
-        target.draw_indexed(resources.scene.faces.size)
-        return 1
+        target.set_pipeline(self._whole)
+        ranges = resources.whole_ranges
+        for first, count in ranges:
+            target.draw_indexed(count * 3, 1, first * 3)
+        cut_out = resources.cut_out
+        if cut_out:
+            target.set_pipeline(self._cut_out)
+        for record in cut_out:
+            target.set_bind_group(1, resources.materials[record.material].group)
+            target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
+        return len(ranges) + len(cut_out)
+
+
+def _pipeline(device: Any, groups: list[Any], module: Any, fragment: dict[str, Any] | None = None) -> Any:
+    return device.create_render_pipeline(
+        layout=device.create_pipeline_layout(bind_group_layouts=groups),
+        vertex={"module": module, "entry_point": "vertex_main", "buffers": VERTEX_BUFFERS},
+        fragment=fragment,
+        primitive=TRIANGLES,
+        depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": True, "depth_compare": "greater"},
+    )

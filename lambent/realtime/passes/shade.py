@@ -21,22 +21,55 @@ class Draw:
     n: int  # samples per lobe
     lookup: str
     material_group: Any
+    textures: int = 0  # bits of the pictures to read, see realtime.textures
+    planar: bool = False  # has pixels on planar reflectors
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a pass makes of an object's light: shader and entry point, what targets it has beside that of light."""
+
+    shader: str = "shade.wgsl"
+    entry: str = "shade_main"
+    front_face: str = "ccw"
+    further_targets: tuple[str, ...] = ()
+
+
+SHADE = Stage()
+
+
+def constants_of(draw: Draw) -> dict[str, int]:
+    """Constants of a draw's pipeline, not uniforms: the compiler unrolls, a quarter faster."""
+    return {
+        "SAMPLES": draw.n,
+        "LOBES": draw.lobes,
+        "TEXTURES": draw.textures,
+        "LOOKUP": LOOKUPS[draw.lookup],
+        "PLANES": draw.item.light.plane_count if draw.lookup == "planes" else 0,
+        **draw.integrator.constants,
+    }
 
 
 class ShadePass:
     """Draws objects where their depth is the one that the depth pass left."""
 
-    def __init__(self, device: Any, layouts: Layouts) -> None:
-        self._device = device
+    def __init__(self, device: Any, layouts: Layouts, stage: Stage = SHADE, planar_layout: Any = None) -> None:
+        """`planar_layout` is that of group 3 for draws with `planar`."""
+        self._device, self._stage = device, stage
+        if planar_layout is not None:
+            self._planar_layout = device.create_pipeline_layout(
+                bind_group_layouts=[layouts.frame, layouts.material, layouts.object, planar_layout]
+            )
         self._layout = device.create_pipeline_layout(
             bind_group_layouts=[layouts.frame, layouts.material, layouts.object, layouts.light]
         )
-        self._modules: dict[str, Any] = {}
+        self._modules: dict[tuple[str, ...], Any] = {}
         self._pipelines: dict[tuple[Any, ...], Any] = {}
 
-    def draw(self, target: Any, resources: SceneResources, draws: list[Draw], format: str) -> int:
+    def draw(
+        self, target: Any, resources: SceneResources, draws: list[Draw], format: str, planar_group: Any = None
+    ) -> int:
         """Encode into the render pass `target`, whose group 0 is set; returns the draw calls."""
-        target.set_bind_group(3, resources.light_group)
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
         for draw in draws:
@@ -44,36 +77,32 @@ class ShadePass:
             target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
             target.set_bind_group(2, draw.item.group(draw.integrator.prefiltered))
+            target.set_bind_group(3, planar_group if draw.planar else resources.light_group)
             target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
         return len(draws)
 
     def _pipeline(self, draw: Draw, format: str) -> Any:
-        # Constants, not uniforms: the compiler unrolls, a quarter faster.
-        constants = {
-            "SAMPLES": draw.n,
-            "LOBES": draw.lobes,
-            "LOOKUP": LOOKUPS[draw.lookup],
-            "PLANES": draw.item.light.plane_count if draw.lookup == "planes" else 0,
-            **draw.integrator.constants,
-        }
-        key = (draw.integrator.shader, format, *constants.values())
+        constants = constants_of(draw)
+        key = (draw.integrator.shader, draw.planar, format, *constants.values())
         if key not in self._pipelines:
-            module = self._module(draw.integrator.shader)
+            module = self._module(draw)
             self._pipelines[key] = self._device.create_render_pipeline(
-                layout=self._layout,
+                layout=self._planar_layout if draw.planar else self._layout,
                 vertex={"module": module, "entry_point": "vertex_main", "buffers": VERTEX_BUFFERS},
                 fragment={
                     "module": module,
-                    "entry_point": "shade_main",
-                    "targets": [{"format": format}],
+                    "entry_point": self._stage.entry,
+                    "targets": [{"format": target} for target in (format, *self._stage.further_targets)],
                     "constants": constants,
                 },
-                primitive=TRIANGLES,
+                primitive={**TRIANGLES, "front_face": self._stage.front_face},
                 depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": False, "depth_compare": "equal"},
             )
         return self._pipelines[key]
 
-    def _module(self, shader: str) -> Any:
-        if shader not in self._modules:
-            self._modules[shader] = self._device.create_shader_module(code=assemble(shader, "probe_light.wgsl", "shade.wgsl"))
-        return self._modules[shader]
+    def _module(self, draw: Draw) -> Any:
+        specular = "planar_shown.wgsl" if draw.planar else "probe_light.wgsl"
+        names = (draw.integrator.shader, specular, "shade.wgsl", self._stage.shader)
+        if names not in self._modules:
+            self._modules[names] = self._device.create_shader_module(code=assemble(*names))
+        return self._modules[names]

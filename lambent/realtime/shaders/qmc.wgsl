@@ -13,7 +13,7 @@ fn pixel_hash(pixel: vec2u, lobe: u32) -> vec2u {
 }
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
-    let lobe = lobes[index].lobe;
+    let lobe = lobe_here(index, s).lobe;
     let offset = pixel_hash(s.pixel, index);
     var sum = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {

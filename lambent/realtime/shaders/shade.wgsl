@@ -15,12 +15,24 @@ const HALF_MAX = 6e4; // below the largest half float
 // (along `view`) until cos_o is GRAZING, so that frame, mirror direction and lobe agree.
 fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     // a mesh may bring a zero normal, and one NaN would stay in the mean of a progressive series
-    let given = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12)) * facing;
+    let mesh_n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12));
+    var given = mesh_n * facing;
+    var brushed = v.t_world;
+    var shown = painted(v.uv);
+    if ((TEXTURES & 24u) != 0u) {
+        let flat_t = v.t_world - mesh_n * dot(mesh_n, v.t_world);
+        let mesh_t = flat_t * inverseSqrt(max(dot(flat_t, flat_t), 1e-12));
+        let mesh_b = cross(mesh_n, mesh_t);
+        given = normalize(shown.slope.x * mesh_t + shown.slope.y * mesh_b + mesh_n) * facing;
+        brushed = shown.turn.x * mesh_t + shown.turn.y * mesh_b;
+        let shares = shown.turn * shown.turn;
+        shown.widening = vec2f(dot(shares, shown.widening), dot(shares.yx, shown.widening));
+    }
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
-    let along = v.t_world - n * dot(n, v.t_world);
+    let along = brushed - n * dot(n, brushed);
     let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
     let t = normalize(select(cross(n, other), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown);
 }
 
 fn surface_light(v: Varyings, front: bool) -> vec3f {
@@ -32,7 +44,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
     let e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front);
-    let diffuse = diffuse_light(wo.z, e_here, e_beyond);
+    let diffuse = diffuse_light(wo.z, e_here, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
     let specular = specular_light(wo, s);

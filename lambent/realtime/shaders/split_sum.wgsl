@@ -1,16 +1,21 @@
 // What today's engines do (Karis 2013): one look-up in a cube prefiltered for the roughness, about the normal, times
 // a table of the lobe's albedo. Isotropic: an anisotropic lobe gets the roughness sqrt(mx my).
+// Where a picture varies the roughness, the level follows it, and the table stays that of the material's numbers.
 // The table has rows (A, B) over cos_o: k (r0 A + B) is the albedo.
 
 #include "surface.wgsl"
 
+const LAST_LEVEL = 6.0; // LEVELS of split_sum.py, less one
+
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
-    let lobe = lobes[index].lobe;
+    let here = lobe_here(index, s);
+    let lobe = here.lobe;
     let place = clamp(wo.z, 0.0, 1.0) * f32(SAMPLES) - 0.5;
     let row = u32(clamp(floor(place), 0.0, f32(SAMPLES - 2u)));
     let at = index * SAMPLES + row;
     let ab = mix(samples[at].xy, samples[at + 1u].xy, clamp(place - f32(row), 0.0, 1.0));
     let f = select(lobe.r0 * ab.x + ab.y, (1.0 - lobe.r0) * ab.x, lobe.side == LAMBENT_TRANSMISSION);
+    let level = lobes[index].level * exp2(0.5 * here.half_log2_growth); // goes with the root of sqrt(mx my)
     let mirror = vec3f(-wo.xy, wo.z);
-    return lobe.k * f * incident_at_level(s, on_side(lobe, mirror), lobes[index].level);
+    return lobe.k * f * incident_at_level(s, on_side(lobe, mirror), min(level, LAST_LEVEL));
 }

@@ -1,6 +1,7 @@
 // Materials (group 1), objects and the light around them (group 2), and how a direction finds its light.
 
 #include "lobes.wgsl"
+#include "material.wgsl"
 
 override SAMPLES: u32 = 7u; // n per lobe
 override LOBES: u32 = 1u;
@@ -15,17 +16,11 @@ struct PlacedLobe {
     unused: f32,
 }
 
-struct Material {
-    kd: vec4f, // w: 1 where the diffuse reflection is coupled to Fresnel
-    kt_d: vec4f,
-}
-
 struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
 }
 
-@group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
 @group(1) @binding(2) var<storage, read> samples: array<vec4f>; // see patterns.py
 
@@ -34,13 +29,36 @@ struct Object {
 @group(2) @binding(2) var radiance_cube: texture_cube<f32>;
 @group(2) @binding(3) var inverse_depth_cube: texture_cube<f32>; // 1/max(|x|, |y|, |z|) of what is seen, 1/m
 
-// Shading frame and place of a pixel; n is turned to the viewer.
+// Shading frame and place of a pixel, and what the material's pictures say there; n is turned to the viewer, and
+// painted.widening is along t and b.
 struct Surface {
     t: vec3f,
     b: vec3f,
     n: vec3f,
     x: vec3f,      // position about the probe's centre
     pixel: vec2u,
+    painted: Painted,
+}
+
+// A lobe where the pictures have changed its numbers: the samples, of slopes of the material's mx and my, grow by
+// `growth` along t and b, and the solid angle they stand for by its product.
+struct LobeHere {
+    lobe: LambentLobe,
+    growth: vec2f,
+    half_log2_growth: f32, // log2(growth.x growth.y)/2
+}
+
+fn lobe_here(index: u32, s: Surface) -> LobeHere {
+    var lobe = lobes[index].lobe;
+    if ((TEXTURES & 14u) == 0u) { return LobeHere(lobe, vec2f(1.0), 0.0); }
+    lobe.k *= s.painted.specular;
+    let m = vec2f(lobe.mx, lobe.my);
+    let factor = clamp(s.painted.roughness, 0.001 / min(m.x, m.y), 4.0 / max(m.x, m.y)); // bounds of a document
+    let here = sqrt(factor * factor * m * m + s.painted.widening);
+    lobe.mx = here.x;
+    lobe.my = here.y;
+    let growth = here / m;
+    return LobeHere(lobe, growth, 0.5 * log2(growth.x * growth.y));
 }
 
 // Where to look in the probe (not unit), and the distance from the surface to what is seen there.
@@ -130,9 +148,9 @@ fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
 
 // Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A coupled kd is kd t(cos_o) times
 // the mean of (21/20) t(cos_i) over the light, which is 1 under uniform light and taken as 1 under any.
-fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f) -> vec3f {
+fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -> vec3f {
     let seen = select(1.0, lambent_under_fresnel(cos_o), material.kd.w > 0.5);
-    return (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
+    return painted.diffuse * (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
 }
 
 // A direction of the upper side on the lobe's side: transmission is reflection mirrored at the surface.

@@ -16,8 +16,9 @@ fn tangent_of_angle(a: vec3f, b: vec3f) -> f32 {
 }
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
-    let lobe = lobes[index].lobe;
-    let border = lobes[index].border;
+    let here = lobe_here(index, s);
+    let lobe = here.lobe;
+    let border = lobes[index].border * here.growth;
     let centre = vec3f(-wo.xy, wo.z);
     let u = tangent_of_angle(centre, reflected(wo, vec2f(border.x, 0.0)));
     let v = tangent_of_angle(centre, reflected(wo, vec2f(0.0, border.y)));
@@ -26,7 +27,8 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     var weights = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
-        let h = vec3f(sample.xy, 1.0) * inverseSqrt(1.0 + dot(sample.xy, sample.xy));
+        let slope = sample.xy * here.growth; // no longer quite equal angles where the roughness varies
+        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
         let cos_d = dot(wo, h);
         let wi = 2.0 * cos_d * h - wo;
         if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }

@@ -1,0 +1,194 @@
+"""Pictures of materials on the GPU: all MIP levels, made once, of what may be averaged.
+
+diffuse, specular   bytes, sRGB encoded, times a scale per channel: half a step is less than the eye sees
+roughness           the mean of squares: slopes' variances add
+normal              mean slopes, and twice the variance of the slopes within a texel (0 on level 0), which widens
+                    the lobes: what a texel of bumps reflects is as wide as its bumps lean apart (Olano & Baker
+                    2010, "LEAN mapping", without the covariance)
+direction           cosine and sine of the doubled angle
+opacity             every level has the share of surface that level 0 has (Castano 2010), so that leaves keep
+                    their area; the test at the cutoff is sharp, edges are smoothed as those of triangles are
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.core.colour import srgb_encode
+from lambent.scenes.scene import MaterialTextures, Texture
+from lambent.scenes.textures import CHANNELS, doubled_angle, halved, parts, slopes
+
+Floats = NDArray[np.floating]
+PARTS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
+BITS = {part: 1 << i for i, part in enumerate(PARTS)}
+ROUGH_SHARE = 0.9  # of a picture's texels are at most as rough as what chooses the number of samples
+ANISOTROPY = 8
+_ALL_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+
+
+def chain(texels: Floats) -> list[Floats]:
+    """Means (H, W, C) float32 of all levels down to one texel."""
+    levels = [np.asarray(texels, np.float32)]
+    while max(levels[-1].shape[:2]) > 1:
+        levels.append(halved(levels[-1]))
+    return levels
+
+
+def roughness_levels(texels: Floats) -> list[Floats]:
+    return [np.sqrt(level) for level in chain(np.square(texels, dtype=np.float32))]
+
+
+def normal_levels(normals: Floats) -> list[Floats]:
+    """(H, W, 4): slopes along t and b, and twice their variances."""
+    s = slopes(normals)
+    return [
+        np.concatenate([moments[..., :2], 2 * np.maximum(moments[..., 2:] - moments[..., :2] ** 2, 0)], axis=-1)
+        for moments in chain(np.concatenate([s, s * s], axis=-1))
+    ]
+
+
+def opacity_levels(opacity: Floats, cutoff: float) -> list[Floats]:
+    """Levels scaled so that each is at or above the cutoff on the same share of its texels."""
+    levels = chain(opacity)
+    share = float((levels[0] >= cutoff).mean())
+    if not 0 < share < 1:
+        return levels
+    return [levels[0], *(_with_share(level, cutoff, share) for level in levels[1:])]
+
+
+def _with_share(opacity: Floats, cutoff: float, share: float) -> Floats:
+    """`opacity` times a factor; the factor is found between texels, so that a level of few texels errs least."""
+    ordered = np.sort(opacity, axis=None)[::-1]
+    edge = np.interp(share * len(ordered), np.arange(len(ordered)) + 0.5, ordered)
+    return np.asarray(opacity * np.float32(cutoff / max(float(edge), 1e-3)))
+
+
+def encoded(texels: Floats) -> tuple[list[NDArray[np.uint8]], tuple[float, ...]]:
+    """Levels (H, W, 4) as sRGB bytes, and the scale (3) of their decoded values."""
+    scale = np.maximum(texels.max(axis=(0, 1)).astype(float), 1e-6)
+    with np.errstate(invalid="ignore"):
+        relative = np.clip(np.nan_to_num(_ALL_HALVES.astype(float)[:, None] / scale), 0, 1)
+    table = (srgb_encode(relative) * 255 + 0.5).astype(np.uint8)  # a look-up is faster than a power
+    levels = []
+    for level in chain(texels):
+        bits = level.astype(np.float16).view(np.uint16)
+        rgba = np.full((*level.shape[:2], 4), 255, np.uint8)
+        for c in range(3):
+            rgba[..., c] = table[bits[..., c], c]
+        levels.append(rgba)
+    return levels, tuple(float(x) for x in scale)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A texture's view; decoded texels count times `scale`."""
+
+    view: Any
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+
+class Pictures:
+    """The pictures of a scene, each on the GPU once."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+        self._made: dict[tuple[str, int, float], Picture] = {}
+        self._kept: list[Any] = []  # arrays, so that no other comes to stand at a made one's address
+        white = np.full((1, 1, 4), 255, np.uint8)
+        self.none = Picture(self._uploaded([white], "rgba8unorm"))
+        self.sampler = device.create_sampler(
+            mag_filter="linear", min_filter="linear", mipmap_filter="linear", max_anisotropy=ANISOTROPY,
+            address_mode_u="repeat", address_mode_v="repeat",
+        )  # fmt: skip
+
+    def picture(self, part: str, texture: Texture, cutoff: float) -> Picture:
+        key = (part, id(texture.texels), cutoff if part == "opacity" else 0.0)
+        if key not in self._made:
+            self._kept.append(texture.texels)
+            self._made[key] = self._new(part, texture.texels, cutoff)
+        return self._made[key]
+
+    def _new(self, part: str, texels: Floats, cutoff: float) -> Picture:
+        if part in ("diffuse", "specular"):
+            levels, scale = encoded(texels)
+            return Picture(self._uploaded(levels, "rgba8unorm-srgb"), scale)
+        if part == "normal":
+            return Picture(self._uploaded(_halves(normal_levels(texels)), "rgba16float"))
+        if part == "direction":
+            return Picture(self._uploaded(_halves(chain(doubled_angle(texels))), "rg16float"))
+        made = roughness_levels(texels) if part == "roughness" else opacity_levels(texels, cutoff)
+        return Picture(self._uploaded(_halves(made), "r16float"))
+
+    def _uploaded(self, levels: list[Any], format: str) -> Any:
+        height, width = levels[0].shape[:2]
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        texture = (
+            self._device.create_texture(
+                size=(width, height, 1), format=format, mip_level_count=max(width, height).bit_length(), usage=usage
+            )
+            if len(levels) > 1
+            else self._device.create_texture(size=(width, height, 1), format=format, usage=usage)
+        )
+        for level, values in enumerate(levels):
+            rows, columns, channels = values.shape
+            self._device.queue.write_texture(
+                {"texture": texture, "mip_level": level},
+                np.ascontiguousarray(values),
+                {"bytes_per_row": columns * channels * values.itemsize, "rows_per_image": rows},
+                (columns, rows, 1),
+            )
+        return texture.create_view()
+
+
+def _halves(levels: list[Floats]) -> list[NDArray[np.float16]]:
+    return [np.clip(level, -65504, 65504).astype(np.float16) for level in levels]
+
+
+@dataclass(frozen=True)
+class MaterialPictures:
+    """What a material's bind group holds, in the order of PARTS, and which of it is more than a stand-in."""
+
+    pictures: tuple[Picture, ...]
+    bits: int = 0
+    cutoff: float = 0.5
+    lie: NDArray[np.float32] = field(default_factory=lambda: np.zeros((2 * len(PARTS), 4), np.float32))
+    rough: float = 1.0  # factor on the roughness that most of the surface stays below
+
+    @property
+    def masked(self) -> bool:
+        return bool(self.bits & BITS["opacity"])
+
+    def scale(self, part: str) -> tuple[float, ...]:
+        return self.pictures[PARTS.index(part)].scale
+
+
+def material_pictures(pictures: Pictures, textures: MaterialTextures | None) -> MaterialPictures:
+    """The pictures of one material; stand-ins of one texel where it has none."""
+    there = parts(textures) if textures is not None else {}
+    if textures is None or not there:
+        return MaterialPictures((pictures.none,) * len(PARTS))
+    lie = np.zeros((2 * len(PARTS), 4), np.float32)
+    for i, part in enumerate(PARTS):
+        if part in there:
+            lie[2 * i : 2 * i + 2, :3] = there[part].uv_transform
+    rough = float(np.quantile(there["roughness"].texels, ROUGH_SHARE)) if "roughness" in there else 1.0
+    return MaterialPictures(
+        tuple(pictures.picture(p, there[p], textures.cutoff) if p in there else pictures.none for p in PARTS),
+        sum(BITS[part] for part in there),
+        textures.cutoff,
+        lie,
+        rough,
+    )
+
+
+def bits_that_show(bits: int, lobes: int, anisotropic: bool) -> int:
+    """The pictures that shading reads: opacity is tested before, and without lobes only the diffuse one counts."""
+    shown = bits & ~BITS["opacity"]
+    if not lobes:
+        return shown & BITS["diffuse"]
+    return shown if anisotropic else shown & ~BITS["direction"]
