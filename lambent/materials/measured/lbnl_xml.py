@@ -58,7 +58,7 @@ def read(path: Path) -> LbnlTable:
 
 
 @dataclass(frozen=True)
-class _Use:
+class Use:
     """How light that comes from one side is answered: by a part of the file, or by the other side's backwards."""
 
     part: Part
@@ -67,6 +67,8 @@ class _Use:
 
 class LbnlTable:
     """Both sides of a sheet, each with reflection and transmission, as far as the file has them.
+
+    `uses` says by (way, side of the light) which part answers.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ class LbnlTable:
 
     def __init__(self, file: str, parts: dict[Where, Part], notes: tuple[str, ...] = ()) -> None:
         self.parts = parts
-        self._uses = {where: use for where in _NAMES if (use := _use(parts, where)) is not None}
+        self.uses = {where: use for where in _NAMES if (use := _use(parts, where)) is not None}
         self._turned = not any(side == 1 for _, side in parts)
         anisotropy = max(part.anisotropy for part in parts.values())
         self.info = TableInfo(
@@ -94,13 +96,18 @@ class LbnlTable:
             notes=(*notes, *self._notes(anisotropy)),
         )
 
+    @property
+    def has_a_back(self) -> bool:
+        """Whether the table says anything of light from -z."""
+        return any(side == -1 for _, side in self.uses)
+
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr of wi, wo (..., 3) on any side; 0 at the horizon."""
         wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
         shape = wi.shape[:-1]
         wi, wo = wi.reshape(-1, 3), wo.reshape(-1, 3)
         f = np.zeros((len(wi), self.info.channels))
-        for (way, side), use in self._uses.items():
+        for (way, side), use in self.uses.items():
             far = -side if way == "transmission" else side
             here = (wi[:, 2] * side > 0) & (wo[:, 2] * far > 0)
             entering, leaving = _entering(wi[here]), _leaving(wo[here])
@@ -128,7 +135,7 @@ class LbnlTable:
         """
         side: Side = -1 if self._turned else 1
         columns: list[list[Floats]] = [[], [], [], []]
-        for (way, from_side), use in self._uses.items():
+        for (way, from_side), use in self.uses.items():
             if from_side == side:
                 entering, leaving, f, weight = use.part.tuples_reversed() if use.backwards else use.part.tuples()
                 far = -1.0 if way == "transmission" else 1.0
@@ -144,7 +151,7 @@ class LbnlTable:
     def _hemispherical(self, wi: Floats, way: Way) -> Floats:
         flat = np.asarray(wi, float).reshape(-1, 3)
         total = np.zeros((len(flat), self.info.channels))
-        for (way_of, side), use in self._uses.items():
+        for (way_of, side), use in self.uses.items():
             here = flat[:, 2] * side > 0
             if way_of != way or not here.any():
                 continue
@@ -158,10 +165,10 @@ class LbnlTable:
     def _notes(self, anisotropy: float) -> list[str]:
         notes = ["+z is the side the file calls Back and Radiance calls front"]
         for where, name in _NAMES.items():
-            if where not in self._uses:
+            if where not in self.uses:
                 if where[0] == "reflection":
                     notes.append(f"{name} is not in the file, or zero: black")
-            elif self._uses[where].backwards:
+            elif self.uses[where].backwards:
                 notes.append(f"{name} is not in the file, or zero: the other side's backwards, as Radiance does")
         if self._turned:
             notes.append("the file knows light from -z alone: for a fit the sheet is turned over")
@@ -192,9 +199,9 @@ def _leaving(wo: Floats) -> Floats:
     return np.column_stack([wo[:, 0], wo[:, 1], np.abs(wo[:, 2])])
 
 
-def _use(parts: dict[Where, Part], where: Where) -> _Use | None:
+def _use(parts: dict[Where, Part], where: Where) -> Use | None:
     way, side = where
     other: Where = (way, 1 if side == -1 else -1)
     if where in parts:
-        return _Use(parts[where], backwards=False)
-    return _Use(parts[other], backwards=True) if way == "transmission" and other in parts else None
+        return Use(parts[where], backwards=False)
+    return Use(parts[other], backwards=True) if way == "transmission" and other in parts else None
