@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,10 +17,14 @@ from lambent.realtime.device import open_device
 from lambent.realtime.frame import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.store.store import Store
+from lambent.viewer.comparison import Comparison
+from lambent.viewer.filming import FilmOptions
 from lambent.viewer.input import Input, Rect
 from lambent.viewer.picking import Geometry
-from lambent.viewer.picture import CHOICES, Picture
+from lambent.viewer.picture import CHOICES
+from lambent.viewer.pictures import Pictures
 from lambent.viewer.state import Mode, ViewerState
+from lambent.viewer.views import SavedViews
 
 MODES: dict[str, Mode] = {"walk": "walk", "view": "orbit"}
 MAX_FPS = 60
@@ -61,11 +66,38 @@ def run(
     if mode not in MODES:
         raise UserError("unknown mode", got=mode, expected=" or ".join(MODES))
     check_display()
-    scene = read_baked(Store.open(store_path))
+    store = Store.open(store_path)
+    scene = read_baked(store)
     state = ViewerState.of(scene.record, CHOICES, MODES[mode], folder=folder or Path.cwd(), missing=scene.missing)
+    state.views = SavedViews(scene.record, store.folder, state.say)
+    state.views.load()
+    state.comparison, state.film, state.notes = Comparison(), FilmOptions(), light_map_notes(store)
     geometry = Geometry(scene.positions, scene.faces, scene.record.objects)
-    picture = Picture(Renderer(open_device(device_needs(scene)), scene))
-    Window(state, geometry, picture, size=size, frames=frames).run()
+    pictures = Pictures(Renderer(open_device(device_needs(scene)), scene))
+    window = Window(state, geometry, pictures, size=size, frames=frames)
+    try:
+        window.run()
+    except Exception:
+        for rescued in state.rescue_materials():
+            sys.stderr.write(f"lambent: note: an unsaved material is in {rescued}\n")
+        raise
+    finally:
+        pictures.close(state)
+    if state.unsaved:
+        sys.stderr.write(f"lambent: note: {', '.join(state.unsaved)} changed and not saved\n")
+
+
+def light_map_notes(store: Store) -> tuple[str, ...]:
+    """What the bake says of its light map: its noise and samples, per side."""
+    notes = []
+    for name in ("light_map/irradiance", "light_map/irradiance_back"):
+        meta = store.artefact(name).meta if name in store else {}
+        if isinstance(meta.get("noise"), float) and isinstance(meta.get("samples"), float):
+            side = "far side" if name.endswith("back") else "light map"
+            notes.append(
+                f"{side}: noise {100 * meta['noise']:.1f} % before denoising, {meta['samples']:.0f} samples a texel"
+            )
+    return tuple(notes)
 
 
 def check_display(hint: str = "use `lambent render`, or `lambent demo --headless`") -> None:
@@ -85,6 +117,9 @@ class Drawing(Protocol):
 
     @property
     def views(self) -> tuple[Any, ...]: ...
+
+    @property
+    def images(self) -> Mapping[str, np.ndarray[Any, np.dtype[np.uint8]]]: ...
 
     def update(self, state: ViewerState, rect: Rect, pixel_ratio: float) -> None: ...
 
@@ -163,6 +198,8 @@ class Window:
     def _on_event(self, event: dict[str, Any]) -> None:
         self._extra_frames = SETTLE_FRAMES
         self.canvas.request_draw()
+        if event["event_type"] == "pointer_leave":
+            self.state.meter.cursor = None
         if event["event_type"] in FOR_IMGUI_ONLY:
             return
         with self._failed:
@@ -183,6 +220,8 @@ class Window:
         dt_s = since_last_s if self._moving else 0.0  # the sleep before a first step is not walked through
         self._input.walk(state, dt_s)
         state.play(dt_s)
+        if state.recorder.take(state.camera, now_s):
+            state.record()
         state.drop_old_messages()
         if state.editor is not None:
             state.editor.tick()
@@ -204,6 +243,7 @@ class Window:
     def _register(self) -> None:
         """Tell Dear ImGui of the pictures' textures, and of the editor's, where they are new ones."""
         wanted: dict[str, Any] = {f"picture {'AB'[i]}": view for i, view in enumerate(self._picture.views)}
+        wanted |= self._picture.images
         if self.state.editor is not None:
             wanted |= self.state.editor.shown.images
         for name in [name for name in self._textures if self._made_of[name] is not wanted.get(name)]:
@@ -262,6 +302,8 @@ class Window:
         waits = [m.until_s - self.state.clock() for m in self.state.messages]
         if self.state.editor is not None and self.state.editor.busy:
             waits.append(POLL_S)
+        if self.state.recorder.on:
+            waits.append(POLL_S)  # its clock is shown
         due = self._picture.wait_s(self.state)
         if due is not None:
             waits.append(due)

@@ -80,12 +80,15 @@ def walk(
     floor_y: float | None,
     flying: bool = False,
     fast: bool = False,
+    pace_m_s: float | None = None,
+    height_m: float | None = None,
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
 ) -> CameraRecord:
     """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
     On foot the eye moves level, as far as `allowed(eye, step)` gives way, and settles at eye height above `floor_y`
-    (the scene's lowest point where it is None). Flying, it moves along the line of sight, through everything, and up
+    (the scene's lowest point where it is None). `pace_m_s` and `height_m` are the walker's own, in place of those that
+    suit the scene. Flying, it moves along the line of sight, through everything, and up
     and down by the keys for it.
     """
     right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
@@ -98,10 +101,13 @@ def walk(
     length = float(np.linalg.norm(step))
     if length > 0:
         step = step / length
-    eye, step = np.array(camera.position), step * speed_m_s(bounds, fast) * dt_s
+    eye, step = (
+        np.array(camera.position),
+        step * (pace_m_s * (FAST if fast else 1.0) if pace_m_s else speed_m_s(bounds, fast)) * dt_s,
+    )
     eye = eye + (step if flying else allowed(eye, step))
     if not flying:
-        eye_y = (bounds[0][1] if floor_y is None else floor_y) + eye_height_m(bounds)
+        eye_y = (bounds[0][1] if floor_y is None else floor_y) + (height_m or eye_height_m(bounds))
         eye[1] += (eye_y - eye[1]) * (1 - math.exp(-dt_s / SETTLE_S))
     eye = confined(eye, camera.position, bounds)
     return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))

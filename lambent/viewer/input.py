@@ -27,7 +27,9 @@ SHORTCUTS = (
     ("wheel", "nearer to the target, or away (orbit)"),
     ("click", "select the object under the mouse"),
     ("Esc", "select nothing"),
-    ("1 ... 9", "jump to a camera of the scene"),
+    ("1 ... 9", "jump to a camera of the scene, or a saved view"),
+    ("V", "save the view"),
+    ("R", "record the way, or stop"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
@@ -78,6 +80,8 @@ class Input:
     def handle(self, state: ViewerState, event: Mapping[str, Any], *, ui_has_mouse: bool, ui_has_keys: bool) -> None:
         """Apply one event. What begins over the interface belongs to it, even where it ends over the picture."""
         kind = event["event_type"]
+        if kind == "pointer_move":
+            self._point(state, event, ui_has_mouse)
         if kind == "pointer_down" and not ui_has_mouse and self.picture.holds(event["x"], event["y"]):
             self._press(event)
         elif kind == "pointer_move" and self._button is not None:
@@ -102,7 +106,7 @@ class Input:
         if not self.walking or state.mode != "walk":
             return
         bounds = state.scene.bounds
-        height = cameras.eye_height_m(bounds)
+        height = state.walker.eye_height_m
         moved = cameras.walk(
             state.camera,
             self.held,
@@ -111,9 +115,16 @@ class Input:
             floor_y=None if state.flying else self.geometry.floor_below(state.camera.position, height),
             flying=state.flying,
             fast=self._fast,
+            pace_m_s=state.walker.speed_m_s,
+            height_m=height,
             allowed=lambda eye, step: self.geometry.allowed(eye, step, height),
         )
         state.move(moved)
+
+    def _point(self, state: ViewerState, event: Mapping[str, Any], ui_has_mouse: bool) -> None:
+        over = not ui_has_mouse and self.picture.holds(event["x"], event["y"])
+        x, y = event["x"] - self.picture.x + 0.5, event["y"] - self.picture.y + 0.5
+        state.meter.cursor = (x / self.picture.width, y / self.picture.height) if over else None
 
     def _press(self, event: Mapping[str, Any]) -> None:
         if self._button is None:
@@ -165,5 +176,9 @@ class Input:
             state.mode = "walk" if state.mode == "orbit" else "orbit"
         elif letter == "Escape":
             state.select(None)
-        elif letter in "123456789" and int(letter) <= len(state.scene.cameras):
-            state.jump(state.scene.cameras[int(letter) - 1])
+        elif letter == "v":
+            state.save_view()
+        elif letter == "r":
+            state.record()
+        elif letter in "123456789" and int(letter) <= len(state.cameras):
+            state.jump(state.cameras[int(letter) - 1])

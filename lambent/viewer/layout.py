@@ -14,12 +14,16 @@ from imgui_bundle import imgui, implot
 
 from lambent.viewer.input import Rect
 from lambent.viewer.panels import (
+    compare,
     curves,
     disks,
     editing,
+    film,
     fitting,
     help,
+    marks,
     material,
+    metering,
     overlay,
     preview,
     scene,
@@ -34,7 +38,7 @@ BORDER_PX = 6  # between picture, disks and curves
 LEAST_SHARE = 0.15  # of the window that a border leaves on either side
 FONT = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
 FONT_PX = 15.0
-PANELS = (scene, view, material, statistics, help)
+PANELS = (scene, view, metering, compare, film, material, statistics, help)
 EDITOR_PANELS = (editing, fitting, preview, view, statistics, help)
 OPEN_AT_START = (scene, view, material, editing, fitting, preview)
 COLOURS = {
@@ -124,12 +128,14 @@ def draw(state: ViewerState, textures: Mapping[str, imgui.ImTextureRef] | None =
         imgui.begin("panels", None, FIXED)
         _column(state)
         imgui.end()
+    marks.draw(state, shared.picture, textures)
     overlay.draw(state, shared.picture)
     return dragged or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 
 def _column(state: ViewerState) -> None:
     imgui.push_item_width(-LABEL_PX)
+    state.meter.wanted = False
     alone = state.preview is not None
     if alone:
         editing.draw_head(state)
@@ -154,16 +160,20 @@ def _pictures(state: ViewerState, place: Rect, textures: Mapping[str, imgui.ImTe
     a, b = textures.get("picture A"), textures.get("picture B")
     if a is None:
         return False
-    if b is None or state.preview is None:
-        behind.add_image(a, begin, end)
+    comparison = state.comparison
+    beside = state.preview or (comparison if comparison and comparison.mode == "side by side" else None)
+    if b is None or beside is None:
+        behind.add_image(textures.get("error map", a), begin, end)
         return False
-    at = place.x + state.preview.split * place.width
-    behind.add_image(a, begin, (at, end[1]), (0, 0), (state.preview.split, 1))
-    behind.add_image(b, (at, begin[1]), end, (state.preview.split, 0), (1, 1))
+    at = place.x + beside.split * place.width
+    behind.add_image(a, begin, (at, end[1]), (0, 0), (beside.split, 1))
+    behind.add_image(b, (at, begin[1]), end, (beside.split, 0), (1, 1))
     held, at = _border("divider", (at, place.y), place.height, upright=True)
-    state.preview.split = min(max((at - place.x) / place.width, 0.02), 0.98)
-    for letter, x in (("A", at - 22), ("B", at + 12)):
-        behind.add_text((x, place.y + 8), imgui.get_color_u32((1, 1, 1, 0.9)), letter)
+    beside.split = min(max((at - place.x) / place.width, 0.02), 0.98)
+    labels = ("A", "B") if state.preview or comparison is None else (comparison.a_label, comparison.b_label)
+    for text, x in ((labels[0], at - 12 - imgui.calc_text_size(labels[0]).x), (labels[1], at + 12)):
+        behind.add_text((x + 1, place.y + 9), imgui.get_color_u32((0, 0, 0, 0.8)), text)
+        behind.add_text((x, place.y + 8), imgui.get_color_u32((1, 1, 1, 0.95)), text)
     return held
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 REST_S = 0.25
 BUDGET_S = 1 / 15  # a frame in motion should take no longer
-SCALES = (1.0, 0.75, 0.5, 0.35, 0.25)
+SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.12)
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Pacer:
         self._changed_s = 0.0
         self._accumulated = 0
         self._last: Plan | None = None
+        self._budget_s = BUDGET_S
 
     @property
     def shown(self) -> object:
@@ -41,6 +42,10 @@ class Pacer:
     @property
     def accumulated(self) -> int:
         return self._accumulated
+
+    def aim(self, seconds: float) -> None:
+        """A frame in motion should take no longer from now on."""
+        self._budget_s = seconds
 
     def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
         """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
@@ -68,7 +73,7 @@ class Pacer:
         if plan.accumulate is not None:
             return
         full_s = seconds / plan.scale**2  # two thirds of the cost is texture filtering, so pixels are what counts
-        fits = next((s for s in SCALES if full_s * s * s <= BUDGET_S), SCALES[-1])
-        larger_fits_well = fits > self.moving_scale and full_s * fits * fits <= 0.7 * BUDGET_S
+        fits = next((s for s in SCALES if full_s * s * s <= self._budget_s), SCALES[-1])
+        larger_fits_well = fits > self.moving_scale and full_s * fits * fits <= 0.7 * self._budget_s
         if fits < self.moving_scale or larger_fits_well:
             self.moving_scale = fits

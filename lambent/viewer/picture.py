@@ -12,12 +12,13 @@ import numpy as np
 import wgpu
 
 from lambent.core.colour import srgb_decode
+from lambent.core.false_colour import ILLUMINANCE_UNIT, LUMINANCE_UNIT, Range, with_scale
 from lambent.core.images import write_image
 from lambent.materials.document import Material
 from lambent.realtime.device import adapter_info
-from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer
+from lambent.realtime.frame import LIGHT_MAP, QMC_N, SHOW, FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
+from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, FALSE_COLOUR, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
 from lambent.viewer.input import Rect
@@ -26,7 +27,7 @@ from lambent.viewer.state import Choices, Statistics, ViewerState
 
 CHOICES = Choices(
     integrators=tuple(name for name, how in INTEGRATORS.items() if how.specular),
-    view_transforms=("filmic", *(name for name in VIEW_TRANSFORMS if name != "filmic")),
+    view_transforms=tuple(reversed(VIEW_TRANSFORMS)),
     shows=tuple(SHOW),
     lookups=("auto", *LOOKUPS),
     sample_counts=tuple(n for n in RINGS if n <= 19),
@@ -47,39 +48,62 @@ class Picture:
         self._adapter = adapter.name
         self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
         self._pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
+        self._refine = True
         self.view: Any = None
+        self.radiance: Any = None  # texture of what `view` shows, linear
+        self.drawn: FrameState | None = None  # as it was planned
+        self.version = 0  # grows with every drawn frame
         self._size: tuple[int, int] = (0, 0)
 
     @property
     def views(self) -> tuple[Any, ...]:
         return (self.view,)
 
+    @property
+    def renderer(self) -> Renderer:
+        return self._renderer
+
     def update(
-        self, state: ViewerState, rect: Rect, pixel_ratio: float, materials: Mapping[str, Material] | None = None
+        self,
+        state: ViewerState,
+        rect: Rect,
+        pixel_ratio: float,
+        materials: Mapping[str, Material] | None = None,
+        *,
+        integrator: str | None = None,
+        refine: bool | None = None,
+        share: float = 1.0,
     ) -> None:
-        """Draw the next frame where one is due; `materials` stand in for the state's edited ones."""
+        """Draw the next frame where one is due.
+
+        `materials`, `integrator` and `refine` stand in for the state's; `share` of the frame time is for this picture.
+        """
         width, height = (min(round(size * pixel_ratio), LARGEST_PX) for size in (rect.width, rect.height))
         wanted = frame_state(state, width, height)
         if materials is not None:
             wanted = replace(wanted, materials=dict(materials))
-        now_s = state.clock()
-        plan = self._pacer.plan(wanted, now_s, refine=state.refine, adaptive=state.adaptive_resolution)
+        if integrator is not None:
+            wanted = replace(wanted, integrator=integrator)
+        now_s, self._refine = state.clock(), state.refine if refine is None else refine
+        self._pacer.aim(share * state.target_ms / 1e3)
+        plan = self._pacer.plan(wanted, now_s, refine=self._refine, adaptive=state.adaptive_resolution)
         if plan is None or (plan.accumulate is not None and state.answering):
             return
         frame = self._planned(wanted, plan)
         self._fit(frame.width, frame.height)
         started = time.perf_counter()
-        self._renderer.draw(frame, self.view)
+        self.radiance, self.drawn = self._renderer.draw(frame, self.view), frame
+        self.version += 1
         # Waiting keeps the queue short, so that a frame shows the latest event, and tells what a frame costs.
         self._renderer.finish()
         seconds = time.perf_counter() - started
         self._pacer.drawn(plan)
         self._pacer.cost(plan, seconds)
-        state.statistics = self._statistics(seconds)
+        state.statistics = self._statistics(seconds, plan.scale)
 
     def wait_s(self, state: ViewerState) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
-        return self._pacer.wait_s(state.clock(), refine=state.refine)
+        return self._pacer.wait_s(state.clock(), refine=self._refine)
 
     def save(self, state: ViewerState) -> None:
         """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance."""
@@ -91,8 +115,12 @@ class Picture:
         try:
             write_image(state.folder / f"{name}.exr", self._renderer.image(frame))
             display = self._renderer.display_image(frame)
+            if frame.view_transform == FALSE_COLOUR:
+                display = with_scale(
+                    display, frame.scale, ILLUMINANCE_UNIT if frame.show == LIGHT_MAP else LUMINANCE_UNIT
+                )
             write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
-        except OSError as error:
+        except (OSError, RuntimeError) as error:  # OpenEXR raises the latter
             state.say(f"picture not saved: {error}")
         else:
             state.say(f"saved {name}.png and {name}.exr")
@@ -111,7 +139,17 @@ class Picture:
         texture = self.device.create_texture(size=(width, height, 1), format=DISPLAY_FORMAT, usage=usage)
         self.view = texture.create_view()
 
-    def _statistics(self, seconds: float) -> Statistics:
+    @property
+    def accumulated(self) -> int:
+        """Frames of the progressive series that the picture is the mean of; 0: it is one of motion."""
+        return self._pacer.accumulated
+
+    @property
+    def samples(self) -> int:
+        """The same in samples per pixel and lobe."""
+        return self._pacer.accumulated * self._rest_n
+
+    def _statistics(self, seconds: float, scale: float) -> Statistics:
         drawn = self._renderer.statistics
         return Statistics(
             adapter=self._adapter,
@@ -123,13 +161,15 @@ class Picture:
             samples=drawn["samples_per_pixel"],
             accumulated=self._pacer.accumulated * self._rest_n,
             accumulate_to=REST_FRAMES * self._rest_n,
+            scale=scale,
         )
 
 
 def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
     """The frame that shows the state at full size."""
+    false = state.view_transform == FALSE_COLOUR
     return FrameState(
-        state.camera,
+        state.camera.model_copy(update={"name": ""}),  # another name is no other picture
         width,
         height,
         integrator=state.integrator,
@@ -139,6 +179,8 @@ def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
         materials=dict(state.edits.edited),
         lookup=state.lookup,
         show=state.show,
+        scale=state.scale if false else Range(),
+        near_m=state.near_m,
     )
 
 

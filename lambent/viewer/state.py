@@ -9,16 +9,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from lambent.core.errors import UserError
+from lambent.core.false_colour import Range
 from lambent.materials.document import Material
 from lambent.store.camera_paths import camera_at
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+from lambent.viewer import cameras
+from lambent.viewer.metering import Meter
+from lambent.viewer.recorder import Recorder
+from lambent.viewer.views import SavedViews
 
 if TYPE_CHECKING:
+    from lambent.viewer.comparison import Comparison
     from lambent.viewer.editor.editor import Editor
     from lambent.viewer.editor.preview import Preview
+    from lambent.viewer.filming import Filming, FilmOptions
+    from lambent.viewer.markers import Ball, Line
 
 Mode = Literal["orbit", "walk"]
 MESSAGE_S = 6.0
+TARGET_MS = 1e3 / 15
 UNDO_LIMIT = 200
 
 
@@ -127,6 +136,25 @@ class Statistics:
     samples: int = 0  # per pixel, of the frame
     accumulated: int = 0  # per pixel, since the camera rests
     accumulate_to: int = 0
+    scale: float = 1.0  # of the picture's width and height, by the pacing
+
+
+@dataclass
+class Walker:
+    """Who walks: pace in m/s, eye above the floor in m."""
+
+    speed_m_s: float
+    eye_height_m: float
+
+
+@dataclass
+class Marks:
+    """What is drawn over the picture, and whether it is wanted; places are shares of the picture."""
+
+    probes: bool = False
+    reflectors: bool = False
+    balls: tuple[Ball, ...] = ()
+    lines: tuple[Line, ...] = ()
 
 
 @dataclass
@@ -155,6 +183,23 @@ class ViewerState:
     refine: bool = True  # accumulate while nothing moves
     answering: bool = False  # an event was just seen: the interface answers before the picture is refined further
     adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
+    target_ms: float = TARGET_MS  # that a frame in motion should take
+    scale: Range = field(default_factory=Range)  # of false colour
+    near_m: float | None = None  # nearer things are cut away; None: by the scene's size
+    walker: Walker = field(default_factory=lambda: Walker(cameras.WALK_M_S, cameras.EYE_HEIGHT_M))
+    views: SavedViews | None = None
+    view_name: str = ""  # typed for the next saved view
+    renaming: tuple[str, str] | None = None  # "camera" or "path", and its name
+    typed_name: str = ""  # while renaming
+    recorder: Recorder = field(default_factory=Recorder)
+    meter: Meter = field(default_factory=Meter)
+    comparison: Comparison | None = None  # where the picture can be compared with another integrator's
+    marks: Marks = field(default_factory=Marks)
+    film: FilmOptions | None = None  # where films can be made
+    film_wanted: PathRecord | None = None
+    filming: Filming | None = None
+    notes: tuple[str, ...] = ()  # on the light map
+    saved: dict[str, Material] = field(default_factory=dict)  # materials as they were saved last
     panels_shown: bool = True
     screenshot_wanted: bool = False
     statistics: Statistics = field(default_factory=Statistics)
@@ -172,7 +217,20 @@ class ViewerState:
         """
         camera = scene.cameras[0] if scene.cameras else overview(scene)
         first = (choices.view_transforms[0], choices.integrators[0], choices.shows[0], choices.lookups[0])
-        return cls(scene, camera, MaterialEdits(scene.materials), choices, mode, scene.exposure_ev, *first, **options)  # type: ignore[arg-type]
+        state = cls(scene, camera, MaterialEdits(scene.materials), choices, mode, scene.exposure_ev, *first, **options)  # type: ignore[arg-type]
+        state.walker = Walker(cameras.speed_m_s(scene.bounds, False), cameras.eye_height_m(scene.bounds))
+        return state
+
+    @property
+    def cameras(self) -> tuple[CameraRecord, ...]:
+        """The scene's, and those that were saved."""
+        return self.scene.cameras if self.views is None else self.views.all.cameras
+
+    @property
+    def paths(self) -> tuple[PathRecord, ...]:
+        """The scene's, those that were saved, and the one just recorded."""
+        paths = self.scene.paths if self.views is None else self.views.all.paths
+        return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""
@@ -188,8 +246,86 @@ class ViewerState:
     def close_editor(self) -> None:
         """Close the editor; the material stays as it is."""
         if self.editor is not None:
+            if self.editor.saved is not None:
+                self.saved[self.editor.name] = self.editor.saved
             self.editor.close()
         self.editor = None
+
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        """Materials that are neither the scene's nor as they were saved."""
+        saved = dict(self.saved)
+        if self.editor is not None and self.editor.saved is not None:
+            saved[self.editor.name] = self.editor.saved
+        return tuple(
+            name for name, now in self.edits.edited.items() if now != saved.get(name, self.scene.materials[name])
+        )
+
+    def rescue_materials(self) -> tuple[Path, ...]:
+        """Write what was not saved to files of new names, because the window is about to be lost."""
+        written = []
+        for name in self.unsaved:
+            stem, number = plain_name(name), 1
+            while (path := self.folder / f"{stem}-rescued-{number:03}.json").exists():
+                number += 1
+            self.edits.current(name).save(path)
+            written.append(path)
+        return tuple(written)
+
+    # views and recordings
+
+    def save_view(self) -> None:
+        """Save where the camera stands, under the typed name or the next free one."""
+        if self.views is not None:
+            name = self.view_name if self.view_name.strip() else self.views.free_camera_name()
+            added = self.views.add_camera(self.camera, name)
+            if added is not None:
+                self.view_name, self.camera = "", added
+                self.say(f"saved the view {added.name}")
+
+    def record(self) -> None:
+        """Begin to record the camera's way, or stop."""
+        if self.views is None:
+            return
+        if not self.recorder.on:
+            if self.path is not None:
+                self.path.playing = False
+            self.recorder.begin(self.clock())
+        elif self.recorder.stop():
+            assert self.recorder.draft is not None
+            self.recorder.name = self.views.free_path_name()
+            self.say(f"recorded {self.recorder.draft.seconds:.1f} s")
+        else:
+            self.say("nothing recorded: the camera did not move")
+
+    def save_recording(self) -> None:
+        """Save the draft under the typed name."""
+        if self.views is None or self.recorder.draft is None:
+            return
+        added = self.views.add_path(self.recorder.draft, self.recorder.name)
+        if added is not None:
+            self.recorder.drop()
+            self.scrub(added, 0.0)
+            self.say(f"saved the path {added.name}")
+
+    def drop_recording(self) -> None:
+        """Forget the draft."""
+        if self.path is not None and self.path.path == self.recorder.draft:
+            self.path = None
+        self.recorder.drop()
+
+    def set_eye_height(self, eye_height_m: float) -> None:
+        """Grow or shrink the walker; whoever stands is lifted at once."""
+        lift = eye_height_m - self.walker.eye_height_m
+        self.walker.eye_height_m = eye_height_m
+        if self.mode == "walk" and not self.flying and lift:
+            (px, py, pz), (tx, ty, tz) = self.camera.position, self.camera.target
+            places = {"position": (px, py + lift, pz), "target": (tx, ty + lift, tz)}
+            self.move(self.camera.model_copy(update={"name": "free", **places}))
+
+    def set_fov(self, fov_y_deg: float) -> None:
+        """Another field of view."""
+        self.move(self.camera.model_copy(update={"name": "free", "fov_y_deg": fov_y_deg}))
 
     @property
     def playing(self) -> bool:
@@ -233,18 +369,28 @@ class ViewerState:
 
     def file_name(self, material: str) -> str:
         """Where `material` will be saved: what was typed, else its name."""
-        plain = "".join(c if c.isalnum() or c in " ._-" else "_" for c in material).strip(" .") or "material"
-        return self.file_names.get(material, f"{plain}.json")
+        return self.file_names.get(material, f"{plain_name(material)}.json")
 
     def save_material(self, name: str) -> None:
-        """Write the material as it is now into `folder`, and say so, or say why not."""
-        file_name = self.file_name(name)
+        """Write the material as it is now into `folder`, and say so, or say why not.
+
+        Its provenance stays, with a note where numbers were changed by hand.
+        """
+        from lambent.viewer.editor.documents import with_account
+
+        file_name, material = self.file_name(name), self.edits.current(name)
         try:
-            self.edits.current(name).save(file_in(self.folder, file_name))
+            with_account(material, self.scene.materials[name], None, {}).save(file_in(self.folder, file_name))
         except (UserError, OSError) as error:
             self.say(f"not saved: {error}")
         else:
+            self.saved[name] = material
             self.say(f"saved {file_name}")
+
+
+def plain_name(name: str) -> str:
+    """A name of a file for any name of a material."""
+    return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or "material"
 
 
 def file_in(folder: Path, file_name: str) -> Path:

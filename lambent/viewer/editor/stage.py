@@ -28,6 +28,11 @@ class Stage:
         self._lit_by: str | None = None  # the environment that could be loaded last
 
     @property
+    def images(self) -> dict[str, Any]:
+        """None besides the pictures."""
+        return {}
+
+    @property
     def views(self) -> tuple[Any, ...]:
         """Views of the pictures A and, where there is one, B."""
         return tuple(picture.view for picture in self._shown)

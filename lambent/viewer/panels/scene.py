@@ -1,9 +1,11 @@
-"""Where the viewer stands: cameras, camera paths, walking or orbiting; and what the store lacks."""
+"""Where the viewer stands: walking or orbiting, cameras and saved views, camera paths; and what the store lacks."""
 
 from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from lambent.viewer.panels import recording
+from lambent.viewer.panels.widgets import explain, path_field
 from lambent.viewer.state import ViewerState
 
 TITLE = "Scene"
@@ -12,10 +14,10 @@ LISTED = 6
 
 def draw(state: ViewerState) -> None:
     _movement(state)
-    if state.scene.cameras:
+    if state.cameras:
         _cameras(state)
-    if state.scene.paths:
-        _path(state)
+    _saving(state)
+    recording.draw(state)
     for warning in (*state.scene.warnings, *state.missing):
         imgui.push_style_color(imgui.Col_.text, (1.0, 0.75, 0.35, 1.0))
         imgui.push_text_wrap_pos()
@@ -37,30 +39,48 @@ def _movement(state: ViewerState) -> None:
 
 def _cameras(state: ViewerState) -> None:
     imgui.separator_text("cameras")
-    cameras = state.scene.cameras
+    cameras, own = state.cameras, len(state.scene.cameras)
     height = min(len(cameras), LISTED) * imgui.get_text_line_height_with_spacing()
     imgui.begin_child("cameras", (0, height))
     for index, camera in enumerate(cameras):
         key = f"{index + 1}  " if index < 9 else "    "
-        if imgui.selectable(f"{key}{camera.name}##{index}", camera == state.camera)[0]:
+        mark = "  (saved)" if index >= own else ""
+        if imgui.selectable(f"{key}{camera.name}{mark}##{index}", camera == state.camera)[0]:
             state.jump(camera)
     imgui.end_child()
 
 
-def _path(state: ViewerState) -> None:
-    imgui.separator_text("camera path")
-    paths = state.scene.paths
-    current = state.path.path if state.path else paths[0]
-    index = paths.index(current)
-    changed, index = imgui.combo("path", index, [path.name for path in paths])
-    chosen = paths[index]
-    if changed:
-        state.scrub(chosen, 0.0)
-    if imgui.button("pause" if state.playing else "play", (64, 0)):
-        state.toggle(chosen)
+def _saving(state: ViewerState) -> None:
+    views = state.views
+    if views is None:
+        return
+    state.view_name, wanted = path_field("view name", state.view_name, "save view", hint="name of this view...")
+    explain("keeps where you stand, beside the store (V); `lambent render --camera NAME` shows it")
+    if wanted:
+        state.save_view()
+    chosen = next((c.name for c in views.cameras if c == state.camera), None)
+    if chosen is None:
+        return
+    change = rename_or_delete(state, "camera", chosen)
+    if change == "delete" and views.delete_camera(chosen):
+        state.jump(state.camera.model_copy(update={"name": "free"}))
+        state.say(f"deleted the view {chosen}")
+    elif change == "rename" and views.rename_camera(chosen, state.typed_name):
+        state.jump(state.camera.model_copy(update={"name": state.typed_name.strip()}))
+        state.renaming = None
+
+
+def rename_or_delete(state: ViewerState, kind: str, name: str) -> str | None:
+    """Two buttons for what was saved; "rename" once a new name stands in `typed_name`, "delete", or None."""
+    if state.renaming == (kind, name):
+        state.typed_name, done = path_field(f"new {kind} name", state.typed_name, "rename", hint="new name")
+        if imgui.is_key_pressed(imgui.Key.escape):
+            state.renaming = None
+        return "rename" if done else None
+    if imgui.small_button(f"rename...##{kind}"):
+        state.renaming, state.typed_name = (kind, name), name
     imgui.same_line()
-    imgui.set_next_item_width(-1)
-    time_s = state.path.time_s if state.path else 0.0
-    moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
-    if moved:
-        state.scrub(chosen, time_s)
+    deleted = imgui.small_button(f"delete##{kind}")
+    imgui.same_line()
+    imgui.text_disabled(name)
+    return "delete" if deleted else None
