@@ -156,22 +156,155 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     assert scene.cameras[0].fov_y_deg == pytest.approx(40)
 
 
-def test_textures_are_averaged_and_that_is_said(tmp_path: Path) -> None:
+def _png(path: Path, texels: Any) -> None:
     from PIL import Image
 
-    Image.fromarray(np.uint8([[[255, 0, 0]], [[0, 0, 0]]])).save(tmp_path / "half.png")
-    look = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    Image.fromarray(np.uint8(texels)).save(path)
+
+
+def _worn(material: dict[str, Any], images: list[str], **more: Any) -> dict[str, Any]:
+    """A document whose triangle wears `material`; texture i is picture i."""
     content = document(
-        materials=[{"name": "cloth", "pbrMetallicRoughness": look}], textures=[{"source": 0}],
-        images=[{"uri": "half.png"}],
+        materials=[material], textures=[{"source": i} for i in range(len(images))],
+        images=[{"uri": name} for name in images], **more,
     )  # fmt: skip
     content["meshes"][0]["primitives"][0]["material"] = 0
+    return content
+
+
+def test_a_texture_multiplies_the_mean_that_the_document_holds(tmp_path: Path) -> None:
+    _png(tmp_path / "half.png", [[[255, 0, 0]], [[0, 0, 0]]])
+    look = {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
+    content = _worn({"name": "cloth", "pbrMetallicRoughness": look}, ["half.png"])
     scene = loaded(tmp_path, content)
-    assert scene.materials["cloth"].kd == pytest.approx((0.48, 0, 0))
-    assert scene.warnings == ("material cloth: textures are averaged to one colour",)
+    assert scene.materials["cloth"].kd == pytest.approx((0.24, 0, 0)) and scene.materials["cloth"].kd_coupled
+    texture = scene.textures["cloth"].diffuse
+    assert texture is not None and texture.texels.dtype == np.float16
+    assert np.allclose(texture.texels, [[[2, 1, 1]], [[0, 1, 1]]]) and scene.warnings == ()
+    assert scene.textures["cloth"].specular is None and tmp_path / "half.png" in scene.sources
     content["images"][0]["uri"] = "../half.png"
     with pytest.raises(UserError, match="leaves its folder"):
         loaded(tmp_path, content)
+
+
+def test_a_metals_picture_is_its_reflectance_and_never_more_than_arrives(tmp_path: Path) -> None:
+    _png(tmp_path / "base.png", [[[255, 255, 255], [255, 0, 0]]])
+    _png(tmp_path / "packed.png", [[[0, 255, 255], [0, 128, 0]]])  # metal and rough; dielectric and smoother
+    look = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
+    scene = loaded(tmp_path, _worn({"name": "m", "pbrMetallicRoughness": look}, ["base.png", "packed.png"]))
+    material, textures = scene.materials["m"], scene.textures["m"]
+    assert textures.diffuse is not None and textures.specular is not None and textures.roughness is not None
+    (lobe,) = material.lobes
+    assert np.array(lobe.k) * np.array(lobe.r0) * textures.specular.texels[0] == pytest.approx(
+        np.array([[1, 1, 1], [0.04, 0.04, 0.04]]), abs=2e-3
+    )  # reflectance at normal incidence
+    assert np.max(np.array(lobe.k) * textures.specular.texels) <= 1.001
+    assert np.array(material.kd) * textures.diffuse.texels[0] == pytest.approx(
+        np.array([[0, 0, 0], [0.96, 0, 0]]), abs=2e-3
+    )
+    assert lobe.mx * textures.roughness.texels[0, :, 0] == pytest.approx([1, (128 / 255) ** 2], abs=2e-3)
+    assert any("normal incidence alone" in w for w in scene.warnings)
+
+
+def _texel_at(texture: Any, uv: tuple[float, float]) -> Any:
+    """The texel a point's uv falls on, by the words of `scene.Texture`."""
+    u, v = np.array(texture.uv_transform) @ (*uv, 1)
+    height, width = texture.texels.shape[:2]
+    return texture.texels[int((1 - v) % 1 * height), int(u % 1 * width)]
+
+
+def test_texture_transforms(tmp_path: Path) -> None:
+    """A quarter turn with half the scale shows the lower left quarter of the picture, as the extension's example."""
+    _png(tmp_path / "four.png", [[[10] * 3, [80] * 3], [[160] * 3, [250] * 3]])
+    moved = {"offset": [0, 1], "rotation": np.pi / 2, "scale": [0.5, 0.5]}
+    reference = {"index": 0, "extensions": {"KHR_texture_transform": moved}}
+    look = {"name": "m", "normalTexture": {"index": 0}, "pbrMetallicRoughness": {"baseColorTexture": reference}}
+    textures = loaded(tmp_path, _worn(look, ["four.png"])).textures["m"]
+    plain, turned = textures.normal, textures.specular
+    corners = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+    assert plain is not None and turned is not None
+    lower_left = _texel_at(plain, (0.25, 0.25))
+    assert np.array_equal(lower_left, plain.texels[1, 0])
+    assert all(np.array_equal(_texel_at(turned, c), turned.texels[1, 0]) for c in corners)
+
+
+def test_holes_and_what_shines_through(tmp_path: Path) -> None:
+    _png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 255, 0, 0]]])
+    pbr = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    look = {"name": "m", "pbrMetallicRoughness": pbr, "alphaMode": "MASK", "alphaCutoff": 0.3}
+    textures = loaded(tmp_path, _worn(look, ["leaf.png"])).textures["m"]
+    assert textures.opacity is not None and textures.cutoff == 0.3
+    assert textures.opacity.texels.ravel().tolist() == [1, 0]
+    scene = loaded(tmp_path, _worn(look | {"alphaMode": "BLEND"}, ["leaf.png"]))
+    assert scene.textures["m"].opacity is not None and "cuts holes" in scene.warnings[0]
+    pane = {"name": "m", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}}
+    scene = loaded(tmp_path, _worn(pane, []))
+    (through,) = scene.materials["m"].transmission_lobes
+    assert through.k == (0.75,) * 3 and through.r0 == (0,) * 3 and "lets 75% of the light through" in scene.warnings[0]
+    assert scene.materials["m"].reflection_lobes[0].k == (0.25,) * 3
+
+
+def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
+    _png(tmp_path / "normal.png", [[[128, 128, 255], [255, 128, 128]]])
+    _png(tmp_path / "way.png", [[[255, 128, 128], [128, 255, 128]]])
+    brushed = {"anisotropyStrength": 0.8, "anisotropyRotation": np.pi / 2, "anisotropyTexture": {"index": 1}}
+    look = {
+        "name": "m", "normalTexture": {"index": 0, "scale": 0.5}, "pbrMetallicRoughness": {"roughnessFactor": 0.3},
+        "extensions": {"KHR_materials_anisotropy": brushed},
+    }  # fmt: skip
+    scene = loaded(tmp_path, _worn(look, ["normal.png", "way.png"]))
+    textures = scene.textures["m"]
+    assert textures.normal is not None and textures.direction is not None
+    assert np.allclose(textures.normal.texels, [[(0, 0, 1), (1, 0, 0)]], atol=0.02)
+    assert np.allclose(textures.direction.texels, [[(0, 1), (-1, 0)]], atol=0.02)  # turned by a right angle
+    lobe = scene.materials["m"].lobes[0]
+    assert lobe.my == pytest.approx(0.09) and lobe.mx == pytest.approx(0.09 + 0.91 * (0.8 * 128 / 255) ** 2, rel=1e-3)
+
+
+def test_sparse_accessors(tmp_path: Path) -> None:
+    """The third vertex is moved from (0, 1, 0) to (0, 2, 0), and normals begin as zeros."""
+    content = document()
+    data = base64.b64decode(content["buffers"][0]["uri"].partition(",")[2])
+    put = np.uint16([2]).tobytes() + b"\0\0" + np.float32([0, 2, 0]).tobytes()
+    ups = np.uint16([0, 1, 2]).tobytes() + b"\0\0" + np.tile(np.float32([0, 0, 1]), 3).tobytes()
+    blocks, start = [], len(data) + -len(data) % 4
+    whole = data + b"\0" * (-len(data) % 4) + put + ups
+    for length in (2, 12, 6, 36):
+        blocks.append({"buffer": 0, "byteOffset": start, "byteLength": length})
+        start += length + -length % 4
+    content["buffers"] = [{"byteLength": len(whole), "uri": "data:;base64," + base64.b64encode(whole).decode()}]
+    content["bufferViews"] += blocks
+
+    def sparse(count: int, first: int) -> dict[str, Any]:
+        indices = {"bufferView": first, "componentType": 5123}
+        return {"count": count, "indices": indices, "values": {"bufferView": first + 1}}
+
+    content["accessors"][0]["sparse"] = sparse(1, 4)
+    content["accessors"][1] = {"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse(3, 6)}
+    mesh = loaded(tmp_path, content).object("thing").mesh
+    assert np.array_equal(mesh.positions, [(0, 0, 0), (1, 0, 0), (0, 2, 0)]) and np.allclose(mesh.normals, (0, 0, 1))
+    content["accessors"][1]["count"] = 10**12
+    content["accessors"][1].pop("sparse")
+    with pytest.raises(UserError, match="too many zeros"):
+        loaded(tmp_path, content)
+
+
+def test_variants_are_material_sets(tmp_path: Path) -> None:
+    names = [{"name": "oak"}, {"name": "night"}]
+    lamp = {"name": "lamp", "emissiveFactor": [1, 1, 1]}
+    content = _worn({"name": "plain"}, [], extensions={"KHR_materials_variants": {"variants": names}})
+    content["materials"] += [{"name": "wood"}, lamp]
+    mappings = [{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]
+    content["meshes"][0]["primitives"][0]["extensions"] = {"KHR_materials_variants": {"mappings": mappings}}
+    assert loaded(tmp_path, content).object("thing").material == "plain"
+    head = 'format = "lambent-scene"\nversion = 1\ngeometry = "thing.gltf"\n'
+    for variant, material, emission in (("oak", "wood", 0.0), ("night", "lamp", 1.0)):
+        (tmp_path / "scene.toml").write_text(head + f'variant = "{variant}"\n')
+        thing = load_scene(tmp_path / "scene.toml").object("thing")
+        assert thing.material == material and thing.emission == (emission,) * 3
+    (tmp_path / "scene.toml").write_text(head + 'variant = "nigth"\n')
+    with pytest.raises(UserError, match="did you mean 'night'"):
+        load_scene(tmp_path / "scene.toml")
 
 
 def test_what_is_missing_is_made_and_said(tmp_path: Path) -> None:

@@ -16,15 +16,18 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.errors import UserError
-from lambent.core.files import inside, read_bytes
+from lambent.core.files import read_bytes
 from lambent.core.frames import Floats
 from lambent.scenes.loaders.gltf_schema import GltfDocument
+from lambent.scenes.loaders.place import named
 
 LIMIT_BYTES = 4 << 30
+ZEROS_MAX = 60_000_000  # elements that an accessor may make of nothing
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 READ_EXTENSIONS = {
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
     "KHR_materials_anisotropy", "KHR_materials_transmission", "KHR_mesh_quantization", "KHR_texture_transform",
+    "KHR_materials_variants", "KHR_materials_clearcoat", "EXT_texture_webp",
 }  # fmt: skip
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -39,6 +42,7 @@ class Gltf:
     document: GltfDocument
     buffers: tuple[bytes, ...]
     sources: tuple[Path, ...]
+    root: Path  # the folder that its files may lie in
 
     def pick(self, items: Sequence[T], index: int, field: str) -> T:
         """`items[index]`, or a `UserError` that names the field."""
@@ -64,21 +68,42 @@ class Gltf:
         """Array (count, width) of an accessor, as stored; a copy."""
         field = f"accessors.{index}"
         a = self.pick(self.document.accessors, index, "accessors")
-        if a.sparse is not None or a.bufferView is None:
-            raise UserError("sparse accessors are not read", file=self.path, field=field, hint="export without them")
         dtype, width = np.dtype(COMPONENTS[a.componentType]), WIDTHS[a.type]
-        buffer, start, length, stride = self.view(a.bufferView)
+        if a.bufferView is None and a.count > ZEROS_MAX:
+            raise UserError("too many zeros", file=self.path, field=field, got=a.count, expected=f"at most {ZEROS_MAX}")
+        if a.bufferView is None:
+            array = np.zeros((a.count, width), dtype)
+        else:
+            array = self._elements(a.bufferView, a.byteOffset, dtype, (a.count, width), field)
+        if a.sparse is not None and a.sparse.count:
+            at, put = a.sparse.indices, a.sparse.values
+            kind = np.dtype(COMPONENTS[at.componentType])
+            places = self._elements(at.bufferView, at.byteOffset, kind, (a.sparse.count, 1), f"{field}.sparse.indices")
+            if int(places.max()) >= a.count:
+                got, expected = int(places.max()), f"below {a.count}"
+                raise UserError(
+                    "index out of range", file=self.path, field=f"{field}.sparse", got=got, expected=expected
+                )
+            shape = (a.sparse.count, width)
+            array[places[:, 0]] = self._elements(put.bufferView, put.byteOffset, dtype, shape, f"{field}.sparse.values")
+        return array
+
+    def _elements(
+        self, view: int, offset: int, dtype: np.dtype[Any], shape: tuple[int, int], field: str
+    ) -> np.ndarray[Any, Any]:
+        """Elements (count, width) of a buffer view; a copy."""
+        count, width = shape
+        buffer, start, length, stride = self.view(view)
         step = stride or dtype.itemsize * width
-        need = a.byteOffset + step * (a.count - 1) + dtype.itemsize * width if a.count else 0
+        need = offset + step * (count - 1) + dtype.itemsize * width if count else 0
         if need > length:
             raise UserError(
                 "accessor ends after its buffer view", file=self.path, field=field, got=f"{need} bytes",
                 expected=f"at most {length}",
             )  # fmt: skip
-        if a.count == 0:
+        if count == 0:
             return np.zeros((0, width), dtype)
-        strides = (step, dtype.itemsize)
-        return np.ndarray((a.count, width), dtype, buffer, start + a.byteOffset, strides).copy()
+        return np.ndarray(shape, dtype, buffer, start + offset, (step, dtype.itemsize)).copy()
 
     def floats(self, index: int, width: int, field: str) -> Floats:
         """Accessor as float64 (count, width); normalised integers become [0, 1] or [-1, 1]."""
@@ -92,14 +117,15 @@ class Gltf:
         return values
 
 
-def read(path: Path) -> Gltf:
-    """A .glb or .gltf file with all its buffers.
+def read(path: Path, root: Path | None = None) -> Gltf:
+    """A .glb or .gltf file with all its buffers; files it names lie below the folder `root`, unsaid its own.
 
     Raises
     ------
     UserError
         Where the file is truncated, not glTF 2.0, needs an extension that is not read, or names a file elsewhere.
     """
+    root = path.resolve().parent if root is None else root
     data = read_bytes(path, LIMIT_BYTES)
     text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
     try:
@@ -124,13 +150,13 @@ def read(path: Path) -> Gltf:
         raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=hint)
     buffers, sources = [], [path]
     for i, buffer in enumerate(document.buffers):
-        content, source = _buffer(buffer.uri, binary if i == 0 else None, path, f"buffers.{i}")
+        content, source = _buffer(buffer.uri, binary if i == 0 else None, path, f"buffers.{i}", root)
         if len(content) < buffer.byteLength:
             got, expected = f"{len(content)} bytes", f"{buffer.byteLength}"
             raise UserError("buffer is truncated", file=path, field=f"buffers.{i}", got=got, expected=expected)
         buffers.append(content)
         sources += [source] if source else []
-    return Gltf(path, document, tuple(buffers), tuple(sources))
+    return Gltf(path, document, tuple(buffers), tuple(sources), root)
 
 
 def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
@@ -156,17 +182,17 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
     return chunks[JSON_CHUNK], chunks.get(BIN_CHUNK)
 
 
-def _buffer(uri: str | None, binary: bytes | None, path: Path, field: str) -> tuple[bytes, Path | None]:
+def _buffer(uri: str | None, binary: bytes | None, path: Path, field: str, root: Path) -> tuple[bytes, Path | None]:
     """Bytes of a buffer or image, and the file they are from where it is another one."""
     if uri is None:
         if binary is None:
             raise UserError("has neither a uri nor a binary chunk", file=path, field=field)
         return binary, None
-    return resource(uri, path, field)
+    return resource(uri, path, field, root)
 
 
-def resource(uri: str, path: Path, field: str) -> tuple[bytes, Path | None]:
-    """Bytes behind a uri: data within it, or a file beside `path` or below."""
+def resource(uri: str, path: Path, field: str, root: Path) -> tuple[bytes, Path | None]:
+    """Bytes behind a uri of `path`: data within it, or a file below `root`."""
     if uri.startswith("data:"):
         try:
             return base64.b64decode(uri.partition(",")[2], validate=True), None
@@ -174,5 +200,5 @@ def resource(uri: str, path: Path, field: str) -> tuple[bytes, Path | None]:
             raise UserError(f"its base64 data is damaged ({error})", file=path, field=field) from error
     if "://" in uri:
         raise UserError("is on the network", file=path, field=field, got=uri, hint="put the file beside the scene")
-    source = inside(path.parent, unquote(uri))
+    source = named(unquote(uri), path, root, field)
     return read_bytes(source, LIMIT_BYTES), source

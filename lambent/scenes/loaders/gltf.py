@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.core.frames import Floats, normalize
+from lambent.materials.document import Material
 from lambent.scenes.geometry import transformed
 from lambent.scenes.loaders import glb
 from lambent.scenes.loaders.glb import Gltf
-from lambent.scenes.loaders.gltf_material import Textures, material_of
+from lambent.scenes.loaders.gltf_material import surface_of
 from lambent.scenes.loaders.gltf_schema import MaterialDocument, Node, Primitive
+from lambent.scenes.loaders.gltf_texture import Textures, main_uv_set
 from lambent.scenes.loaders.parts import Parts, unique_name
 from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.loaders.surface import finished
 from lambent.scenes.scene import (
     Camera,
     DirectionalLight,
     Light,
+    MaterialTextures,
     Mesh,
     PointLight,
     SceneObject,
@@ -37,14 +41,15 @@ class _Reading:
     """What has been read so far of one file."""
 
     gltf: Gltf
-    materials: list[tuple[str, Triple]]
+    looks: _Looks
+    variants: dict[str, dict[str, tuple[str, Triple]]] = field(default_factory=dict)
     objects: list[SceneObject] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     names: set[str] = field(default_factory=set)
     camera_names: set[str] = field(default_factory=set)
-    meshes: dict[tuple[int, int], Mesh | None] = field(default_factory=dict)
+    meshes: dict[tuple[int, int, int], Mesh | None] = field(default_factory=dict)
     triangles: int = 0
 
 
@@ -52,42 +57,63 @@ def read_gltf(path: Path, root: Path | None = None) -> Parts:
     """Parts of a .glb or .gltf file.
 
     Names are the nodes' (made unique, which is said in the warnings); a mesh of several materials becomes an object
-    per material. Textures are averaged, which is said as well.
+    per material. Files it names lie below the folder `root`, unsaid its own.
 
     Raises
     ------
     UserError
         Where the file is damaged or holds nothing to see.
     """
-    gltf = glb.read(path)
-    textures = Textures(gltf)
+    gltf = glb.read(path, root)
     taken: set[str] = set()
-    materials, looks = {}, []
-    for i, document in enumerate([*gltf.document.materials, MaterialDocument()]):
-        last = i == len(gltf.document.materials)
-        name = unique_name(document.name or ("default" if last else f"material_{i}"), taken)
-        materials[name], glow = material_of(document, name, textures)
-        looks.append((name, glow))
-    reading = _Reading(gltf, looks)
+    documents = [*gltf.document.materials, MaterialDocument()]
+    names = [
+        unique_name(d.name or ("default" if i == len(documents) - 1 else f"material_{i}"), taken)
+        for i, d in enumerate(documents)
+    ]
+    reading = _Reading(gltf, _Looks(gltf, documents, names))
     _walk(reading)
-    used = {o.material for o in reading.objects}
     if not reading.objects:
         raise UserError("holds no triangles", file=path, hint="; ".join(reading.warnings) or None)
-    reading.warnings += [f"material {n}: textures are averaged to one colour" for n in sorted(textures.averaged & used)]
-    for i, document in enumerate(gltf.document.materials):
-        name = looks[i][0]
-        if name in used and document.normalTexture is not None:
-            reading.warnings.append(f"material {name}: its normal map is not read")
-        if name in used and document.alphaMode != "OPAQUE":
-            reading.warnings.append(f"material {name}: alpha {document.alphaMode} is not read, it is opaque")
+    looks = reading.looks
     return Parts(
         tuple(reading.objects),
-        {n: m for n, m in materials.items() if n in used},
+        looks.materials,
         tuple(reading.lights),
         tuple(reading.cameras),
-        gltf.sources,
-        tuple(reading.warnings),
+        (*gltf.sources, *looks.textures.sources),
+        (*reading.warnings, *looks.said, *looks.textures.pictures.said),
+        looks.of_material,
+        variants=reading.variants,
     )
+
+
+class _Looks:
+    """The materials of a file, each made when something first wears it."""
+
+    def __init__(self, gltf: Gltf, documents: list[MaterialDocument], names: list[str]) -> None:
+        self._documents, self._names = documents, names
+        self.textures = Textures(gltf)
+        self.materials: dict[str, Material] = {}
+        self.of_material: dict[str, MaterialTextures] = {}
+        self.said: list[str] = []
+        self._glow: dict[str, Triple] = {}
+
+    def wear(self, index: int) -> tuple[str, Triple]:
+        """Name of a material, and the radiance it emits."""
+        name = self._names[index]
+        if name not in self.materials:
+            said: list[str] = []
+            surface = surface_of(self._documents[index], self.textures, said)
+            self.materials[name], textures = finished(name, surface, said)
+            if textures is not None:
+                self.of_material[name] = textures
+            self._glow[name] = surface.emission
+            self.said += [f"material {name}: {text}" for text in dict.fromkeys(said)]
+        return name, self._glow[name]
+
+    def uv_set(self, index: int) -> int:
+        return main_uv_set(self._documents[index])
 
 
 def _walk(reading: _Reading) -> None:
@@ -145,9 +171,11 @@ def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
         reading.warnings.append(f"{wanted}: left out, its node's scale is zero")
         return
     for k, primitive in enumerate(mesh.primitives):
-        key = (node.mesh, k)
+        look = -1 if primitive.material is None else _index(gltf, primitive.material)
+        uv_set = reading.looks.uv_set(look)
+        key = (node.mesh, k, uv_set)
         if key not in reading.meshes:
-            reading.meshes[key], said = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted)
+            reading.meshes[key], said = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
             reading.warnings += said
         local = reading.meshes[key]
         if local is None:
@@ -156,12 +184,25 @@ def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
         if reading.triangles > TRIANGLES_MAX:
             got, expected = f"{reading.triangles} triangles", f"at most {TRIANGLES_MAX}"
             raise UserError("scene is too large", file=gltf.path, got=got, expected=expected)
-        material, glow = reading.materials[-1 if primitive.material is None else _index(gltf, primitive.material)]
+        material, glow = reading.looks.wear(look)
         single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
         name = unique_name(single, reading.names)
         if name != single:
             reading.warnings.append(f"{single}: the name is used twice, one is now {name}")
         reading.objects.append(SceneObject(name, transformed(local, world), material, glow))
+        _note_variants(reading, primitive, name)
+
+
+def _note_variants(reading: _Reading, primitive: Primitive, name: str) -> None:
+    """What an object wears in each of the file's material sets that says so."""
+    listed = reading.gltf.document.extensions.KHR_materials_variants.variants
+    for variant in listed:
+        reading.variants.setdefault(variant.name, {})
+    for mapping in primitive.extensions.KHR_materials_variants.mappings:
+        look = reading.looks.wear(_index(reading.gltf, mapping.material))
+        for number in mapping.variants:
+            variant = reading.gltf.pick(listed, number, "variants")
+            reading.variants[variant.name][name] = look
 
 
 def _index(gltf: Gltf, material: int) -> int:
@@ -169,7 +210,7 @@ def _index(gltf: Gltf, material: int) -> int:
     return material
 
 
-def _primitive(gltf: Gltf, primitive: Primitive, name: str) -> tuple[Mesh | None, list[str]]:
+def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tuple[Mesh | None, list[str]]:
     attributes = primitive.attributes
     if "POSITION" not in attributes:
         return None, [f"{name}: left out, it has no positions"]
@@ -194,7 +235,9 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str) -> tuple[Mesh | None
             raise UserError("wrong length", file=gltf.path, field=field, got=len(array), expected=len(positions))
         return array
 
-    uv = optional("TEXCOORD_0", 2)
+    if "COLOR_0" in attributes:
+        said.append(f"{name}: colours of its vertices are not read")
+    uv = optional(f"TEXCOORD_{uv_set}", 2)
     if uv is not None:
         uv = uv * (1, -1) + (0, 1)  # glTF counts v from the top
     tangents = optional("TANGENT", 4)

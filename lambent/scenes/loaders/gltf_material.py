@@ -1,108 +1,134 @@
-"""glTF's metallic-roughness materials as lobes."""
+"""glTF's metallic-roughness materials as surfaces.
+
+alpha_ggx = roughness^2 (glTF 2.0, appendix B); a dielectric reflects ((ior - 1)/(ior + 1))^2 at normal incidence.
+Transmission is that of a thin sheet.
+"""
 
 from __future__ import annotations
 
-import io
-import math
+from dataclasses import replace
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
-from lambent.core.errors import UserError
 from lambent.core.frames import Floats
-from lambent.materials.document import Lobe, Material
-from lambent.scenes.loaders.glb import Gltf, resource
-from lambent.scenes.loaders.gltf_schema import MaterialDocument, TextureReference
-from lambent.scenes.scene import Triple
-
-PIXELS_MAX = 1 << 28
-ROUGHNESS_MIN = 0.003  # slope; below it single precision loses the lobe
-
-
-class Textures:
-    """Mean texels, each picture read once. Textures are averaged for now; `averaged` says where."""
-
-    def __init__(self, gltf: Gltf) -> None:
-        self._gltf = gltf
-        self._means: dict[tuple[int, bool], Floats] = {}
-        self.averaged: set[str] = set()
-
-    def mean(self, reference: TextureReference | None, srgb: bool, used_by: str) -> Floats:
-        """Mean (3,) of a texture, linear; ones where there is none."""
-        if reference is None:
-            return np.ones(3)
-        gltf = self._gltf
-        texture = gltf.pick(gltf.document.textures, reference.index, "textures")
-        if texture.source is None:
-            raise UserError("texture has no picture", file=gltf.path, field=f"textures.{reference.index}")
-        self.averaged.add(used_by)
-        key = (texture.source, srgb)
-        if key not in self._means:
-            self._means[key] = self._read(texture.source, srgb)
-        return self._means[key]
-
-    def _read(self, source: int, srgb: bool) -> Floats:
-        gltf, field = self._gltf, f"images.{source}"
-        image = gltf.pick(gltf.document.images, source, "images")
-        if image.uri is not None:
-            data, _ = resource(image.uri, gltf.path, field)
-        elif image.bufferView is not None:
-            buffer, start, length, _ = gltf.view(image.bufferView)
-            data = buffer[start : start + length]
-        else:
-            raise UserError("picture has neither a uri nor a buffer view", file=gltf.path, field=field)
-        try:
-            with Image.open(io.BytesIO(data)) as picture:
-                if picture.width * picture.height > PIXELS_MAX:
-                    got = f"{picture.width} x {picture.height}"
-                    raise UserError("picture is too large", file=gltf.path, field=field, got=got, expected=PIXELS_MAX)
-                picture.thumbnail((512, 512))
-                texels = np.asarray(picture.convert("RGB"), float) / 255
-        except (OSError, UnidentifiedImageError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-            raise UserError(f"picture cannot be read ({error})", file=gltf.path, field=field) from error
-        if srgb:
-            texels = np.where(texels <= 0.04045, texels / 12.92, ((texels + 0.055) / 1.055) ** 2.4)
-        mean: Floats = texels.mean(axis=(0, 1))
-        return mean
+from lambent.scenes.loaders.gltf_schema import MaterialDocument
+from lambent.scenes.loaders.gltf_texture import Textures, main_uv_set
+from lambent.scenes.loaders.metallic import metallic_roughness
+from lambent.scenes.loaders.pictures import Picture
+from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, seen_through, triple
+from lambent.scenes.loaders.varying import UvTransform, Varying, absolute, combined, constant
+from lambent.scenes.scene import Texture, Triple
 
 
-def material_of(document: MaterialDocument, name: str, textures: Textures) -> tuple[Material, Triple]:
-    """The material, and the radiance it emits.
-
-    mx = my = alpha_ggx = roughness^2 (glTF 2.0, appendix B); metals reflect their base colour and have no diffuse
-    term; dielectrics reflect ((ior - 1)/(ior + 1))^2 and are diffuse below; between the two everything is blended.
-    Transmission is that of a thin sheet. The exponent of the cosines keeps the albedo below one: see `_cosine_power`.
-    """
+def surface_of(document: MaterialDocument, textures: Textures, said: list[str]) -> Surface:
+    """The surface a material describes; `said` is told what it lost."""
     pbr, more = document.pbrMetallicRoughness, document.extensions
-    base = np.asarray(pbr.baseColorFactor[:3]) * textures.mean(pbr.baseColorTexture, True, name)
-    packed = textures.mean(pbr.metallicRoughnessTexture, False, name)
-    metallic, roughness = pbr.metallicFactor * packed[2], pbr.roughnessFactor * packed[1]
+    uv_set = main_uv_set(document)
+    found = textures.of(pbr.baseColorTexture, uv_set, said)
+    base = _times(np.asarray(pbr.baseColorFactor[:3]), found and Varying(found[0].rgb(srgb=True), found[1]))
+    packed = textures.rgb(pbr.metallicRoughnessTexture, uv_set, said, srgb=False)
+    metallic = _times(np.array([pbr.metallicFactor]), packed and packed.channel(2))
+    roughness = _times(np.array([pbr.roughnessFactor]), packed and packed.channel(1))
+    across = combined(lambda r: r**2, roughness, said=said)
     ior, specular = more.KHR_materials_ior.ior, more.KHR_materials_specular
+    # Such an ior is specified to mean no Fresnel effect at all; at most everything is reflected.
     plain = ((ior - 1) / (ior + 1)) ** 2 * np.asarray(specular.specularColorFactor) * specular.specularFactor
-    plain = np.clip(plain, 0, 1)
-    r0 = (1 - metallic) * plain + metallic * base
-    across = roughness**2
-    strength = more.KHR_materials_anisotropy.anisotropyStrength
-    along = across + (1 - across) * strength**2
-    mx, my = (max(float(m), ROUGHNESS_MIN) for m in (along, across))
-    power = _cosine_power(max(mx, my))
-    lobes = [Lobe(distribution="ggx", mx=mx, my=my, r0=_triple(r0), alpha=power)]
-    through = more.KHR_materials_transmission.transmissionFactor * (1 - metallic)
-    if through > 0:
-        k = _triple(through * base)
-        lobes.append(lobes[0].model_copy(update={"side": "transmission", "k": k, "r0": _triple(plain)}))
-    kd = base * (1 - metallic) * (1 - through) * (1 - plain)
-    glow = np.asarray(document.emissiveFactor) * more.KHR_materials_emissive_strength.emissiveStrength
-    if glow.any():
-        glow = glow * textures.mean(document.emissiveTexture, True, name)
-    return Material(name=name, kd=_triple(kd), lobes=tuple(lobes)), _triple(glow)
+    if specular.specularTexture is not None or specular.specularColorTexture is not None:
+        said.append("the textures of its specular extension are not read")
+    strength, direction = _anisotropy(document, textures, uv_set, said)
+    along = combined(lambda a: a + (1 - a) * strength**2, across, said=said) if strength else across
+    aspect = float(max(across.mean[0], ROUGHNESS_MIN) / max(along.mean[0], ROUGHNESS_MIN))
+    through = more.KHR_materials_transmission.transmissionFactor
+    if through and more.KHR_materials_transmission.transmissionTexture is not None:
+        mean = textures.rgb(more.KHR_materials_transmission.transmissionTexture, uv_set, said, srgb=False)
+        through *= float(mean.channel(0).mean[0]) if mean is not None else 1.0
+        said.append("its transmission is averaged over its picture")
+    surface = metallic_roughness(base, metallic, along, plain, said, aspect=aspect, through=through)
+    surface = replace(
+        surface,
+        glosses=(*surface.glosses, *_clear_coat(document)),
+        normal=_normal(document, textures, uv_set, said),
+        direction=direction,
+        emission=_emission(document, textures, uv_set, said),
+    )
+    return _with_alpha(surface, document, found, said)
 
 
-def _cosine_power(m: float) -> float:
-    """Exponent of (cos_i cos_o): 1/2 on smooth surfaces, less on rough ones, where 1/2 would return too much light."""
-    return 0.5 * min(1.0, math.sqrt(0.25 / m))
+def _times(factor: Floats, v: Varying | None) -> Varying:
+    if v is None:
+        return constant(factor)
+    return Varying(v.values * factor.astype(np.float32), v.uv_transform)
 
 
-def _triple(values: Floats) -> Triple:
-    r, g, b = (float(v) for v in values)
-    return r, g, b
+def _anisotropy(
+    document: MaterialDocument, textures: Textures, uv_set: int, said: list[str]
+) -> tuple[float, Texture | None]:
+    """Strength, and by which angles the tangent is turned."""
+    anisotropy = document.extensions.KHR_materials_anisotropy
+    strength, turn_rad = anisotropy.anisotropyStrength, anisotropy.anisotropyRotation
+    if not strength:
+        return 0.0, None
+    turned = np.array([np.cos(turn_rad), np.sin(turn_rad)])
+    picture = textures.rgb(anisotropy.anisotropyTexture, uv_set, said, srgb=False)
+    if picture is None:
+        return strength, (absolute(constant(turned)) if turn_rad else None)
+    if float(np.ptp(picture.values[..., 2])) > 0.02:
+        said.append("the strength of its anisotropy is averaged over its picture")
+    strength *= float(picture.channel(2).mean[0])
+    x, y = (picture.values[..., i] * 2 - 1 for i in range(2))
+    length = np.maximum(np.hypot(x, y), 1e-3)
+    x, y = x / length, y / length
+    directions = np.stack([x * turned[0] - y * turned[1], x * turned[1] + y * turned[0]], axis=-1)
+    return strength, absolute(Varying(directions, picture.uv_transform))
+
+
+def _clear_coat(document: MaterialDocument) -> tuple[Gloss, ...]:
+    coat = document.extensions.KHR_materials_clearcoat
+    if not coat.clearcoatFactor:
+        return ()
+    k = constant(np.full(3, coat.clearcoatFactor))
+    return (Gloss(constant(coat.clearcoatRoughnessFactor**2), k, np.full(3, 0.04)),)
+
+
+def _normal(document: MaterialDocument, textures: Textures, uv_set: int, said: list[str]) -> Texture | None:
+    reference = document.normalTexture
+    picture = textures.rgb(reference, uv_set, said, srgb=False)
+    if picture is None or reference is None:
+        return None
+    strength = np.array([reference.scale, reference.scale, 1.0], np.float32)
+    normals = (picture.values * 2 - 1) * strength
+    length = np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-3)
+    return absolute(Varying(normals / length, picture.uv_transform))
+
+
+def _emission(document: MaterialDocument, textures: Textures, uv_set: int, said: list[str]) -> Triple:
+    glow = np.asarray(document.emissiveFactor) * document.extensions.KHR_materials_emissive_strength.emissiveStrength
+    if not glow.any():
+        return 0.0, 0.0, 0.0
+    picture = textures.rgb(document.emissiveTexture, uv_set, said, srgb=True)
+    if picture is not None:
+        said.append("its emission is averaged over its picture")
+        glow = glow * picture.mean
+    return triple(glow)
+
+
+def _with_alpha(
+    surface: Surface, document: MaterialDocument, base: tuple[Picture, UvTransform] | None, said: list[str]
+) -> Surface:
+    """With its holes (MASK), or with what shines through it (BLEND)."""
+    factor = document.pbrMetallicRoughness.baseColorFactor[3]
+    if document.alphaMode == "OPAQUE":
+        return surface
+    alpha = Varying(base[0].opacity() * np.float32(factor), base[1]) if base and base[0].alpha else constant(factor)
+    if document.alphaMode == "MASK":
+        if alpha.is_picture or factor < document.alphaCutoff:
+            return replace(surface, opacity=absolute(alpha), cutoff=document.alphaCutoff)
+        return surface
+    even = float(alpha.mean[0])
+    if alpha.is_picture and float(np.ptp(alpha.values)) > 0.02:
+        said.append("alpha BLEND cuts holes where it is below a half")
+        return replace(surface, opacity=absolute(alpha))
+    if even >= 1:
+        return surface
+    said.append(f"alpha BLEND lets {1 - even:.0%} of the light through")
+    return seen_through(surface, np.full(3, even))

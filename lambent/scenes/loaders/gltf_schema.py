@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -35,6 +35,23 @@ class BufferView(_Part):
     byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
 
 
+class SparseIndices(_Part):
+    bufferView: Index
+    componentType: Literal[5121, 5123, 5125]
+    byteOffset: Index = 0
+
+
+class SparseValues(_Part):
+    bufferView: Index
+    byteOffset: Index = 0
+
+
+class Sparse(_Part):
+    count: Index
+    indices: SparseIndices
+    values: SparseValues
+
+
 class Accessor(_Part):
     componentType: Literal[5120, 5121, 5122, 5123, 5125, 5126]
     count: Index
@@ -42,7 +59,20 @@ class Accessor(_Part):
     bufferView: Index | None = None
     byteOffset: Index = 0
     normalized: bool = False
-    sparse: Any = None
+    sparse: Sparse | None = None
+
+
+class VariantMapping(_Part):
+    material: Index
+    variants: list[Index]
+
+
+class PrimitiveVariants(_Part):
+    mappings: list[VariantMapping] = []
+
+
+class PrimitiveExtensions(_Part):
+    KHR_materials_variants: PrimitiveVariants = PrimitiveVariants()
 
 
 class Primitive(_Part):
@@ -50,6 +80,7 @@ class Primitive(_Part):
     indices: Index | None = None
     material: Index | None = None
     mode: Index = 4
+    extensions: PrimitiveExtensions = PrimitiveExtensions()
 
 
 class MeshDocument(_Part):
@@ -77,8 +108,28 @@ class Node(_Part):
     extensions: NodeExtensions = NodeExtensions()
 
 
+class WebpSource(_Part):
+    source: Index
+
+
+class TextureExtensions(_Part):
+    EXT_texture_webp: WebpSource | None = None
+
+
 class Texture(_Part):
     source: Index | None = None
+    sampler: Index | None = None
+    extensions: TextureExtensions = TextureExtensions()
+
+    @property
+    def image(self) -> int | None:
+        webp = self.extensions.EXT_texture_webp
+        return webp.source if webp is not None else self.source
+
+
+class Sampler(_Part):
+    wrapS: int = 10497
+    wrapT: int = 10497
 
 
 class Image(_Part):
@@ -86,8 +137,25 @@ class Image(_Part):
     bufferView: Index | None = None
 
 
+class TextureTransform(_Part):
+    offset: tuple[Finite, Finite] = (0, 0)
+    rotation: Finite = 0
+    scale: tuple[Finite, Finite] = (1, 1)
+    texCoord: Index | None = None
+
+
+class ReferenceExtensions(_Part):
+    KHR_texture_transform: TextureTransform | None = None
+
+
 class TextureReference(_Part):
     index: Index
+    texCoord: Index = 0
+    extensions: ReferenceExtensions = ReferenceExtensions()
+
+
+class NormalReference(TextureReference):
+    scale: Finite = 1
 
 
 class MetallicRoughness(_Part):
@@ -109,15 +177,24 @@ class Ior(_Part):
 class Specular(_Part):
     specularFactor: Share = 1
     specularColorFactor: Colour = (1, 1, 1)
+    specularTexture: TextureReference | None = None
+    specularColorTexture: TextureReference | None = None
 
 
 class Anisotropy(_Part):
     anisotropyStrength: Share = 0
     anisotropyRotation: Finite = 0
+    anisotropyTexture: TextureReference | None = None
+
+
+class ClearCoat(_Part):
+    clearcoatFactor: Share = 0
+    clearcoatRoughnessFactor: Share = 0
 
 
 class Transmission(_Part):
     transmissionFactor: Share = 0
+    transmissionTexture: TextureReference | None = None
 
 
 class MaterialExtensions(_Part):
@@ -126,6 +203,7 @@ class MaterialExtensions(_Part):
     KHR_materials_specular: Specular = Specular()
     KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_transmission: Transmission = Transmission()
+    KHR_materials_clearcoat: ClearCoat = ClearCoat()
 
 
 class MaterialDocument(_Part):
@@ -133,8 +211,9 @@ class MaterialDocument(_Part):
     pbrMetallicRoughness: MetallicRoughness = MetallicRoughness()
     emissiveFactor: Colour = (0, 0, 0)
     emissiveTexture: TextureReference | None = None
-    normalTexture: TextureReference | None = None
-    alphaMode: str = "OPAQUE"
+    normalTexture: NormalReference | None = None
+    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alphaCutoff: NotNegative = 0.5
     extensions: MaterialExtensions = MaterialExtensions()
 
 
@@ -170,8 +249,17 @@ class LightList(_Part):
     lights: list[LightDocument] = []
 
 
+class Variant(_Part):
+    name: str
+
+
+class VariantList(_Part):
+    variants: list[Variant] = []
+
+
 class RootExtensions(_Part):
     KHR_lights_punctual: LightList = LightList()
+    KHR_materials_variants: VariantList = VariantList()
 
 
 class GltfDocument(_Part):
@@ -188,6 +276,7 @@ class GltfDocument(_Part):
     materials: list[MaterialDocument] = []
     textures: list[Texture] = []
     images: list[Image] = []
+    samplers: list[Sampler] = []
     cameras: list[CameraDocument] = []
     extensionsRequired: list[str] = []
     extensions: RootExtensions = RootExtensions()

@@ -60,6 +60,13 @@ class ImageSection(Section):
     rotation_deg: Finite = 0.0
 
 
+class ConstantSection(Section):
+    """The same radiance from everywhere."""
+
+    kind: Literal["constant"]
+    radiance: Colour
+
+
 class ObjectSection(Section):
     """What is said of the objects whose name fits a pattern; unsaid, the geometry file's word stands."""
 
@@ -156,8 +163,10 @@ class SceneDocument(Section):
     name: str = "scene"
     geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] = 0.0
-    environment: Annotated[SunSkySection | ImageSection, Field(discriminator="kind")] | None = None
+    environment: Annotated[SunSkySection | ImageSection | ConstantSection, Field(discriminator="kind")] | None = None
+    variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    assign: dict[str, str] = Field(default_factory=dict)  # pattern over objects and materials -> material
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[PointSection | SpotSection | DirectionalSection, Field(discriminator="kind")], ...] = ()
     cameras: tuple[CameraSection, ...] = ()

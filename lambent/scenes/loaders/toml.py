@@ -16,8 +16,10 @@ from lambent.core.errors import UserError, did_you_mean
 from lambent.core.files import inside, read_bytes
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
-from lambent.scenes.loaders.parts import Parts, unique_name
+from lambent.scenes.loaders.assembly import assembled, assigned
+from lambent.scenes.loaders.parts import Parts
 from lambent.scenes.loaders.schema import (
+    ConstantSection,
     DirectionalSection,
     GeometrySection,
     ImageSection,
@@ -30,6 +32,7 @@ from lambent.scenes.loaders.schema import (
 from lambent.scenes.scene import (
     Camera,
     CameraPath,
+    ConstantEnvironment,
     DirectionalLight,
     Environment,
     ImageEnvironment,
@@ -57,11 +60,10 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     document = _parse(path)
     parts = [_geometry(entry, path, read_geometry) for entry in document.geometry]
     environment = _environment(document, path) or next((p.environment for p in parts if p.environment), None)
-    objects = _gather(parts)
-    materials = {name: m for p in parts for name, m in p.materials.items()}
+    whole = assembled(parts, document.variant, path)
     named, sources = _materials(document, path)
-    materials |= named
-    textures = {name: t for p in parts for name, t in p.textures.items() if name not in named}
+    materials = {**whole.materials, **named}
+    objects, unfit = assigned(document.assign, whole.objects, materials, path)
     objects, centres, planes = _apply(document, objects, path)
     for o in objects:
         if o.material not in materials:
@@ -87,8 +89,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         ),
         exposure_ev=document.exposure_ev,
         sources=(path, *(s for p in parts for s in p.sources), *sources),
-        warnings=tuple(w for p in parts for w in p.warnings),
-        textures=textures,
+        warnings=(*whole.warnings, *unfit),
+        textures={name: t for name, t in whole.textures.items() if name not in named},
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),
@@ -138,11 +140,6 @@ def _geometry(entry: str | GeometrySection, path: Path, read_geometry: ReadGeome
     )
 
 
-def _gather(parts: list[Parts]) -> tuple[SceneObject, ...]:
-    taken: set[str] = set()
-    return tuple(replace(o, name=unique_name(o.name, taken)) for p in parts for o in p.objects)
-
-
 def _materials(document: SceneDocument, path: Path) -> tuple[dict[str, Material], tuple[Path, ...]]:
     """Materials said in the document, and the files some of them come from."""
     materials, sources = {}, []
@@ -152,11 +149,28 @@ def _materials(document: SceneDocument, path: Path) -> tuple[dict[str, Material]
             if len(table) > 1:
                 raise UserError("says more than its file", file=where, got=sorted(set(table) - {"file"})[0])
             source = inside_scene(path, f"materials.{name}.file", table["file"])
-            materials[name] = load_material(source).model_copy(update={"name": name})
+            materials[name] = _material_of_file(source, f"materials.{name}.file", path)
+            materials[name] = materials[name].model_copy(update={"name": name})
             sources.append(source)
         else:
             materials[name] = material_from({"name": name, **table}, where)
     return materials, tuple(sources)
+
+
+def _material_of_file(source: Path, field: str, path: Path) -> Material:
+    """The document of a file; a measurement has to be fitted before it can be worn."""
+    from lambent.materials.measured.registry import is_known
+
+    if source.is_file() and not _begins_as_json(source) and is_known(source):
+        fitted = source.with_suffix(".json").name
+        hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
+        raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
+    return load_material(source)
+
+
+def _begins_as_json(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def inside_scene(path: Path, field: str, name: Any) -> Path:
@@ -214,6 +228,8 @@ def _environment(document: SceneDocument, path: Path) -> Environment | None:
     e = document.environment
     if e is None:
         return None
+    if isinstance(e, ConstantSection):
+        return ConstantEnvironment(e.radiance)
     if isinstance(e, ImageSection):
         file = inside_scene(path, "environment.file", e.file)
         if not file.is_file():

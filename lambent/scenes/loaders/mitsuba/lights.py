@@ -43,7 +43,7 @@ def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
 
 
 def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
-    """Mitsuba's pictures have +y on top and -z in the middle, as ours."""
+    """Mitsuba's pictures have +y on top, as ours, and +z in the middle, where ours have -z."""
     path = plugin.file()
     if not path.is_file():
         plugin.say(f"picture {plugin.text('filename')} is not there: left out")
@@ -58,7 +58,8 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
     gamma = plugin.number("gamma", 0.0)
     if gamma > 0:
         plugin.say("its gamma is not read")
-    rotation_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
+    turned_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
+    rotation_deg = turned_deg % 360 - 180
     return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4))
 
 
