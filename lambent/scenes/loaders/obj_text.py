@@ -167,16 +167,13 @@ class _Block:
         if not len(lines):
             return
         text = self._text(lines, "f")
-        flat = np.frombuffer(text, np.uint8)
-        ends = np.flatnonzero(flat == 10)
         sizes = _tokens(text)
-        slash = flat == 47
-        slashes = _per_line(slash, ends)
-        doubles = _per_line(slash & np.concatenate([slash[1:], [False]]), ends)
-        n = np.maximum(sizes, 1)
         form = np.full(len(lines), -1)
-        for code, (single, double) in enumerate(FORMS):
-            form[(slashes == single * n) & (doubles == double * n)] = code
+        some = sizes > 0
+        codes = _forms(text)
+        first = (np.cumsum(sizes) - sizes)[some]
+        form[some] = np.minimum.reduceat(codes, first) if some.any() else -1
+        form[some] = np.where(np.maximum.reduceat(codes, first) == form[some], form[some], -1) if some.any() else -1
         if (form < 0).any():
             raise self._error("face that cannot be read", lines[int(np.argmax(form < 0))])
         made = [self._of_form(lines[form == code], FORMS[key], sizes[form == code], seen)
@@ -253,12 +250,30 @@ def _per_line(marks: NDArray[np.bool_], ends: Ints) -> Ints:
     return np.diff(np.searchsorted(np.flatnonzero(marks), ends), prepend=0)
 
 
+def _begins(flat: Bytes) -> NDArray[np.bool_]:
+    """Where words begin."""
+    blank = flat <= 32
+    return ~blank & np.concatenate([[True], blank[:-1]])
+
+
 def _tokens(text: bytes) -> Ints:
     """Words on each line."""
     flat = np.frombuffer(text, np.uint8)
-    blank = flat <= 32
-    first = ~blank & np.concatenate([[True], blank[:-1]])
-    return _per_line(first, np.flatnonzero(flat == 10))
+    return _per_line(_begins(flat), np.flatnonzero(flat == 10))
+
+
+def _forms(text: bytes) -> Ints:
+    """The form of each corner, as a place in `FORMS`; -1 where it has none."""
+    flat = np.frombuffer(text, np.uint8)
+    starts = np.flatnonzero(_begins(flat))
+    slash = flat == 47
+    double = slash & np.concatenate([slash[1:], [False]])
+    bounds = np.append(starts, len(flat))
+    slashes, doubles = (np.diff(np.searchsorted(np.flatnonzero(marks), bounds)) for marks in (slash, double))
+    codes = np.full(len(starts), -1)
+    for code, (single, twice) in enumerate(FORMS):
+        codes[(slashes == single) & (doubles == twice)] = code
+    return codes
 
 
 def _ranges(counts: Ints) -> Ints:
