@@ -49,6 +49,8 @@ from lambent.store.textures import texture_records, write_textures
 Array = NDArray[np.floating]
 KINDS = ("geometry", "light_map", "environment", "probe")
 NEEDS = {"geometry": (), "light_map": ("geometry",), "environment": (), "probe": ("geometry", "light_map")}
+PATHS, PHOTONS = INTEGRATORS = ("paths", "photons")
+INTEGRATOR = "light_map"  # document: which of INTEGRATORS made the light map
 log = logging.getLogger(__name__)
 
 
@@ -61,6 +63,7 @@ def bake(
     resume: bool = True,
     progress: Progress = silent,
     seed: int = 0,
+    light_map: str | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -73,6 +76,8 @@ def bake(
         False bakes everything anew, even what is up to date.
     seed : int
         The same seed gives the same arrays.
+    light_map : {'paths', 'photons'}, optional
+        What integrates the light map: path tracing and final gathering, or photons. By default as the store has it.
 
     Returns
     -------
@@ -80,7 +85,7 @@ def bake(
         Changed inputs are told by the logger and kept in the document "changes".
     """
     kinds = _with_needs(KINDS if only is None else only)
-    job = _Bake(scene, store_path, quality_named(quality), resume, progress, seed)
+    job = _Bake(scene, store_path, quality_named(quality), resume, progress, seed, light_map)
     steps: dict[str, Callable[[], None]] = {
         "geometry": job.geometry,
         "environment": job.environment,
@@ -101,9 +106,18 @@ def _with_needs(only: Collection[str]) -> set[str]:
     return {need for kind in only for need in (kind, *NEEDS[kind])}
 
 
+def _integrator(wanted: str | None, store: Store | None) -> str:
+    """What makes the light map: as asked for, else as in the store."""
+    found = wanted or (store.documents.get(INTEGRATOR, PATHS) if store else PATHS)
+    if found not in INTEGRATORS:
+        hint = did_you_mean(str(found), INTEGRATORS)
+        raise UserError("unknown light map integrator", got=found, expected=", ".join(INTEGRATORS), hint=hint)
+    return str(found)
+
+
 def inputs_of(scene: Scene) -> dict[str, str]:
     """SHA-256 of the files a scene was read from, by file name."""
-    return {path.name: sha256_of(path) for path in scene.sources}
+    return {path.name: sha256_of(path) for path in (*scene.sources, *scene.measured.values())}
 
 
 def changed_inputs(store: Store, scene: Scene) -> list[str]:
@@ -115,7 +129,16 @@ def changed_inputs(store: Store, scene: Scene) -> list[str]:
 class _Bake:
     """One run: the scene, the store, and what the steps share."""
 
-    def __init__(self, scene: Scene, path: Path, quality: Quality, resume: bool, progress: Progress, seed: int) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        path: Path,
+        quality: Quality,
+        resume: bool,
+        progress: Progress,
+        seed: int,
+        integrator: str | None,
+    ) -> None:
         if not scene.objects:
             raise UserError("scene has no objects", field=scene.name)
         scene = replace(scene, textures=bounded(scene.textures))
@@ -124,7 +147,9 @@ class _Bake:
         changes = changed_inputs(existing, scene) if existing else []
         if changes:
             log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
+        self.integrator = _integrator(integrator, existing)
         self.store = Store.create(path, inputs_of(scene))
+        self.store.set_document(INTEGRATOR, self.integrator)
         self._sides: dict[float, Any] = {}
         self.store.set_document("changes", changes)
         if not resume:
@@ -132,6 +157,8 @@ class _Bake:
         geometry = keys.geometry_parts(scene)
         self.geometry_key = keys.key_of("geometry", quality.light_map_texels, *geometry)
         q = [quality.light_map_samples, quality.light_map_noise, quality.gather_samples, quality.max_depth, seed]
+        if self.integrator == PHOTONS:
+            q.append([PHOTONS, quality.photons_per_texel])
         looks = keys.material_parts(scene)
         self.light_map_key = keys.key_of("light_map", self.geometry_key, looks, keys.light_parts(scene), q)
         self.irradiance_key = keys.key_of("irradiance", self.light_map_key)  # raw samples, filled and denoised
@@ -205,25 +232,49 @@ class _Bake:
 
             texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
             labels = chart_labels(self.merged, texels)
-            builder = self._builder(diffuse=True)
-            how = path_traced(self.quality)
-            maps = {side: self._sampled_map(texels, labels, side, builder, "traced", how) for side in sides}
-            if self.quality.gather_samples:
+            builder = self._builder(diffuse=True, photons=self.integrator == PHOTONS)
+            if self.integrator == PHOTONS:
+                maps = dict(zip(sides, self._photon_maps(texels, labels, len(sides), builder), strict=True))
+            else:
+                how = path_traced(self.quality)
+                maps = {side: self._sampled_map(texels, labels, side, builder, "traced", how) for side in sides}
+            if self.quality.gather_samples and self.integrator != PHOTONS:
                 builder = self._builder(diffuse=False)
                 back = maps["irradiance_back"][0] if len(sides) > 1 else None
                 how = gathered(self.quality, LightMapCache(builder, maps["irradiance"][0], back))
                 maps = {side: self._sampled_map(texels, labels, side, builder, "gathered", how) for side in sides}
             for side, (clean, meta) in maps.items():
                 name = f"light_map/{side}"
-                self.store.put(name, "light_map", clean, key=self.irradiance_key, meta=self._meta(**meta))
+                meta = self._meta(integrator=self.integrator, **meta)
+                self.store.put(name, "light_map", clean, key=self.irradiance_key, meta=meta)
 
-    def _builder(self, diffuse: bool) -> Any:
+    def _builder(self, diffuse: bool, photons: bool = False) -> Any:
         from lambent.bake.emitters import balance_emitters
+        from lambent.bake.measured_materials import grids_of
         from lambent.bake.mitsuba_scene import SceneBuilder
 
-        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse)
+        grids = grids_of(self.scene, photons=photons, progress=self.progress)
+        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse, measured=grids)
         balance_emitters(builder)
         return builder
+
+    def _photon_maps(
+        self, texels: Any, labels: NDArray[np.integer], count: int, builder: Any
+    ) -> list[tuple[Array, dict[str, float]]]:
+        """Both sides' maps, denoised, and what to note of them; the batches stay as `light_map/photons`."""
+        from lambent.bake.photon_map import finished, shape_of, shoot_batches
+
+        name, quality = "light_map/photons", self.quality
+        shape, chunks = shape_of(texels, count)
+        writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
+        scene, covered = builder.build(), len(texels.index)
+        if writer.missing:
+            per_texel, bounces = quality.photons_per_texel, quality.max_depth
+            shoot_batches(writer, scene, per_texel, bounces, self.seed, covered, self.progress)
+        writer.finish()
+        self.progress(0, 1, "denoising")
+        sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
+        return finished(self.store.read(name), self.merged, sides, labels)
 
     def _sampled_map(
         self, texels: Any, labels: NDArray[np.integer], side: str, builder: Any, stage: str, how: Any

@@ -56,6 +56,8 @@ def material_parts(scene: Scene) -> object:
     for name, textures in scene.textures.items():
         pictures = {part: digest(texture) for part, texture in parts(textures).items()}
         look[name] = [look.get(name), pictures, textures.cutoff]
+    for name, file in scene.measured.items():
+        look[name] = [look.get(name), sha256_of(file)]
     return [(o.name, look[o.material]) for o in scene.objects]
 
 

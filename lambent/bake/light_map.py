@@ -159,7 +159,14 @@ def finished(raw: Array, texels: Texels, labels: NDArray[np.integer]) -> tuple[A
         return np.zeros((*known.shape, 3), np.float16), {"noise": 0.0, "samples": 0.0}
     halves = raw[..., :3] / np.maximum(count, 1)[..., None]
     noise = relative_noise(halves[:, known])
-    filled = fill(halves.mean(axis=0), known, labels, smooth=SMOOTH)
-    clean = fill(blend_seams(denoise(filled), known, texels, labels), known, labels)
     meta = {"noise": noise, "samples": float(count.sum(axis=0)[known].mean())}
-    return np.minimum(clean, HALF_MAX).astype(np.float16), meta
+    return cleaned(halves.mean(axis=0), known, texels, labels), meta
+
+
+def cleaned(
+    irradiance: Array, known: NDArray[np.bool_], texels: Texels, labels: NDArray[np.integer]
+) -> NDArray[np.float16]:
+    """A noisy light map (H, W, 3), denoised, filled where nothing is known, its seams blended."""
+    filled = fill(irradiance, known, labels, smooth=SMOOTH)
+    clean = fill(blend_seams(denoise(filled), known, texels, labels), known, labels)
+    return np.minimum(clean, HALF_MAX).astype(np.float16)

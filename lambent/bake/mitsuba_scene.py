@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
+from lambent.bake.table_plugin import table_dict
 from lambent.core.images import read_image
+from lambent.materials.measured.patch_sheet import Lookup
 from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
@@ -40,17 +42,30 @@ class SceneBuilder:
         Light map coordinates (V, 2) per object name; they become the mesh attribute `vertex_uv2` (third component 0).
     diffuse : bool
         False takes the diffuse terms out of all materials (for tracing with a light map).
+    measured : mapping, optional
+        Tables by material name that surfaces scatter by instead of their material; they stay whole without `diffuse`.
     """
 
-    def __init__(self, scene: Scene, uv2: Mapping[str, Array] | None = None, *, diffuse: bool = True) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        uv2: Mapping[str, Array] | None = None,
+        *,
+        diffuse: bool = True,
+        measured: Mapping[str, Lookup] | None = None,
+    ) -> None:
         import mitsuba as mi
 
         register_material_plugin()
-        self.scene = scene
+        self.scene, self.measured = scene, measured or {}
+        tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
         # Equal materials share a BSDF: each one costs every kernel a function of its own.
         bsdfs: dict[object, Any] = {}
         self.meshes = {}
         for o in scene.objects:
+            if o.material in tables:
+                self.meshes[o.name] = mesh_of(o, tables[o.material], (uv2 or {}).get(o.name))
+                continue
             material, textures = scene.materials[o.material], scene.textures.get(o.material)
             look = (material_dict(material, diffuse=diffuse)["material"], textures and o.material)
             if look not in bsdfs:

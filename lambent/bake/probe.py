@@ -21,6 +21,7 @@ from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
 from lambent.materials.bsdf import under_fresnel
+from lambent.materials.document import Material
 from lambent.store.contract import FAR, HALF_MAX
 
 Array = NDArray[np.floating]
@@ -37,7 +38,9 @@ class LightMapCache:
     """
 
     def __init__(self, builder: SceneBuilder, irradiance: Array, irradiance_back: Array | None) -> None:
-        materials = [builder.scene.materials[o.material] for o in builder.scene.objects]
+        # A measured table is traced whole: its object has no diffuse term of its own.
+        looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
+        materials = [looks[o.material] for o in builder.scene.objects]
         self._numbers = builder.object_numbers()
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
         self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))

@@ -24,6 +24,11 @@ class Quality(StrEnum):
     final = "final"
 
 
+class Integrator(StrEnum):
+    paths = "paths"
+    photons = "photons"
+
+
 class Kind(StrEnum):
     geometry = "geometry"
     light_map = "light_map"
@@ -38,6 +43,9 @@ def command(
     quality: Annotated[Quality, typer.Option(help="How much work to put in.")] = Quality.preview,
     resume: Annotated[bool, typer.Option("--resume/--anew", help="Keep what is up to date, or bake it all.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same store.")] = 0,
+    light_map: Annotated[
+        Integrator | None, typer.Option(help="What integrates the light map. [default: as in the store, else paths]")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
@@ -49,7 +57,10 @@ def command(
 
     what = load_scene(scene)
     with progress_bar() as progress:
-        store = bake(what, output, quality=quality.value, only=only, resume=resume, seed=seed, progress=progress)
+        store = bake(
+            what, output, quality=quality.value, only=only, resume=resume, seed=seed, progress=progress,
+            light_map=light_map and light_map.value,
+        )  # fmt: skip
     store.set_document(SOURCE, _place(scene, output))
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     seconds = store.documents.get("timings", {})

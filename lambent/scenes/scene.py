@@ -182,6 +182,7 @@ class Scene:
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
+    measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
 
     @property
     def bounds(self) -> tuple[Array, Array]:

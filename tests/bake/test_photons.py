@@ -1,0 +1,98 @@
+"""Photons against scenes whose answer is known by hand, and against path tracing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.photon_density import texel_areas
+from lambent.bake.texels import texels_of
+from lambent.materials.document import Material
+from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, Scene
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, constant_picture, furnace, plane
+
+SMALL = replace(TINY, photons_per_texel=512, max_depth=48)
+
+
+def photon_baked(scene: Scene, folder: Path) -> Store:
+    return bake(scene, folder, quality=SMALL, light_map="photons")
+
+
+def geometry_of(store: Store) -> dict[str, np.ndarray]:
+    return {name: store.read(f"geometry/{name}") for name in ("positions", "normals", "uv2", "faces")}
+
+
+def areas(store: Store) -> np.ndarray:
+    height, width = store.artefact("light_map/photons").shape[2:4]
+    return texel_areas(geometry_of(store), width, height)
+
+
+def flux(store: Store) -> np.ndarray:
+    """(BATCHES, 3) W in all texels of the normal's side."""
+    return store.read("light_map/photons")[:, 0].astype(float).sum(axis=(1, 2))
+
+
+def test_areas_add_up_to_the_surface(tmp_path: Path) -> None:
+    store = bake(furnace(), tmp_path / "s", quality=TINY, only=("geometry",))
+    width, height = store.artefact("geometry/uv2").meta["light_map_size"]
+    found = texel_areas(geometry_of(store), width, height)
+    assert found.sum() == pytest.approx(24.0, rel=1e-6)
+    covered = np.zeros(width * height, bool)
+    covered[texels_of(geometry_of(store), width, height).index] = True
+    assert not found.reshape(-1)[~covered].any()
+
+
+def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
+    store = photon_baked(furnace(), tmp_path / "s")
+    mean = flux(store) / 24.0
+    error = mean.std(axis=0, ddof=1) / np.sqrt(len(mean))
+    assert (error < 2e-3 * np.pi).all()
+    assert np.all(np.abs(mean.mean(axis=0) - np.pi) < 4 * error + 1e-4)
+    finished = store.read("light_map/irradiance").astype(float)
+    assert finished.min() > 0.93 * np.pi and finished.max() < 1.07 * np.pi, "no border is darker, no gutter black"
+    assert 0 < store.artefact("light_map/irradiance").meta["noise"] < 0.2
+
+
+def test_plane_under_a_constant_sky_receives_pi(tmp_path: Path) -> None:
+    environment = ImageEnvironment(constant_picture(tmp_path, 2.0))
+    store = photon_baked(replace(plane(), environment=environment), tmp_path / "s")
+    assert flux(store).mean() == pytest.approx(4 * 2 * np.pi, rel=0.01)
+    assert np.allclose(store.read("light_map/irradiance"), 2 * np.pi, rtol=0.25)
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.3])
+def test_plane_under_the_sun_receives_the_cosine(tmp_path: Path, cosine: float) -> None:
+    sun = DirectionalLight((np.sqrt(1 - cosine**2), -cosine, 0.0), (3.0, 2.0, 1.0))
+    store = photon_baked(replace(plane(), lights=(sun,)), tmp_path / "s")
+    assert flux(store).mean(axis=0) / 4 == pytest.approx(np.array([3, 2, 1]) * cosine, rel=5e-3)
+
+
+def test_plane_under_lamps_receives_the_inverse_square(tmp_path: Path) -> None:
+    lamp = PointLight((0.0, 1.0, 0.0), (4.0, 4.0, 4.0))
+    spot = PointLight((0.0, 1.0, 0.0), (2.0, 2.0, 2.0), (0.0, -1.0, 0.0), 60.0, 60.0)  # covers the square's corners
+    store = photon_baked(replace(plane(), lights=(lamp, spot)), tmp_path / "s")
+    batches, area = store.read("light_map/photons")[:, 0, ..., 0].astype(float), areas(store)
+    texels = texels_of(geometry_of(store), area.shape[1], area.shape[0])
+    wanted = np.zeros(area.size)
+    wanted[texels.index] = (6 / (1 + texels.positions[..., [0, 2]] ** 2 @ [1, 1]) ** 1.5).mean(axis=1)
+    whole = (area > 0.9 * area.max()).reshape(-1)
+    means = batches.reshape(len(batches), -1)[:, whole] / area.reshape(-1)[whole]
+    z = (means.mean(axis=0) - wanted[whole]) / (means.std(axis=0, ddof=1) / np.sqrt(len(means)))
+    assert np.abs(z).mean() < 1.2 and abs(z.mean()) < 0.2, "over the whole square"
+    assert means.mean() == pytest.approx(wanted[whole].mean(), rel=0.01)
+
+
+def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) -> None:
+    sun = DirectionalLight((0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+    store = photon_baked(replace(plane(), materials={"black": Material(kt_d=0.4)}, lights=(sun,)), tmp_path / "s")
+    assert not store.read("light_map/irradiance").any()
+    assert np.allclose(store.read("light_map/irradiance_back"), 1.0, rtol=0.12)
+
+
+def test_no_light_is_a_black_map(tmp_path: Path) -> None:
+    assert not photon_baked(plane(), tmp_path / "s").read("light_map/irradiance").any()
