@@ -2,11 +2,13 @@
 
     scene["ball"]["bsdf"] = table_dict(load("satin.bsdf"))
 
-The table is resampled once onto `half_vector_grid`; its docstring says how that looks up and samples, and
-docs/performance.md what the resampling costs in exactness. Conventions are those of material_plugin.py: Mitsuba's
-`si.wi` is the viewer (our wo), its `wo` the light (our wi), its eval includes the cosine; a thin two-sided sheet
-(unless the table has a back of its own) without refraction; the brushing direction is the mesh attribute
-`vertex_tangent`.
+A table of patch matrices (LBNL Klems) is looked up itself, by `patch_sheet`. Every other table is resampled once onto
+`half_vector_grid`; its docstring says how that looks up and samples, and docs/performance.md what the resampling costs
+in exactness.
+
+Conventions are those of material_plugin.py: Mitsuba's `si.wi` is the viewer (our wo), its `wo` the light (our wi), its
+eval includes the cosine; a thin two-sided sheet (unless the table has a back of its own) without refraction; the
+brushing direction is the mesh attribute `vertex_tangent`.
 
 Mitsuba's own `measured` plugin asks an RGL file with the viewer as the file's incident direction. RGL files are
 reciprocal to a few per cent only, so the two renderings differ by that much where grazing light meets a steep viewer.
@@ -15,7 +17,6 @@ reciprocal to a few per cent only, so the two renderings differ by that much whe
 from __future__ import annotations
 
 import functools
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -23,18 +24,20 @@ import numpy as np
 from lambent.bake.engine import engine
 from lambent.bake.material_plugin import Turned, brushing_angle
 from lambent.core.progress import Progress, silent
-from lambent.materials.measured import half_vector_grid
-from lambent.materials.measured.half_vector_grid import GridOps, GridShape, HalfVectorGrid, grid_of
+from lambent.materials.measured.half_vector_grid import GridOps, GridShape, HalfVectorGrid
+from lambent.materials.measured.patch_sheet import Lookup, PatchSheet, lookup_of
 from lambent.materials.measured.protocol import MeasuredTable
 
 PLUGIN = "lambent_table"
-_ARRAYS = ("values", "marginal", "conditional", "density", "across")
+_LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet]] = {"grid": HalfVectorGrid, "patches": PatchSheet}
 
 
 def table_dict(
-    table: MeasuredTable | HalfVectorGrid, *, shape: GridShape | None = None, progress: Progress = silent
+    table: MeasuredTable | Lookup, *, shape: GridShape | None = None, progress: Progress = silent
 ) -> dict[str, Any]:
-    """The dictionary for `mi.load_dict`; registers the plugin. Give a grid to use one table in several scenes.
+    """The dictionary for `mi.load_dict`; registers the plugin. Give a lookup to use one table in several scenes.
+
+    `shape` is of the grid, where the table needs one.
 
     Raises
     ------
@@ -44,10 +47,10 @@ def table_dict(
     register_table_plugin()
     import mitsuba as mi
 
-    grid = table if isinstance(table, HalfVectorGrid) else grid_of(table, shape, progress)
-    sizes = [getattr(grid.shape, field.name) for field in fields(GridShape)]
-    data = {name: mi.TensorXf(np.ascontiguousarray(getattr(grid, name))) for name in _ARRAYS}
-    return {"type": PLUGIN, "shape": " ".join(map(str, sizes)), "faces": grid.faces, "kinds": grid.kinds} | data
+    lookup = table if isinstance(table, HalfVectorGrid | PatchSheet) else lookup_of(table, shape, progress)
+    kind = next(word for word, kind in _LOOKUPS.items() if isinstance(lookup, kind))
+    data = {name: mi.TensorXf(np.ascontiguousarray(getattr(lookup, name))) for name in lookup.ARRAYS}
+    return {"type": PLUGIN, "lookup": kind, "sizes": " ".join(map(str, lookup.sizes))} | data
 
 
 def register_table_plugin() -> None:
@@ -71,11 +74,11 @@ def _register(variant: str) -> None:
 
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
-            shape = GridShape(*map(int, str(props["shape"]).split()))
-            arrays = {name: mi.Float(mi.TensorXf(props[name]).array) for name in _ARRAYS}
-            self.grid = HalfVectorGrid(shape, int(props["faces"]), int(props["kinds"]), **arrays)
-            self.anisotropic = shape.viewer_phi > 1
-            kinds = [mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission][: self.grid.kinds]
+            kind = _LOOKUPS[str(props["lookup"])]
+            arrays = {name: mi.Float(mi.TensorXf(props[name]).array) for name in kind.ARRAYS}
+            self.lookup = kind.of_sizes(tuple(map(int, str(props["sizes"]).split())), arrays)
+            self.anisotropic = self.lookup.anisotropic
+            kinds = [mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission][: self.lookup.kinds]
             both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             both = both | mi.BSDFFlags.Anisotropic if self.anisotropic else both
             self.kinds = kinds
@@ -85,11 +88,11 @@ def _register(variant: str) -> None:
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             angle = brushing_angle(si, active, self.anisotropic)
             wo = Turned(*angle).to_local(si.wi)
-            wi = half_vector_grid.sample(wo, sample1, sample2.x, sample2.y, self.grid, ops)
-            density = half_vector_grid.pdf(wi, wo, self.grid, ops)
+            wi = self.lookup.sample(wo, sample1, sample2.x, sample2.y, ops)
+            density = self.lookup.pdf(wi, wo, ops)
             across = wi[2] * wo[2] < 0
             active &= (density > 0) & self._enabled(ctx, across)
-            value = mi.Color3f(half_vector_grid.evaluate(wi, wo, self.grid, ops))
+            value = mi.Color3f(self.lookup.evaluate(wi, wo, ops))
 
             bs = mi.BSDFSample3f()
             bs.wo = mi.Vector3f(Turned(*angle).to_world(wi))
@@ -109,12 +112,12 @@ def _register(variant: str) -> None:
             angle = brushing_angle(si, active, self.anisotropic)
             viewer, light = Turned(*angle).to_local(si.wi), Turned(*angle).to_local(wo)
             active &= self._enabled(ctx, viewer[2] * light[2] < 0)
-            value = mi.Color3f(half_vector_grid.evaluate(light, viewer, self.grid, ops)) * dr.abs(light[2])
-            density = half_vector_grid.pdf(light, viewer, self.grid, ops)
+            value = mi.Color3f(self.lookup.evaluate(light, viewer, ops)) * dr.abs(light[2])
+            density = self.lookup.pdf(light, viewer, ops)
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
         def to_string(self) -> str:
-            return f"{PLUGIN}[{self.grid.shape}, {self.grid.faces} faces, {self.grid.kinds} kinds]"
+            return f"{PLUGIN}[{type(self.lookup).__name__}, sizes {self.lookup.sizes}]"
 
         def _enabled(self, ctx: Any, across: Any) -> Any:
             """Whether `ctx` wants the side; a component left out keeps its share of the samples and is black."""

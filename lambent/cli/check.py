@@ -93,7 +93,7 @@ def describe_table(report: TableReport) -> str:
     """The same of a table."""
     rows = [
         ("reciprocity", f"swapping wi and wo changes {report.reciprocity_share:.1%} of the light"),
-        ("in the path tracer", f"its grid deviates by {report.resampling_share:.1%} of the light"),
+        ("in the path tracer", f"what it looks up deviates by {report.resampling_share:.1%} of the light"),
     ]
     rows += _energy_rows(report.furnace)
     rows += [

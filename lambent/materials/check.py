@@ -42,9 +42,13 @@ class Scatters(Protocol):
 
 @runtime_checkable
 class KnowsItsSteps(Protocol):
-    """A density with steps, which tests its own sampler in cells along them."""
+    """A density with steps, which tests its own sampler in cells along them.
+
+    `steps` are cells (N, 4) of the light's directions within which f is smooth, or None where it is throughout.
+    """
 
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare: ...
+    def steps(self, wo: Floats) -> Floats | None: ...
 
 
 @dataclass(frozen=True)
@@ -218,12 +222,13 @@ def check_sampler(
         return np.asarray(bsdf.eval(w, np.broadcast_to(wo, w.shape)).mean(axis=-1) * np.abs(w[..., 2]))
 
     if isinstance(bsdf, KnowsItsSteps):
-        test = bsdf.chi_square(wo, samples=samples, seed=seed)
+        test, cells = bsdf.chi_square(wo, samples=samples, seed=seed), bsdf.steps(wo)
     else:
+        cells = None
         test = chi_square(draw, seen_from_wo(bsdf.pdf), samples=samples, seed=seed)
     rng = np.random.default_rng(seed)
     pilot = draw(rng.random((samples // 16, 3)))
-    quadrature = float(integrate_cells(returned, adapted_cells(pilot), pilot).sum())
+    quadrature = float(integrate_cells(returned, adapted_cells(pilot) if cells is None else cells, pilot).sum())
     weights = _weights(bsdf, wo, rng.random((samples // 4, 3))).mean(axis=-1)
     sampled, error = float(weights.mean()), float(weights.std() / np.sqrt(len(weights)))
     return SamplerCheck(

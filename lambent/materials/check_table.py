@@ -15,7 +15,6 @@ import numpy as np
 from lambent.core.frames import Floats, direction
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere
-from lambent.materials.bsdf import components
 from lambent.materials.check import (
     PHI_DEG,
     SAMPLER_THETA_DEG,
@@ -27,7 +26,6 @@ from lambent.materials.check import (
     sampler_failures,
 )
 from lambent.materials.chi_square import adapted_cells, integrate_cells
-from lambent.materials.measured import half_vector_grid
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.sampling import TableBSDF
@@ -113,20 +111,21 @@ def check_table(
 
 
 def asymmetry(bsdf: TableBSDF, seed: int = 0, pairs: int = 60_000) -> tuple[float, float]:
-    """Share of the reflected light by which f(wi, wo) differs from f(wo, wi), and of all light from the grid's.
+    """Share of the reflected light by which f(wi, wo) differs from f(wo, wi), and of all light from what is looked up.
 
-    Importance sampled: wo by its cosine, wi by the grid; both within LAST_THETA_DEG.
+    Importance sampled: wo by its cosine, wi by the table's sampler; both within LAST_THETA_DEG.
     """
     rng = np.random.default_rng(seed)
     wo = cosine_hemisphere(rng.random((pairs, 2)))
     wi = bsdf.sample(wo, rng.random((pairs, 3)))
     lowest = np.cos(np.radians(LAST_THETA_DEG))
-    used = (np.abs(wi[:, 2]) > lowest) & (wo[:, 2] > lowest)
+    pdf = bsdf.pdf(wi, wo)
+    used = (np.abs(wi[:, 2]) > lowest) & (wo[:, 2] > lowest) & (pdf > 0)
     wi, wo = wi[used], wo[used]
     near = wi[:, 2] > 0
-    gain = (np.abs(wi[:, 2]) / bsdf.pdf(wi, wo))[:, None]
+    gain = (np.abs(wi[:, 2]) / pdf[used])[:, None]
     f, swapped = bsdf.eval(wi, wo), bsdf.eval(wo[near], wi[near])
-    looked_up = np.stack(half_vector_grid.evaluate(components(wi), components(wo), bsdf.grid), axis=-1)
+    looked_up = bsdf.looked_up(wi, wo)
     changed = (np.abs(swapped - f[near]) * gain[near]).sum() / max(((swapped + f[near]) / 2 * gain[near]).sum(), 1e-30)
     return float(changed), float((np.abs(looked_up - f) * gain).sum() / max((f * gain).sum(), 1e-30))
 
@@ -147,7 +146,8 @@ def check_integral(bsdf: TableBSDF, theta_deg: float, phi_deg: float, seed: int 
         return np.asarray(bsdf.eval(np.broadcast_to(wi, wo.shape), wo).mean(axis=-1) * np.abs(wo[..., 2]))
 
     pilot = bsdf.sample(np.broadcast_to(wi, (1 << 15, 3)), np.random.default_rng(seed).random((1 << 15, 3)))
-    quadrature = float(integrate_cells(returned, adapted_cells(pilot), pilot).sum())
+    cells = bsdf.steps(wi, reverse=True)
+    quadrature = float(integrate_cells(returned, adapted_cells(pilot) if cells is None else cells, pilot).sum())
     return IntegralCheck(theta_deg, phi_deg, float(bsdf.sheet.table.albedo(wi).mean()), quadrature)
 
 
@@ -173,6 +173,6 @@ def _warnings(resampling: float, energy: Furnace) -> list[str]:
         found.append(f"returns {albedo:.3f} of the light at theta {theta:g}, phi {phi:g} degrees: {where}")
     if resampling > 0.05:
         found.append(
-            f"the path tracer's grid deviates from the table by {resampling:.0%} of the light: steps or spikes"
+            f"what the path tracer looks up deviates from the table by {resampling:.0%} of the light: steps or spikes"
         )
     return found

@@ -13,9 +13,13 @@ from lambent.bake.table_plugin import table_dict
 from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF, components
+from lambent.materials.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import half_vector_grid, load
 from lambent.materials.measured.half_vector_grid import GridShape, grid_of
+from lambent.materials.measured.klems import KLEMS_HALF, AngleBasis, PatchMatrix
+from lambent.materials.measured.lbnl_xml import LbnlTable
+from lambent.materials.measured.patch_sheet import lookup_of
 from lambent.materials.measured.protocol import TableInfo
 
 SATIN = Path(os.environ.get("LAMBENT_DATA", Path(__file__).parents[3] / "shared" / "data")) / "measured" / "rgl"
@@ -59,6 +63,24 @@ def sheet(mi):
     return grid, mi.load_dict(table_dict(grid))
 
 
+ODD = AngleBasis("odd", (0.0, 11.0, 40.0, 62.0), (1, 5, 7))
+
+
+def blind(side):
+    """Patches of two bases, without reciprocity, colourful, most of them dark."""
+    random = np.random.default_rng(side + 1)
+    f = random.random((ODD.count, KLEMS_HALF.count, 3)) * (random.random((ODD.count, KLEMS_HALF.count, 1)) > 0.6)
+    return PatchMatrix(KLEMS_HALF, ODD, f / 20)
+
+
+@pytest.fixture(scope="module")
+def patches(mi):
+    """A table of patch matrices, black for reflection from below, and its plugin."""
+    parts = {("reflection", 1): blind(1), ("transmission", 1): blind(0), ("transmission", -1): blind(-1)}
+    table = LbnlTable("blind", parts)
+    return table, mi.load_dict(table_dict(table))
+
+
 def interaction(mi, wo):
     import drjit as dr
 
@@ -97,6 +119,49 @@ def test_sample_agrees_with_eval_pdf_and_numpy(mi, sheet):
     assert agrees[kept].mean() > 0.998
     expected = np.stack(half_vector_grid.sample(components(wo), *u.T.astype(float), grid), axis=-1)
     assert (np.linalg.norm(np.array(bs.wo).T - expected, axis=1)[kept] < 1e-3).mean() > 0.998
+
+
+def test_patch_matrices_are_looked_up_as_they_are(mi, patches):
+    table, plugin = patches
+    wi, wo = random_directions(20_000, 1, 0.01), random_directions(20_000, 2, 0.01)
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    expected = table.eval(wi, wo) * np.abs(wi[:, 2:])
+    differs = ~np.isclose(np.array(value).T, expected, rtol=1e-4, atol=0).all(axis=-1)
+    assert differs.sum() < 10 and (expected > 0).any(axis=-1).mean() > 0.1  # float32 on the border of a patch
+    differs = ~np.isclose(np.array(density), lookup_of(table).pdf(components(wi), components(wo)), rtol=1e-4)
+    assert differs.sum() < 10
+
+
+def test_samples_of_patches_weigh_the_albedo(mi, patches):
+    table, plugin = patches
+    wo, u = random_directions(20_000, 3), np.random.default_rng(4).random((20_000, 3)).astype(np.float32)
+    bs, weight = plugin.sample(mi.BSDFContext(), interaction(mi, wo), mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+    lookup, kept = lookup_of(table), np.array(bs.pdf) > 0
+    near, far = (lookup.albedo_of(components(wo), np.full(len(wo), across)) for across in (False, True))
+    assert (kept | (near + far == 0)).mean() > 0.999 and kept.mean() > 0.5
+    agrees = np.isclose(np.array(weight).T.mean(axis=-1), near + far, rtol=2e-3)
+    assert agrees[kept].mean() > 0.999
+    f = table.eval(np.array(bs.wo).T, wo).mean(axis=-1)
+    assert (f > 0)[kept].mean() > 0.999
+
+
+@pytest.mark.parametrize("theta_deg", [3.0, 50.0, 120.0])
+def test_chi_square_of_patches(mi, patches, theta_deg):
+    """In cells along the borders of the patches: Mitsuba's own test integrates across steps."""
+    table, plugin = patches
+    context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
+
+    def draw(u):
+        si, u = interaction(mi, np.tile(wo, (len(u), 1))), u.astype(np.float32)
+        bs, _ = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+        return np.where(np.array(bs.pdf)[:, None] > 0, np.array(bs.wo).T, [1.0, 0.0, 0.0]).astype(float)
+
+    def density(w):
+        si = interaction(mi, np.tile(wo, (len(w), 1)))
+        return np.array(plugin.pdf(context, si, mi.Vector3f(np.ascontiguousarray(w.T, np.float32))), float)
+
+    test = chi_square(draw, density, samples=500_000, cells=lookup_of(table).cell_borders(wo))
+    assert test.p_value > 1e-3 and test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-4)
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 50.0, 120.0])

@@ -17,10 +17,11 @@ Hazard: 1 - cos(theta_h) cancels in float32; elevations go by atan2 and by sin^2
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -28,10 +29,11 @@ from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import COS_MIN, Vector, dot, half_vector
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.two_sided import DOWN, Sheet
 
 DIFFUSE = 0.1  # share of cosine-distributed samples
+MARGIN = 1.2  # the peak is tabulated at nodes and cell centres; between them f cos may be higher
 LAST_VIEWER_DEG = 89.0  # beyond it the last viewer's f
-_DOWN = np.array([1.0, 1.0, -1.0])
 _LOWEST_COSINE = 0.02  # cells whose wi is below take f of this height, so that blending sees no edge at the horizon
 
 
@@ -106,6 +108,8 @@ class HalfVectorGrid:
         Of f cos(theta_i), mean of the channels: its integral over the side, and its largest value in 1/sr.
     """
 
+    ARRAYS: ClassVar[tuple[str, ...]] = ("values", "marginal", "conditional", "density", "across")
+
     shape: GridShape
     faces: int
     kinds: int
@@ -116,6 +120,42 @@ class HalfVectorGrid:
     across: Any
     albedo: Any = None
     peak: Any = None
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return (*(getattr(self.shape, field.name) for field in fields(GridShape)), self.faces, self.kinds)
+
+    @classmethod
+    def of_sizes(cls, sizes: tuple[int, ...], arrays: dict[str, Any]) -> HalfVectorGrid:
+        """The inverse of `sizes` and `ARRAYS`."""
+        *shape, faces, kinds = sizes
+        return cls(GridShape(*shape), faces, kinds, **arrays)
+
+    @property
+    def anisotropic(self) -> bool:
+        return self.shape.viewer_phi > 1
+
+    def evaluate(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Vector:
+        return evaluate(wi, wo, self, ops)
+
+    def pdf(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Any:
+        return pdf(wi, wo, self, ops)
+
+    def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: GridOps = NUMPY) -> Vector:
+        return sample(wo, u_select, u1, u2, self, ops)
+
+    def share_across(self, wo: Vector, ops: GridOps = NUMPY) -> Any:
+        return share_across(wo, self, ops)
+
+    def albedo_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
+        """Share of the light that is reflected or transmitted, mean of the channels, between the viewer nodes."""
+        shares = [weight * ops.gather(self.albedo, place) for place, weight in _places(wo, across, self, ops)]
+        return ops.select(across & (self.kinds == 1), 0.0, sum(shares[1:], shares[0]))
+
+    def peak_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
+        """Upper bound of f cos(theta_i), mean of the channels, in 1/sr."""
+        peaks = [ops.gather(self.peak, place) for place, _ in _places(wo, across, self, ops)]
+        return ops.select(across & (self.kinds == 1), 0.0, MARGIN * functools.reduce(ops.maximum, peaks))
 
 
 def grid_of(
@@ -145,7 +185,7 @@ def grid_of(
             wi[:, 2] = np.maximum(wi[:, 2], _LOWEST_COSINE)
             wi = normalize(wi)
             for face, kind in np.ndindex(faces, kinds):
-                wo_there, wi_there = (w * _DOWN if below else w for w, below in ((wo, face), (wi, face != kind)))
+                wo_there, wi_there = (w * DOWN if below else w for w, below in ((wo, face), (wi, face != kind)))
                 f = sheet.eval(wi_there, wo_there)
                 values[face, kind, a, b] = f
                 p = f.mean(axis=-1) * cos_i
@@ -188,28 +228,6 @@ def _twins(table: Sheet, shape: GridShape) -> list[tuple[int, Any]]:
         for k in range(n // 2, n):
             own[k] = (k - n // 2, ordered(j - columns // 2))
     return own
-
-
-class Sheet:
-    """A table that answers for both sides: where it has no back of its own, light from below is the mirrored pair.
-
-    A table has a back if it says something of light from below (wi.z < 0) that is not the mirrored pair.
-    """
-
-    def __init__(self, table: MeasuredTable) -> None:
-        self.table, self.info = table, table.info
-        z, phi = np.random.default_rng(0).uniform((0.1, 0), (1, 2 * np.pi), (2, 64, 2)).transpose(2, 0, 1)
-        up, other = direction(np.arccos(z), phi)
-        front = [table.eval(up, other), table.eval(up, other * _DOWN)]
-        back = [table.eval(up * _DOWN, other * _DOWN), table.eval(up * _DOWN, other)]
-        self.has_a_back = bool(np.any(back)) and not np.allclose(front, back, rtol=1e-3, atol=1e-6)
-
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., C) in 1/sr, without the cosine."""
-        if not self.has_a_back:
-            below = np.asarray(wi)[..., 2:] < 0
-            wi, wo = np.where(below, wi * _DOWN, wi), np.where(below, wo * _DOWN, wo)
-        return np.asarray(self.table.eval(wi, wo))
 
 
 def viewer_nodes(shape: GridShape) -> Floats:
@@ -293,7 +311,7 @@ def _viewers(wo: Vector, grid: HalfVectorGrid, ops: GridOps) -> _Viewers:
         length = ops.maximum(sin_theta, 1e-7)
         turn = ops.select(off, x / length, 1.0), ops.select(off, y / length, 0.0)
         return _Viewers([(row, 1 - share), (row + 1, share)], (sin_theta, 0 * z, z), turn, face)
-    around = _turns(y, x, ops) * shape.viewer_phi
+    around = turns(y, x, ops) * shape.viewer_phi
     left = ops.minimum(ops.floor(around), shape.viewer_phi - 1.0)
     beside, first = around - left, ops.whole(left)
     second = ops.whole(ops.select(left + 1.5 > shape.viewer_phi, 0.0, left + 1))
@@ -305,7 +323,7 @@ def _viewers(wo: Vector, grid: HalfVectorGrid, ops: GridOps) -> _Viewers:
     return _Viewers(nodes, (x, y, z), (1.0 + 0 * z, 0.0 * z), face)
 
 
-def _turns(y: Any, x: Any, ops: GridOps) -> Any:
+def turns(y: Any, x: Any, ops: GridOps) -> Any:
     """Azimuth in turns, in [0, 1]."""
     turns = ops.atan2(y, x) / (2 * np.pi)
     return ops.select(turns < 0, turns + 1, turns)
@@ -317,7 +335,7 @@ def _half(wi: Vector, viewers: _Viewers, ops: GridOps) -> tuple[Any, Any, Any]:
     turned = c * wi[0] + s * wi[1], c * wi[1] - s * wi[0], ops.abs(wi[2])
     h = half_vector(turned, viewers.up, ops)
     theta = ops.atan2(ops.sqrt(h[0] * h[0] + h[1] * h[1]), h[2])
-    return ops.sqrt(theta * (2 / np.pi)), _turns(h[1], h[0], ops), dot(viewers.up, h)
+    return ops.sqrt(theta * (2 / np.pi)), turns(h[1], h[0], ops), dot(viewers.up, h)
 
 
 def evaluate(wi: Vector, wo: Vector, grid: HalfVectorGrid, ops: GridOps = NUMPY) -> Vector:
@@ -357,10 +375,12 @@ def _seen(wi: Vector, wo: Vector, grid: HalfVectorGrid, ops: GridOps) -> Any:
     return off_horizon & ((wi[2] * wo[2] > 0) | (grid.kinds == 2))
 
 
-def viewer_places(wo: Vector, grid: HalfVectorGrid, ops: GridOps = NUMPY) -> tuple[Any, list[tuple[Any, Any]]]:
-    """Number of the face that `wo` sees, and its neighbouring viewer nodes with their blending weights."""
+def _places(wo: Vector, across: Any, grid: HalfVectorGrid, ops: GridOps) -> list[tuple[Any, Any]]:
+    """Neighbouring viewer nodes among those of all faces and kinds, with their blending weights."""
     viewers = _viewers(wo, grid, ops)
-    return viewers.face, viewers.nodes
+    kind = ops.whole(ops.select(across & (grid.kinds == 2), 1.0, 0.0))
+    first = (viewers.face * grid.kinds + kind) * grid.shape.viewers
+    return [(first + node, weight) for node, weight in viewers.nodes]
 
 
 def share_across(wo: Vector, grid: HalfVectorGrid, ops: GridOps = NUMPY) -> Any:

@@ -6,7 +6,7 @@ Two samplers of the new direction, to be chosen by what `docs/performance.md` me
   follows the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
   for satin, 40 000 for chrome.
 - `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; its small deviation from the table is in the
-  weight, so estimates follow the table all the same.
+  weight, so estimates follow the table all the same. Of patch matrices it is that of `patch_sheet`, and exact.
 
 `TableBSDF` gives a table the face of a BSDF (eval, pdf, sample), for materials.check and whoever traces paths.
 
@@ -27,11 +27,12 @@ from lambent.materials.bsdf import components
 from lambent.materials.chi_square import ChiSquare, chi_square
 from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured import half_vector_grid
-from lambent.materials.measured.half_vector_grid import GridShape, Sheet, grid_of
+from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
+from lambent.materials.measured.patch_sheet import lookup_of, patch_sheet_of
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.two_sided import Sheet
 
 ABSORBED, REFLECTED, TRANSMITTED = 0, 1, 2
-MARGIN = 1.2  # the row's maximum is tabulated at nodes and cell centres; between them p may be higher
 CANDIDATES_LIMIT = 200_000  # per sample, before rejection is given up
 _STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # the root of x^4 = x + 1
 
@@ -62,14 +63,14 @@ class Scattered:
 
 
 class TableBSDF:
-    """A measured table as a BSDF: `eval` is the table's own, `pdf` and `sample` those of its grid.
+    """A measured table as a BSDF: `eval` is the table's own, `pdf` and `sample` those of its patches or its grid.
 
     It is the `Sheet` that the path tracer renders: two-sided, unless the table has a back of its own.
     """
 
     def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
         self.sheet = Sheet(table)
-        self.grid = grid_of(self.sheet, shape, progress)
+        self.lookup = lookup_of(table, shape, progress)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3) in 1/sr, without the cosine; grey is repeated."""
@@ -80,20 +81,41 @@ class TableBSDF:
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
         """Density (...) in 1/sr of `sample` given wo."""
-        return np.asarray(half_vector_grid.pdf(components(wi), components(wo), self.grid))
+        return np.asarray(self.lookup.pdf(components(wi), components(wo)))
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
         """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1)."""
         u_select, u1, u2 = components(u)
-        return np.stack(half_vector_grid.sample(components(wo), u_select, u1, u2, self.grid), axis=-1)
+        return np.stack(self.lookup.sample(components(wo), u_select, u1, u2), axis=-1)
+
+    def looked_up(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr as the path tracer has it: of a grid not quite `eval`."""
+        return np.stack(self.lookup.evaluate(components(wi), components(wo)), axis=-1)
+
+    def steps(self, w: Floats, reverse: bool = False) -> Floats | None:
+        """(N, 4) cells of z and phi within which f is constant; None of tables that are not patches.
+
+        They are of the light's directions given the viewer's w (3,); `reverse`: of the viewer's given the light's.
+        """
+        sheet = patch_sheet_of(self.sheet.table, reverse=reverse)
+        return None if sheet is None else sheet.cell_borders(w)
 
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare:
-        """Test of `sample` against `pdf` for one wo (3,), in half vectors: the density has steps at the grid's cells.
+        """Test of `sample` against `pdf` for one wo (3,), in cells along the steps of the density."""
+        if isinstance(self.lookup, HalfVectorGrid):
+            return self._chi_square_in_half_vectors(wo, self.lookup, samples, seed)
+        return chi_square(
+            lambda u: self.sample(np.broadcast_to(wo, u.shape), u),
+            lambda wi: self.pdf(wi, np.broadcast_to(wo, wi.shape)),
+            samples=samples,
+            seed=seed,
+            cells=self.lookup.cell_borders(wo),
+        )
 
-        A transmitted direction is the half vector of its mirror image, below the surface.
-        """
+    def _chi_square_in_half_vectors(self, wo: Floats, grid: HalfVectorGrid, samples: int, seed: int) -> ChiSquare:
+        """A transmitted direction is the half vector of its mirror image, below the surface."""
         theta, phi = (float(a) for a in angles(wo))
-        wo = direction(theta, 0.0) if self.grid.shape.viewer_phi == 1 else direction(theta, phi)
+        wo = direction(theta, 0.0) if not grid.anisotropic else direction(theta, phi)
         up, side = wo * [1, 1, np.sign(wo[2])], np.sign(wo[2])
 
         def half_vectors(u: Floats) -> Floats:
@@ -110,15 +132,8 @@ class TableBSDF:
             wi[:, 2] *= side * np.sign(h[:, 2])
             return np.where(possible, self.pdf(wi, np.broadcast_to(wo, wi.shape)) * 4 * cos_d, 0.0)
 
-        cells = half_vector_grid.cell_borders(self.grid.shape, self.grid.kinds)
+        cells = half_vector_grid.cell_borders(grid.shape, grid.kinds)
         return chi_square(half_vectors, density, samples=samples, seed=seed, cells=cells)
-
-
-class _Reversed(Sheet):
-    """The sheet with light and viewer exchanged: its grid samples wo for a given wi."""
-
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        return super().eval(wo, wi)
 
 
 class _Photons:
@@ -126,21 +141,12 @@ class _Photons:
 
     def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
         self.sheet = Sheet(table)
-        self.grid = grid_of(_Reversed(table), shape, progress)
+        self.lookup = lookup_of(table, shape, progress, reverse=True)
 
     def albedo(self, wi: Floats) -> tuple[Floats, Floats]:
-        """r and t (N,), means over the channels, of wi (N, 3), interpolated between the grid's nodes."""
-        first, nodes = self._nodes(wi)
-        viewers = self.grid.shape.viewers
-        r = np.sum([weight * self.grid.albedo[first + node] for node, weight in nodes], axis=0)
-        if self.grid.kinds == 1:
-            return r, np.zeros_like(r)
-        return r, np.sum([weight * self.grid.albedo[first + viewers + node] for node, weight in nodes], axis=0)
-
-    def _nodes(self, wi: Floats) -> tuple[NDArray[np.int64], list[tuple[NDArray[np.int64], Floats]]]:
-        """Where each photon's face begins in the per-viewer arrays, and its neighbouring nodes with weights."""
-        face, nodes = half_vector_grid.viewer_places(components(wi), self.grid)
-        return face * self.grid.kinds * self.grid.shape.viewers, nodes
+        """r and t (N,), means over the channels, of wi (N, 3); of a grid interpolated between its nodes."""
+        r, t = (self.lookup.albedo_of(components(wi), np.full(len(wi), across)) for across in (False, True))
+        return r, t
 
     def _fates(self, wi: Floats, u: Floats) -> tuple[NDArray[np.int8], Floats, Floats]:
         """What 3.1 makes of u (N,) uniform in [0, 1), and the probability of either side; over 1 none is absorbed."""
@@ -168,7 +174,7 @@ class Rejection(_Photons):
         """
         rng = np.random.default_rng(seed)
         fate, _, _ = self._fates(wi, rng.random(len(wi)))
-        bound = self._bound(wi, fate)
+        bound = self.lookup.peak_of(components(wi), fate == TRANSMITTED)
         offset = rng.random(3)
         found, weight = np.zeros((len(wi), 3)), np.zeros((len(wi), self.sheet.info.channels))
         waiting = np.flatnonzero((fate != ABSORBED) & (bound > 0))
@@ -204,11 +210,6 @@ class Rejection(_Photons):
         wo[:, 2] *= np.where((wi[:, 2] > 0) == (fate == REFLECTED), 1.0, -1.0)
         return wo, u[:, 2]
 
-    def _bound(self, wi: Floats, fate: NDArray[np.int8]) -> Floats:
-        first, nodes = self._nodes(wi)
-        first = first + np.where(fate == TRANSMITTED, self.grid.shape.viewers, 0)
-        return np.asarray(MARGIN * np.max([self.grid.peak[first + node] for node, _ in nodes], axis=0))
-
 
 def _even(first: int, count: int, offset: Floats) -> Floats:
     """(count, 3) points from number `first` of the additive sequence of Roberts 2018 in three dimensions."""
@@ -218,18 +219,18 @@ def _even(first: int, count: int, offset: Floats) -> Floats:
 
 
 class Tabulated(_Photons):
-    """Directions by the tabulated CDF of the table's grid; what the cells smooth away is in the weight."""
+    """Directions by the CDF of the table's patches or grid; what a grid's cells smooth away is in the weight."""
 
     def scatter(self, wi: Floats, seed: int = 0) -> Scattered:
         """Fates and directions of photons from wi (N, 3)."""
         rng = np.random.default_rng(seed)
         fate, r, t = self._fates(wi, rng.random(len(wi)))
         u_select, u1, u2 = rng.random((3, len(wi)))
-        across = half_vector_grid.share_across(components(wi), self.grid)
+        across = self.lookup.share_across(components(wi))
         # the sampler's own choice of the side is replaced by the fate that was drawn
         u_select = np.where(fate == TRANSMITTED, u_select * across, across + u_select * (1 - across))
-        wo = np.stack(half_vector_grid.sample(components(wi), u_select, u1, u2, self.grid), axis=-1)
-        pdf = half_vector_grid.pdf(components(wo), components(wi), self.grid)
+        wo = np.stack(self.lookup.sample(components(wi), u_select, u1, u2), axis=-1)
+        pdf = self.lookup.pdf(components(wo), components(wi))
         alive = (fate != ABSORBED) & (pdf > 0)
         drawn, wanted = np.where(fate == TRANSMITTED, (across, t), (1 - across, r))
         gain = np.divide(np.abs(wo[:, 2]) * drawn, pdf * wanted, out=np.zeros(len(wi)), where=alive)

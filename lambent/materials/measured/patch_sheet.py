@@ -1,0 +1,339 @@
+"""A sheet of patch matrices as a renderer looks it up and samples it: exactly, patch by patch.
+
+f is constant over pairs of patches, so nothing is resampled: a direction's patch is found in the bounds of its basis'
+rings, f is one number of the matrix, and a sample is the light's patch by the row's CDF (mean of the channels times
+projected solid angle), then a direction even in projected solid angle within it. So f cos(theta_i) / pdf is the same
+for all samples of a row, in the mean of the channels: the albedo.
+
+Roles: the viewer (wo) is given, the light (wi) is sampled. Radiance's matrices need not be reciprocal, so the row is
+that of all incident patches for one outgoing patch; `reverse` exchanges the roles, for photons.
+
+Conventions are those of half_vector_grid.py: components, f in 1/sr without the cosine, `ops` names the array library.
+Both cosines of a patch's place are looked up, sin^2 and cos^2: neither is left to cancel in float32.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lambent.core.frames import Floats
+from lambent.core.progress import Progress, silent
+from lambent.materials.lobes import COS_MIN, Vector
+from lambent.materials.measured.half_vector_grid import (
+    NUMPY,
+    GridOps,
+    GridShape,
+    HalfVectorGrid,
+    grid_of,
+    turns,
+)
+from lambent.materials.measured.klems import AngleBasis, Indices, PatchMatrix
+from lambent.materials.measured.lbnl_parts import Side, Way
+from lambent.materials.measured.lbnl_xml import LbnlTable, Use
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.two_sided import Reversed
+
+_WAYS: tuple[Way, ...] = ("reflection", "transmission")
+_BEYOND = 4.0  # as sin^2(theta): no direction is there
+_WHOLE_DEG = 90 - 1e-3  # a basis up to here has the horizon
+_BOUNDS = 6
+_SLIVER = 1e-5  # rad; float32 bounds of phi are no better
+_BELOW_ONE = 1 - 2.0**-24
+
+
+@dataclass(frozen=True)
+class PatchSheet:
+    """Flat arrays of numpy, or of the path tracer. A page is a face of the viewer and a kind of scattering.
+
+    Attributes
+    ----------
+    faces : int
+        1: a two-sided sheet; 2: the back scatters otherwise than the front.
+    kinds : int
+        1: reflection only; 2: transmission as well.
+    patches : int
+        Of the largest basis; the others are padded.
+    rings : int
+        Likewise, plus one for what is beyond the last ring.
+    viewer_edges : (faces, kinds, rings) flat float32
+        sin^2 of the upper theta of the rings of the viewer's basis.
+    viewer_counts, viewer_starts : (faces, kinds, rings) flat float32
+        Patches of a ring, 0 beyond the last, and number of its first.
+    light_edges, light_counts, light_starts
+        The same of the light's basis.
+    signs : (faces, kinds, 2) flat float32
+        -1 where headings point against the direction: to the viewer, to the light.
+    values : (faces, kinds, patches of the viewer, patches of the light, 3) flat float32
+        f in 1/sr, linear RGB; grey is repeated.
+    cdf : (faces, kinds, patches of the viewer, patches of the light) flat float32
+        Probability of the light's patches up to and with this one.
+    density : like cdf
+        Of the light's direction over its cosine, in 1/sr.
+    bounds : (faces, kinds, patches of the light, 6) flat float32
+        sin^2 theta, cos^2 theta, each lower and upper, first phi and width, of directions to the light.
+    albedo, peak : (faces, kinds, patches of the viewer) flat float32
+        Of f cos(theta_i), mean of the channels: its integral over the side, and its least upper bound in 1/sr.
+    """
+
+    ARRAYS: ClassVar[tuple[str, ...]] = (
+        "viewer_edges", "viewer_counts", "viewer_starts", "light_edges", "light_counts", "light_starts",
+        "signs", "values", "cdf", "density", "bounds", "albedo",
+    )  # fmt: skip
+
+    faces: int
+    kinds: int
+    patches: int
+    rings: int
+    viewer_edges: Any
+    viewer_counts: Any
+    viewer_starts: Any
+    light_edges: Any
+    light_counts: Any
+    light_starts: Any
+    signs: Any
+    values: Any
+    cdf: Any
+    density: Any
+    bounds: Any
+    albedo: Any
+    peak: Any = None
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return self.faces, self.kinds, self.patches, self.rings
+
+    @classmethod
+    def of_sizes(cls, sizes: tuple[int, ...], arrays: dict[str, Any]) -> PatchSheet:
+        """The inverse of `sizes` and `ARRAYS`."""
+        return cls(*sizes, **arrays)
+
+    @property
+    def anisotropic(self) -> bool:
+        """Patches turn with the sheet."""
+        return True
+
+    def evaluate(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Vector:
+        """f in 1/sr per RGB channel, without the cosine."""
+        pair, seen = self._pair(wi, wo, ops)
+        red, green, blue = (ops.select(seen, ops.gather(self.values, 3 * pair + c), 0.0) for c in range(3))
+        return red, green, blue
+
+    def pdf(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Any:
+        """Density of `sample` in 1/sr."""
+        pair, seen = self._pair(wi, wo, ops)
+        across = self.share_across(wo, ops)
+        share = ops.select(wi[2] * wo[2] < 0, across, 1 - across)
+        return ops.select(seen, ops.gather(self.density, pair) * ops.abs(wi[2]) * share, 0.0)
+
+    def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: GridOps = NUMPY) -> Vector:
+        """wi; u_* uniform in [0, 1). Where nothing is scattered, or at the horizon, it comes back with wi.z = 0."""
+        share = self.share_across(wo, ops)
+        across = u_select < share
+        u_select = ops.select(
+            across, u_select / ops.maximum(share, 1e-9), (u_select - share) / ops.maximum(1 - share, 1e-9)
+        )
+        page = self._page(wo, across, ops)
+        row, inside = self._viewer_row(wo, page, ops)
+        first = row * self.patches
+        light = _drawn(ops.minimum(u_select, _BELOW_ONE), self.cdf, first, self.patches, ops)
+        at = _BOUNDS * (page * self.patches + light)
+        sin2, cos2, phi0, width = self._bounds_at(at, u1, ops)
+        phi = phi0 + u2 * width
+        sin_theta, z = ops.sqrt(sin2), ops.sqrt(cos2)
+        z = ops.select(inside & (z > COS_MIN) & (ops.gather(self.albedo, row) > 0), z, 0.0)
+        return sin_theta * ops.cos(phi), sin_theta * ops.sin(phi), ops.select((wo[2] > 0) == across, -z, z)
+
+    def share_across(self, wo: Vector, ops: GridOps = NUMPY) -> Any:
+        """Probability of a transmitted sample."""
+        if self.kinds == 1:
+            return 0.0 * wo[2]
+        near, far = (self.albedo_of(wo, across, ops) for across in (wo[2] > 2, wo[2] < 2))
+        return far / ops.maximum(near + far, 1e-30)
+
+    def albedo_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
+        """Share of the light that is reflected or transmitted, mean of the channels."""
+        return self._of_viewer(self.albedo, wo, across, ops)
+
+    def peak_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
+        """Upper bound of f cos(theta_i), mean of the channels, in 1/sr."""
+        return self._of_viewer(self.peak, wo, across, ops)
+
+    def cell_borders(self, wo: Floats) -> Floats:
+        """(N, 4) ranges of z and phi of the light's patches seen from wo (3,), sorted, over the whole sphere."""
+        face = int(wo[2] < 0 and self.faces == 2)
+        shape = (self.faces, self.kinds, self.patches, _BOUNDS)
+        pages = np.asarray(self.bounds, float).reshape(shape)[face]
+        reflected = _strips(pages[0])
+        other = _strips(pages[1]) if self.kinds == 2 else [(0.0, 1.0, 0.0, 2 * np.pi)]
+        above, below = (reflected, other) if wo[2] > 0 else (other, reflected)
+        return np.array(sorted([*above, *((-high, -low, a, b) for low, high, a, b in below)]))
+
+    def _of_viewer(self, table: Any, wo: Vector, across: Any, ops: GridOps) -> Any:
+        row, inside = self._viewer_row(wo, self._page(wo, across, ops), ops)
+        return ops.select(inside & ~(across & (self.kinds == 1)), ops.gather(table, row), 0.0)
+
+    def _page(self, wo: Vector, across: Any, ops: GridOps) -> Any:
+        face = ops.whole(ops.select((wo[2] < 0) & (self.faces == 2), 1.0, 0.0))
+        return face * self.kinds + ops.whole(ops.select(across & (self.kinds == 2), 1.0, 0.0))
+
+    def _viewer_row(self, wo: Vector, page: Any, ops: GridOps) -> tuple[Any, Any]:
+        """Number of the viewer's patch among all pages', and whether there is one."""
+        basis = self.viewer_edges, self.viewer_counts, self.viewer_starts
+        patch, inside = self._patch(wo, ops.gather(self.signs, 2 * page), page, basis, ops)
+        return page * self.patches + patch, inside
+
+    def _pair(self, wi: Vector, wo: Vector, ops: GridOps) -> tuple[Any, Any]:
+        """Place of the pair of patches in the matrices, and whether light goes that way."""
+        across = wi[2] * wo[2] < 0
+        page = self._page(wo, across, ops)
+        row, inside = self._viewer_row(wo, page, ops)
+        basis = self.light_edges, self.light_counts, self.light_starts
+        light, lit = self._patch(wi, ops.gather(self.signs, 2 * page + 1), page, basis, ops)
+        seen = inside & lit & (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN)
+        return row * self.patches + light, seen & ((wi[2] * wo[2] > 0) | (self.kinds == 2))
+
+    def _patch(self, w: Vector, sign: Any, page: Any, basis: tuple[Any, Any, Any], ops: GridOps) -> tuple[Any, Any]:
+        """Patch of a direction, as `AngleBasis.index` finds it; and whether it is within the basis."""
+        edges, counts, starts = basis
+        first = page * self.rings
+        x, y = sign * w[0], sign * w[1]
+        ring = first + _drawn(x * x + y * y, edges, first, self.rings, ops)
+        count = ops.gather(counts, ring)
+        place = ops.floor(turns(y, x, ops) * count + 0.5)
+        place = ops.select(place > count - 0.5, 0.0, place)
+        return ops.whole(ops.gather(starts, ring) + place), count > 0.5
+
+    def _bounds_at(self, at: Any, u: Any, ops: GridOps) -> tuple[Any, Any, Any, Any]:
+        """sin^2 and cos^2 at a share `u` of a patch's projected solid angle, its first phi and its width."""
+        s0, s1, c0, c1, phi0, width = (ops.gather(self.bounds, at + k) for k in range(_BOUNDS))
+        return s0 + u * (s1 - s0), c0 + u * (c1 - c0), phi0, width
+
+
+Lookup = HalfVectorGrid | PatchSheet
+
+
+def lookup_of(
+    table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent, *, reverse: bool = False
+) -> Lookup:
+    """The patches of a table that is made of them, else its dense grid, of which `shape` speaks.
+
+    `reverse`: the light's direction is given and the viewer's is sampled; `wi` and `wo` are exchanged in all methods.
+    """
+    sheet = patch_sheet_of(table, reverse=reverse)
+    return sheet if sheet is not None else grid_of(Reversed(table) if reverse else table, shape, progress)
+
+
+def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:
+    """The sheet of a table that is patch matrices throughout, else None; `reverse` as of `lookup_of`."""
+    if not isinstance(table, LbnlTable):
+        return None
+    matrices = [use.part for use in table.uses.values() if isinstance(use.part, PatchMatrix)]
+    if len(matrices) < len(table.uses):
+        return None
+    bases = [basis for matrix in matrices for basis in (matrix.incident, matrix.outgoing)]
+    patches, rings = max(b.count for b in bases), max(len(b.n_phis) for b in bases) + 1
+    faces, kinds = 1 + table.has_a_back, 1 + any(way == "transmission" for way, _ in table.uses)
+    pages = []
+    for face in range(faces):
+        for way in _WAYS[:kinds]:
+            given: Side = -1 if face else 1
+            # `uses` goes by the light's side
+            side: Side = given if reverse or way == "reflection" else (1 if given == -1 else -1)
+            pages.append(_page_of(table.uses.get((way, side)), reverse, patches, rings))
+    flat = {name: np.stack([page[name] for page in pages]).astype(np.float32).ravel() for name in pages[0]}
+    return PatchSheet(faces, kinds, patches, rings, **flat)
+
+
+def _page_of(use: Use | None, reverse: bool, patches: int, rings: int) -> dict[str, Floats]:
+    """The arrays of one page; of a part that is missing, black ones."""
+    if use is None:
+        dark = AngleBasis("", (0.0, 90.0), (1,))
+        return _arrays(dark, 1.0, dark, 1.0, np.zeros((1, 1, 3)), patches, rings)
+    matrix = use.part
+    assert isinstance(matrix, PatchMatrix)
+    f = np.broadcast_to(matrix.f, (*matrix.f.shape[:2], 3))
+    incoming, outgoing = (matrix.incident, -1.0), (matrix.outgoing, 1.0)  # light comes against its heading
+    # used backwards, light comes from where it would go
+    viewer, light = (incoming, outgoing) if use.backwards != reverse else (outgoing, incoming)
+    if use.backwards != reverse:
+        f = f.swapaxes(0, 1)
+    return _arrays(*viewer, *light, f, patches, rings)
+
+
+def _arrays(
+    viewer: AngleBasis, viewer_sign: float, light: AngleBasis, light_sign: float, f: Floats, patches: int, rings: int
+) -> dict[str, Floats]:
+    """Of f (viewer.count, light.count, 3). CDF and density are those of the CDF as stored, rounded to float32."""
+    values = np.zeros((patches, patches, 3), np.float32)
+    values[: viewer.count, : light.count] = f
+    mean = f.mean(axis=-1)
+    mass = np.zeros((patches, patches))
+    mass[: viewer.count, : light.count] = mean * light.projected_sr
+    total = mass.sum(axis=-1)
+    # what is not drawn must not be: rows end at 1 with their last patch that scatters
+    cdf = np.cumsum(mass, axis=-1) / np.where(total > 0, total, 1.0)[:, None]
+    cdf = np.where(np.arange(patches) < patches - 1 - np.argmax(mass[:, ::-1] > 0, axis=-1)[:, None], cdf, 1.0)
+    cdf = cdf.astype(np.float32)
+    projected = np.ones(patches)
+    projected[: light.count] = light.projected_sr
+    density = np.diff(cdf.astype(float), axis=-1, prepend=0.0) / projected * (total > 0)[:, None]
+    highest_cos = np.repeat(np.cos(np.radians(light.edges_deg[:-1])), light.n_phis)
+    peak = np.zeros(patches)
+    peak[: viewer.count] = (mean * highest_cos).max(axis=-1)
+    found = {"values": values, "cdf": cdf, "density": density, "albedo": total, "peak": peak}
+    found |= {"signs": np.array([viewer_sign, light_sign]), "bounds": _bounds(light, light_sign, patches)}
+    for role, basis in (("viewer", viewer), ("light", light)):
+        edges, counts, starts = _rings(basis, rings)
+        found |= {f"{role}_edges": edges, f"{role}_counts": counts, f"{role}_starts": starts}
+    return found
+
+
+def _rings(basis: AngleBasis, rings: int) -> tuple[Floats, Floats, Floats]:
+    n = len(basis.n_phis)
+    edges, counts, starts = np.full(rings, _BEYOND), np.zeros(rings), np.zeros(rings)
+    upper = np.array(basis.edges_deg[1:])
+    edges[:n] = np.where(upper < _WHOLE_DEG, np.sin(np.radians(upper)) ** 2, _BEYOND)
+    counts[:n], starts[:n] = basis.n_phis, basis.starts
+    return edges, counts, starts
+
+
+def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:
+    """(patches, 6) as `PatchSheet.bounds`."""
+    n = np.array(basis.n_phis)
+    ring: Indices = np.repeat(np.arange(len(n)), n)
+    place = np.arange(basis.count) - basis.starts[ring]
+    edges_deg = np.array(basis.edges_deg)
+    cos2 = np.where(edges_deg < _WHOLE_DEG, np.cos(np.radians(edges_deg)) ** 2, 0.0)
+    sin2 = np.where(edges_deg < _WHOLE_DEG, np.sin(np.radians(edges_deg)) ** 2, 1.0)
+    phi0 = 2 * np.pi * (place - 0.5) / n[ring] + (np.pi if sign < 0 else 0.0)
+    found = np.zeros((patches, _BOUNDS))
+    columns = sin2[ring], sin2[ring + 1], cos2[ring], cos2[ring + 1], phi0, 2 * np.pi / n[ring]
+    found[: basis.count] = np.stack(columns, axis=-1)
+    return found
+
+
+def _strips(bounds: Floats) -> list[tuple[float, float, float, float]]:
+    """Ranges of z >= 0 and phi, in [0, 2 pi], of patches (N, 6); what is beyond the last ring is one more."""
+    used = bounds[bounds[:, 5] > 0]
+    strips = []
+    edges = np.sqrt(np.unique(used[:, 2:4]))
+    for low, high in pairwise(edges):
+        ring = used[np.isclose(np.sqrt(used[:, 3]), low)]
+        starts = np.sort(np.mod(ring[:, 4], 2 * np.pi))
+        cuts = [0.0, *starts[(starts > _SLIVER) & (starts < 2 * np.pi - _SLIVER)], 2 * np.pi]
+        strips += [(low, high, a, b) for a, b in pairwise(cuts)]
+    return strips if edges[0] == 0 else [(0.0, float(edges[0]), 0.0, 2 * np.pi), *strips]
+
+
+def _drawn(u: Any, table: Any, first: Any, count: int, ops: GridOps) -> Any:
+    """Number of the first entry above `u` in the rising `table[first:first + count]`, whose last one is above."""
+    found, step = 0 * first, 1 << (count - 1).bit_length() >> 1
+    while step:
+        probe = ops.minimum(found + (step - 1), count - 1)
+        found = ops.select(ops.gather(table, first + probe) <= u, found + step, found)
+        step //= 2
+    return found
