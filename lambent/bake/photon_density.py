@@ -1,7 +1,8 @@
 """From photons per texel to irradiance: flux over area, averaged over neighbours on the same surface.
 
 The areas are exact, those of what of a triangle lies in a texel's square, so no border is darker than its middle and
-no energy is lost. The kernel is the same for flux and area: uniform light stays uniform whatever is missing around.
+no energy is lost. The kernel is the same for flux and area: uniform light stays uniform whatever is missing around. It is narrow, because
+noise that neighbours share is what the denoiser cannot tell from light.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from lambent.bake.texels import CANDIDATES_AT_ONCE, Texels
 from lambent.core.frames import normalize
 
 Array = NDArray[np.floating]
-KERNEL = 0.6  # texels: standard deviation along the surface
+KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface, and that of texels that are mostly off it
 LIFT = 0.3  # texels: standard deviation off the surface
 NEIGHBOURS = 21
 SMALLEST = 0.05  # texels: what gathers photons from a smaller area takes its neighbours' light
@@ -85,7 +86,8 @@ class Kernel:
         lit = open_share > 0
         self._index = texels.index[lit]
         self._area = (areas.reshape(-1)[texels.index] * open_share)[lit]
-        self._weights = _weights(texels, lit)
+        small = self._area < 0.5 * texels.spacing[lit] ** 2
+        self._weights = _weights(texels, lit, np.where(small, WIDE, KERNEL))
         gathered = self._weights @ self._area
         self._gathered = gathered
         self._enough = gathered > SMALLEST * texels.spacing[lit] ** 2 * np.asarray(self._weights.sum(axis=1)).ravel()
@@ -106,8 +108,8 @@ class Kernel:
         return result.reshape(*self._shape, 3)
 
 
-def _weights(texels: Texels, lit: NDArray[np.bool_]):  # type: ignore[no-untyped-def]
-    """Sparse (K, K) weights of the lit texels for each other."""
+def _weights(texels: Texels, lit: NDArray[np.bool_], width: Array):  # type: ignore[no-untyped-def]
+    """Sparse (K, K) weights of the lit texels for each other; `width` (K,) in texels is the kernel's."""
     from scipy.sparse import csr_matrix
     from scipy.spatial import cKDTree
 
@@ -123,7 +125,7 @@ def _weights(texels: Texels, lit: NDArray[np.bool_]):  # type: ignore[no-untyped
         others = tree.query(position[mine], k=[*range(1, k + 1)])[1]
         offset = position[others] - position[mine, None]
         lift = np.einsum("nkx,nx->nk", offset, normal[mine]) / (LIFT * spacing[mine, None])
-        along = np.linalg.norm(offset, axis=2) / (KERNEL * spacing[mine, None])
+        along = np.linalg.norm(offset, axis=2) / (width * spacing)[mine, None]
         facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[mine]), 0) ** 8
         values[mine], columns[mine] = np.exp(-(lift**2 + along**2) / 2) * facing, others
     return csr_matrix((values.ravel(), columns.ravel(), np.arange(0, n * k + 1, max(k, 1))), shape=(n, n))

@@ -1,8 +1,8 @@
 """Photons: light followed from its sources through the scene, counted where it falls on the light map.
 
 Photons leave every emitter in proportion to what it emits, scatter by the materials and are counted at each surface
-they meet, in W per texel: divided by the texel's area that is irradiance (Jensen 1996, with texels for discs). Emission
-is spread by a low-discrepancy sequence, turned at random for every batch.
+they meet, in W per texel: divided by the texel's area that is irradiance (Jensen 1996, with texels for discs). All of
+it is drawn independently: the lattices of low-discrepancy sequences show as stripes that no denoiser takes for noise.
 
 A photon is absorbed with probability 1 - (r + t) of where it came from (thesis M, 3.1): it survives with the
 probability that its scattered weight has, whose mean over the scattered directions is r + t.
@@ -33,8 +33,6 @@ PHOTONS_AT_ONCE = 1 << 19
 UNIT = 1 << 20  # whole numbers in a photon of mean power
 PILOT = 1 << 14  # photons that tell the mean power
 STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal: beyond, at grazing, it is noise
-_ROOT = 1.1347241384015194  # of x^6 = x + 1 (Roberts 2018, five dimensions)
-_STEPS = np.array([round(2**32 * _ROOT**-d) for d in range(1, 6)], np.uint32)
 
 
 @dataclass(frozen=True)
@@ -58,46 +56,38 @@ def shoot(scene: Any, bins: Bins, photons: int, max_bounces: int, seed: int) -> 
     """
     sums = dr.zeros(mi.UInt64, bins.sides * bins.height * bins.width * 3)
     rng = np.random.default_rng(seed)
-    shift = rng.integers(1 << 32, size=5, dtype=np.uint32)
     scale = _units_per_watt(scene)
     if scale == 0:
         return np.zeros((bins.sides, bins.height, bins.width, 3))
     for first in range(0, photons, PHOTONS_AT_ONCE):
-        count = min(PHOTONS_AT_ONCE, photons - first)
-        sampler = mi.load_dict({"type": "independent"})
-        sampler.seed(int(rng.integers(1 << 32)), count)
-        ray, power = _emitted(scene, dr.opaque(mi.UInt32, first) + dr.arange(mi.UInt32, count), shift)
-        _trace(
-            scene,
-            sampler,
-            ray,
-            power * dr.opaque(mi.Float, scale),
-            partial(_count, sums, bins),
-            max_bounces,
-            paths.has_holes(scene),
-        )
+        sampler = _sampler(int(rng.integers(1 << 32)), min(PHOTONS_AT_ONCE, photons - first))
+        ray, power = _emitted(scene, sampler)
+        count = partial(_count, sums, bins)
+        _trace(scene, sampler, ray, power * dr.opaque(mi.Float, scale), count, max_bounces, paths.has_holes(scene))
         dr.eval(sums)
     return np.array(sums).astype(np.float64).reshape(bins.sides, bins.height, bins.width, 3) / (scale * photons)
 
 
 def _units_per_watt(scene: Any) -> float:
     """Whole numbers per W, 0 where nothing is emitted."""
-    _, power = _emitted(scene, dr.arange(mi.UInt32, PILOT), np.zeros(5, np.uint32))
+    _, power = _emitted(scene, _sampler(0, PILOT))
     mean = float(np.array(power, np.float64).mean())
     return UNIT / mean if mean > 0 else 0.0
 
 
-def _emitted(scene: Any, index: Any, shift: NDArray[np.uint32]) -> tuple[Any, Any]:
+def _sampler(seed: int, width: int) -> Any:
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, width)
+    return sampler
+
+
+def _emitted(scene: Any, sampler: Any) -> tuple[Any, Any]:
     """Rays of photons, and their power (mi.Color3f) in W times their number."""
-    u = [
-        dr.minimum(mi.Float(index * mi.UInt32(step) + dr.opaque(mi.UInt32, int(offset))) * (1 / 2**32), 1 - 2**-24)
-        for step, offset in zip(_STEPS, shift, strict=True)
-    ]
-    place, direction = mi.Point2f(u[1], u[2]), mi.Point2f(u[3], u[4])
-    number, weight, _ = scene.sample_emitter(u[0])
+    u, place, direction = sampler.next_1d(), sampler.next_2d(), sampler.next_2d()
+    number, weight, _ = scene.sample_emitter(u)
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), number)
     sky = emitter.is_environment()
-    ray, power = emitter.sample_ray(0.0, u[0], place, direction, ~sky)
+    ray, power = emitter.sample_ray(0.0, u, place, direction, ~sky)
     if scene.environment() is not None:
         from_sky, power_of_sky = _from_environment(scene, place, direction)
         ray = mi.Ray3f(dr.select(sky, from_sky.o, ray.o), dr.select(sky, from_sky.d, ray.d))
