@@ -1,8 +1,8 @@
 """Mitsuba's BSDFs as surfaces of lobes. Ours are thin and two-sided: what that loses is said.
 
-A rough dielectric coat over a diffuse base (`plastic`) becomes a lobe and a coupled diffuse term with the albedo that
-Mitsuba's has at normal incidence: (1 - r0)(1 - R) rho / (1 - rho' R), R the diffuse Fresnel reflectance inside, rho' =
-rho where `nonlinear`, else 1 (Mitsuba's manual, "Smooth plastic material").
+A dielectric coat over a diffuse base (`plastic`, `roughplastic`) becomes a lobe and a coupled diffuse term with the
+albedo that Mitsuba's has at normal incidence: T(1) T rho / (eta^2 (1 - rho' R)), T(1) and T what the coat lets through
+from above and of diffuse light, R what it reflects of diffuse light inside, rho' = rho where `nonlinear`, else 1.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from lambent.core.errors import did_you_mean
 from lambent.core.frames import Floats
 from lambent.scenes.loaders.metallic import metallic_roughness
+from lambent.scenes.loaders.mitsuba.interfaces import mean_reflectance, reflectance
 from lambent.scenes.loaders.mitsuba.metals import IOR, R0
 from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_picture
 from lambent.scenes.loaders.mitsuba.values import Plugin
@@ -41,6 +42,11 @@ def surface_of(plugin: Plugin) -> Surface:
     surface = make(plugin)
     plugin.say_unread()
     return surface
+
+
+def normal_reflectance(eta: float) -> float:
+    """Reflectance of a dielectric at normal incidence."""
+    return ((eta - 1) / (eta + 1)) ** 2
 
 
 def grey() -> Surface:
@@ -72,18 +78,21 @@ def _diffuse_transmitter(plugin: Plugin) -> Surface:
 
 def _plastic(plugin: Plugin, rough: bool = True) -> Surface:
     eta = _eta(plugin, "polypropylene")
-    r0 = _normal_reflectance(eta)
-    inside = 1 - (1 - _diffuse_fresnel(eta)) / eta**2
+    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
+    slope = float(np.clip(m.mean[0], 1e-3, 1)) if rough else 0.0
+    inside = mean_reflectance(1 / eta, slope, distribution)
+    through = (1 - mean_reflectance(eta, slope, distribution)) / eta**2
+    through *= 1 - float(reflectance(np.ones(1), eta, slope, distribution)[0])
     nonlinear = plugin.flag("nonlinear", False)
 
     def below(rho: Floats) -> Floats:
         rho = np.clip(rho, 0, 1)
-        albedo: Floats = (1 - r0) * (1 - inside) * rho / (1 - (rho if nonlinear else 1.0) * inside)
+        albedo: Floats = through * rho / (1 - (rho if nonlinear else 1.0) * inside)
         return albedo
 
     kd = combined(below, colour(plugin, "diffuse_reflectance", GREY), said=[])
-    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
-    gloss = Gloss(m, colour(plugin, "specular_reflectance", 1.0), np.full(3, r0), aspect, distribution=distribution)
+    r0 = np.full(3, normal_reflectance(eta))
+    gloss = Gloss(m, colour(plugin, "specular_reflectance", 1.0), r0, aspect, distribution=distribution)
     return Surface(kd=kd, coupled=True, glosses=(gloss,))
 
 
@@ -103,7 +112,7 @@ def _rough_conductor(plugin: Plugin) -> Surface:
 
 def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
     plugin.say("is a thin sheet here: light is not bent")
-    return _sheet(plugin, _normal_reflectance(_eta(plugin, "bk7")), rough)
+    return _sheet(plugin, normal_reflectance(_eta(plugin, "bk7")), rough)
 
 
 def _rough_dielectric(plugin: Plugin) -> Surface:
@@ -111,7 +120,7 @@ def _rough_dielectric(plugin: Plugin) -> Surface:
 
 
 def _thin_dielectric(plugin: Plugin) -> Surface:
-    r0 = _normal_reflectance(_eta(plugin, "bk7"))
+    r0 = normal_reflectance(_eta(plugin, "bk7"))
     return _sheet(plugin, 2 * r0 / (1 + r0), rough=False)  # light that goes to and fro inside counts
 
 
@@ -146,7 +155,7 @@ def _principled(plugin: Plugin, thin: bool = False) -> Surface:
     m = combined(lambda r: np.clip(r, 0, 1) ** 2 / aspect, roughness, said=said)
     eta = plugin.number("eta", 0.0)
     specular = plugin.number("specular", 0.5)
-    r0 = _normal_reflectance(eta) if eta > 0 else 0.08 * min(max(specular, 0.0), 1.0)
+    r0 = normal_reflectance(eta) if eta > 0 else 0.08 * min(max(specular, 0.0), 1.0)
     through = min(max(float(number(plugin, "spec_trans", 0.0).mean[0]), 0.0), 1.0)
     surface = metallic_roughness(base, metallic, m, np.full(3, r0), said, aspect=aspect**2, through=through)
     if through and not thin:
@@ -182,7 +191,7 @@ def _nested(plugin: Plugin) -> Surface:
 def _coating(plugin: Plugin) -> Surface:
     """A clear coat: what is below loses what the coat reflects, once on the way in and once on the way out."""
     below = _nested(plugin)
-    r0 = _normal_reflectance(_eta(plugin, "bk7"))
+    r0 = normal_reflectance(_eta(plugin, "bk7"))
     rough = plugin.type == "roughcoating"
     distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
     under = blended([(below, (1 - r0) ** 2)], [])
@@ -309,19 +318,6 @@ def _index(plugin: Plugin, name: str, default: str) -> float:
     return value
 
 
-def _normal_reflectance(eta: float) -> float:
-    return ((eta - 1) / (eta + 1)) ** 2
-
-
-def _diffuse_fresnel(eta: float) -> float:
-    """Share of diffuse light from outside that a dielectric of relative index eta >= 1 reflects."""
-    cos_i = (np.arange(512) + 0.5) / 512
-    cos_t = np.sqrt(1 - (1 - cos_i**2) / eta**2)
-    parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
-    across = (cos_i - eta * cos_t) / (cos_i + eta * cos_t)
-    return float(((parallel**2 + across**2) * cos_i).mean())
-
-
 def _metal(plugin: Plugin) -> Floats:
     """Reflectance (3,) at normal incidence of a conductor."""
     outside = plugin.transform_element("ext_eta")
@@ -332,8 +328,8 @@ def _metal(plugin: Plugin) -> Floats:
     if plugin.has("eta", "k"):
         plugin.ignore("material")
         eta, k = colour(plugin, "eta", 0.0).mean / around, colour(plugin, "k", 1.0).mean / around
-        reflectance: Floats = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
-        return reflectance
+        r0: Floats = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
+        return r0
     name = plugin.text("material", "Cu")
     if name.lower() == "none":
         return WHITE

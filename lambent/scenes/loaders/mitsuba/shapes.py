@@ -20,6 +20,7 @@ from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 96, 48  # quads of a sphere
 UNSCALED = 1e-18  # determinant of a transform that leaves nothing
+Made = tuple[Mesh | None, list[str], bool]  # the mesh, what was repaired, whether its normals come from its faces
 
 
 def mesh_of_shape(plugin: Plugin, name: str, world: Floats) -> tuple[Mesh | None, list[str]]:
@@ -28,13 +29,15 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats) -> tuple[Mesh | None
     if make is None:
         return None, [f"{plugin.label}: left out, a shape of an unknown kind"]
     to_world = world @ plugin.transform()
-    local, said = make(plugin, name)
+    local, said, from_faces = make(plugin, name)
     if local is None:
         return None, said
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
         return None, [*said, f"{name}: left out, its transform is flat"]
     mesh = transformed(local, to_world)
-    return (flipped(mesh) if plugin.flag("flip_normals", False) else mesh), said
+    # Mitsuba makes missing normals of faces that a mirroring transform has turned; given ones are moved as ours are.
+    turned = from_faces and np.linalg.det(to_world[:3, :3]) < 0
+    return (flipped(mesh) if plugin.flag("flip_normals", False) != turned else mesh), said
 
 
 def flipped(mesh: Mesh) -> Mesh:
@@ -48,7 +51,7 @@ def stem_of(plugin: Plugin) -> str:
     return plugin.element.id or Path(written).stem or plugin.type
 
 
-def _obj(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _obj(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
     text = obj_text.parse(read_bytes(path, obj.LIMIT_BYTES), path)
     if not plugin.flag("flip_tex_coords", True):
@@ -56,17 +59,18 @@ def _obj(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
     faceted = plugin.flag("face_normals", False)
     plugin.ignore("collapse", "load_materials", "shape_index")
     triangles = obj.triangles_of(text, path)
-    return obj.mesh_of_triangles(text, triangles, name, path, faceted=faceted)
+    mesh, said = obj.mesh_of_triangles(text, triangles, name, path, faceted=faceted)
+    return mesh, said, faceted or not len(text.vn)
 
 
-def _ply(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _ply(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
     arrays = ply.read(path)
     plugin.ignore("srgb")
     return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
 
 
-def _serialized(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _serialized(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
     arrays = serialized.read(path, int(plugin.number("shape_index", 0)))
     return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
@@ -74,18 +78,20 @@ def _serialized(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
 
 def _from_arrays(
     plugin: Plugin, name: str, path: Path, positions: Floats, normals: Floats | None, uv: Floats | None, faces: Ints
-) -> tuple[Mesh | None, list[str]]:
+) -> Made:
     """A mesh whose v points down, unless flip_tex_coords says that it does not."""
     if uv is not None and not plugin.flag("flip_tex_coords", False):
         uv = _turned(uv)
     plugin.ignore("flip_tex_coords")
+    from_faces = normals is None or plugin.flag("face_normals", False)
     if plugin.flag("face_normals", False):
         normals = None
     elif normals is None and len(faces) and int(faces.max()) < len(positions):
         normals = np.zeros_like(positions)
         made = smooth_normals(positions, faces, faces)
         normals[: len(made)] = made
-    return mesh_of(positions, faces, normals, uv, None, name=name, file=path)
+    mesh, said = mesh_of(positions, faces, normals, uv, None, name=name, file=path)
+    return mesh, said, from_faces
 
 
 def _turned(uv: Floats) -> Floats:
@@ -105,8 +111,8 @@ def _remembered(plugin: Plugin, path: Path) -> Path:
     return path
 
 
-def _rectangle(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
-    return _sheet(np.array([0.0, 0.0, 1.0]), lambda x, y: (x, y, 0 * x)), []
+def _rectangle(plugin: Plugin, name: str) -> Made:
+    return _sheet(np.array([0.0, 0.0, 1.0]), lambda x, y: (x, y, 0 * x)), [], False
 
 
 def _sheet(normal: Floats, place: Callable[[Floats, Floats], tuple[Floats, Floats, Floats]]) -> Mesh:
@@ -118,7 +124,7 @@ def _sheet(normal: Floats, place: Callable[[Floats, Floats], tuple[Floats, Float
     return grid(positions, np.broadcast_to(normal, positions.shape), along, uv)
 
 
-def _cube(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _cube(plugin: Plugin, name: str) -> Made:
     """Each side as Mitsuba has it: which way u (x here) and v (y here) run on it."""
     one = np.ones((2, 2))
     sides = (
@@ -126,10 +132,10 @@ def _cube(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
         ((1, 0, 0), lambda x, y: (one, x, -y)), ((-1, 0, 0), lambda x, y: (-one, x, y)),
         ((0, 1, 0), lambda x, y: (-x, one, -y)), ((0, -1, 0), lambda x, y: (y, -one, x)),
     )  # fmt: skip
-    return merge([_sheet(np.array(n, float), place) for n, place in sides]), []
+    return merge([_sheet(np.array(n, float), place) for n, place in sides]), [], False
 
 
-def _sphere(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _sphere(plugin: Plugin, name: str) -> Made:
     centre, radius = plugin.vector("center"), plugin.number("radius", 1.0)
     theta = np.linspace(0, np.pi, ROWS + 1)[:, None]
     phi, cos_phi, sin_phi = _circle(AROUND)
@@ -137,25 +143,25 @@ def _sphere(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
     normals = _stacked(sin_theta * cos_phi, sin_theta * sin_phi, np.cos(theta))
     uv = np.stack(np.broadcast_arrays(phi / (2 * np.pi), 1 - theta / np.pi), axis=-1)
     mesh = grid(abs(radius) * normals, normals, _stacked(-sin_phi, cos_phi, 0 * theta), uv)
-    return transformed(mesh, _moved(np.zeros(3) if centre is None else centre)), []
+    return transformed(mesh, _moved(np.zeros(3) if centre is None else centre)), [], False
 
 
-def _disk(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _disk(plugin: Plugin, name: str) -> Made:
     r = np.linspace(0, 1, 2)[:, None]
     phi, cos_phi, sin_phi = _circle(AROUND)
     positions = _stacked(r * cos_phi, r * sin_phi, 0 * r)
     normals = np.broadcast_to([0.0, 0.0, 1.0], positions.shape)
     uv = np.stack(np.broadcast_arrays(r, 1 - phi / (2 * np.pi)), axis=-1)
-    return grid(positions, normals, _stacked(cos_phi, sin_phi, 0 * r), uv), []
+    return grid(positions, normals, _stacked(cos_phi, sin_phi, 0 * r), uv), [], False
 
 
-def _cylinder(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
+def _cylinder(plugin: Plugin, name: str) -> Made:
     """Open at both ends."""
     p0, p1 = plugin.vector("p0"), plugin.vector("p1")
     p0, p1 = np.zeros(3) if p0 is None else p0, np.array([0.0, 0.0, 1.0]) if p1 is None else p1
     radius, length = plugin.number("radius", 1.0), float(np.linalg.norm(p1 - p0))
     if length == 0:
-        return None, [f"{name}: left out, its ends are one point"]
+        return None, [f"{name}: left out, its ends are one point"], False
     z = np.linspace(0, 1, 2)[:, None]
     phi, cos_phi, sin_phi = _circle(AROUND)
     normals = _stacked(cos_phi, sin_phi, 0 * z)
@@ -165,7 +171,7 @@ def _cylinder(plugin: Plugin, name: str) -> tuple[Mesh | None, list[str]]:
     t, b = basis(normalize(p1 - p0))
     matrix = _moved(p0)
     matrix[:3, :3] = np.stack([t, b, normalize(p1 - p0)], axis=-1)
-    return transformed(mesh, matrix), []
+    return transformed(mesh, matrix), [], False
 
 
 def _circle(around: int) -> tuple[Floats, Floats, Floats]:
@@ -186,7 +192,7 @@ def _moved(to: Floats) -> Floats:
     return matrix
 
 
-KINDS: dict[str, Callable[[Plugin, str], tuple[Mesh | None, list[str]]]] = {
+KINDS: dict[str, Callable[[Plugin, str], Made]] = {
     "obj": _obj, "ply": _ply, "serialized": _serialized, "rectangle": _rectangle, "cube": _cube, "sphere": _sphere,
     "disk": _disk, "cylinder": _cylinder,
 }  # fmt: skip
