@@ -205,7 +205,12 @@ class Window:
         with self._failed:
             io = self._imgui.backend.io
             has_keys = io.want_text_input or io.want_capture_keyboard
-            self._input.handle(self.state, event, ui_has_mouse=self._popup_open, ui_has_keys=has_keys)
+            self._input.handle(
+                self.state,
+                event,
+                ui_has_mouse=self._popup_open,
+                ui_has_keys=has_keys,
+            )
 
     def _draw(self) -> None:
         with self._failed:

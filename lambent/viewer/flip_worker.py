@@ -8,6 +8,8 @@ from __future__ import annotations
 import io
 import subprocess
 import sys
+import tempfile
+import time
 from typing import Any
 
 import numpy as np
@@ -22,23 +24,22 @@ POLL_S = 0.1
 
 def flip_beside(reference: Floats, test: Floats, progress: Progress) -> Floats:
     """FLIP error (H, W) of two encoded pictures; stops the process where `progress` says so."""
-    pair = io.BytesIO()
-    np.save(pair, np.stack([reference, test]).astype(np.float32))
     command = [sys.executable, "-m", "lambent.viewer.flip_worker"]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as worker:
-        given: bytes | None = pair.getvalue()
-        try:
-            while True:
-                try:
-                    out, err = worker.communicate(given, timeout=POLL_S)
-                    break
-                except subprocess.TimeoutExpired:
-                    given = None  # communicate goes on with what it was given first
+    # Files, not pipes: `communicate` with a timeout writes its input only as far as the first timeout (Python 3.11).
+    with tempfile.TemporaryFile() as pair, tempfile.TemporaryFile() as error, tempfile.TemporaryFile() as words:
+        np.save(pair, np.stack([reference, test]).astype(np.float32))
+        pair.seek(0)
+        with subprocess.Popen(command, stdin=pair, stdout=error, stderr=words) as worker:
+            try:
+                while worker.poll() is None:
                     progress(0, 1, "FLIP")
-        except BaseException:
-            worker.kill()
-            raise
+                    time.sleep(POLL_S)
+            except BaseException:
+                worker.kill()
+                raise
+        error.seek(0)
+        words.seek(0)
+        out, err = error.read(), words.read()
     if worker.returncode != 0:
         lines = err.decode(errors="replace").strip().splitlines() or ["no reason given"]
         raise UserError(f"FLIP could not be computed ({lines[-1]})")

@@ -72,6 +72,7 @@ class Input:
     _button: int | None = None  # of the drag that began over the picture
     _at: tuple[float, float] = (0.0, 0.0)
     _moved_px: float = 0.0
+    _on_divider: bool = False
 
     @property
     def walking(self) -> bool:
@@ -84,6 +85,7 @@ class Input:
             self._point(state, event, ui_has_mouse)
         if kind == "pointer_down" and not ui_has_mouse and self.picture.holds(event["x"], event["y"]):
             self._press(event)
+            self._on_divider = self._at_divider(state, event["x"])
         elif kind == "pointer_move" and self._button is not None:
             self._drag(state, event)
         elif kind == "pointer_up" and event["button"] == self._button:
@@ -130,12 +132,22 @@ class Input:
         if self._button is None:
             self._button, self._at, self._moved_px = event["button"], (event["x"], event["y"]), 0.0
 
+    def _at_divider(self, state: ViewerState, x: float) -> bool:
+        """Whether a press is at the line between two pictures. Dear ImGui would see it only once it was drawn hovered,
+        and a frame of two pictures can be slow."""
+        comparison = state.comparison
+        if comparison is None or comparison.mode != "side by side":
+            return False
+        return abs(x - self.picture.x - comparison.split * self.picture.width) <= CLICK_PX
+
     def _drag(self, state: ViewerState, event: Mapping[str, Any]) -> None:
         dx, dy = event["x"] - self._at[0], event["y"] - self._at[1]
         if self._moved_px < CLICK_PX and math.hypot(dx, dy) < CLICK_PX:
             return  # not yet a drag
         self._at, self._moved_px = (event["x"], event["y"]), self._moved_px + math.hypot(dx, dy)
-        if state.mode == "walk":
+        if self._on_divider and state.comparison is not None:
+            state.comparison.split = min(max((event["x"] - self.picture.x) / self.picture.width, 0.02), 0.98)
+        elif state.mode == "walk":
             state.move(cameras.look(state.camera, dx, dy))
         elif self._button == LEFT:
             state.move(cameras.orbit(state.camera, dx, dy))
@@ -143,7 +155,7 @@ class Input:
             state.move(cameras.pan(state.camera, dx, dy, self.picture.height))
 
     def _release(self, state: ViewerState, event: Mapping[str, Any]) -> None:
-        was_click = self._button == LEFT and self._moved_px < CLICK_PX
+        was_click = self._button == LEFT and self._moved_px < CLICK_PX and not self._on_divider
         self._button = None
         if was_click:
             if state.preview is not None:

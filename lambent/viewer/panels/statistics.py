@@ -28,4 +28,4 @@ def draw(state: ViewerState) -> None:
     table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
     rows(table, "statistics")
     for note in state.notes:
-        imgui.text_wrapped(note.replace("%", "%%"))
+        imgui.text_wrapped(note)

@@ -83,7 +83,7 @@ def rows(pairs: Sequence[tuple[str, str]], name: str) -> None:
         imgui.table_next_column()
         imgui.text_unformatted(left)
         imgui.table_next_column()
-        imgui.text_wrapped(right.replace("%", "%%"))
+        imgui.text_wrapped(right)
     imgui.end_table()
 
 
