@@ -1,0 +1,203 @@
+"""Pictures on surfaces: MIP chains that keep what they should, the right way round, and as the path tracer has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import cube_of, smooth_light, wall_scene
+
+from lambent.core.colour import srgb_decode
+from lambent.materials.document import Lobe, Material
+from lambent.realtime import textures as on_gpu
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.unbaked import irradiance, unbaked_scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import Camera, MaterialTextures, Scene, SceneObject, Texture
+from lambent.scenes.textures import doubled_angle, halved, slopes
+from lambent.store.contract import CameraRecord
+
+LETTER = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16)  # an F
+FRONT = CameraRecord(
+    name="c", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=float(np.degrees(2 * np.arctan(0.25)))
+)
+SQUARE = patch((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+DARK = np.zeros((6, 2, 2, 3), np.float32)
+
+
+def picture(values: np.ndarray) -> Texture:
+    return Texture(np.asarray(values, np.float16))
+
+
+def constant(*values: float) -> Texture:
+    return picture(np.array(values)[None, None])
+
+
+def square(material: Material, textures: MaterialTextures, environment=DARK, light=(np.pi,) * 3):
+    """A square of 1 m that faces +z and fills FRONT's picture; uv runs with x and y."""
+    scene = unbaked_scene({"o": SQUARE}, material, environment, irradiance=light)
+    return replace(scene, textures={material.name: textures})
+
+
+def test_halving_keeps_the_mean_of_odd_sizes() -> None:
+    texels = np.random.default_rng(0).random((7, 5, 2)).astype(np.float32)
+    for _ in range(3):
+        smaller = halved(texels)
+        assert smaller.shape[:2] == tuple(max(1, n // 2) for n in texels.shape[:2])
+        np.testing.assert_allclose(smaller.mean(axis=(0, 1)), texels.mean(axis=(0, 1)), rtol=1e-5)
+        texels = smaller
+
+
+def test_bytes_decode_to_the_texels() -> None:
+    texels = (np.random.default_rng(0).random((16, 16, 3)) * (0.5, 1.0, 7.0)).astype(np.float16)
+    levels, scale = on_gpu.encoded(texels)
+    decoded = srgb_decode(levels[0][..., :3] / np.float32(255)) * scale
+    np.testing.assert_allclose(decoded, texels, atol=0.005 * max(scale), rtol=0.02)
+    assert [level.shape[0] for level in levels] == [16, 8, 4, 2, 1]
+
+
+def test_bumps_become_roughness_where_they_are_averaged() -> None:
+    """Ridges of slope +-.2 along t: flat from afar, with twice their variance added to mx^2, and nothing to my^2."""
+    normals = np.zeros((8, 8, 3), np.float16)
+    normals[..., 2], normals[:, ::2, 0], normals[:, 1::2, 0] = 1, 0.2, -0.2
+    levels = on_gpu.normal_levels(normals)
+    assert not levels[0][..., 2:].any()
+    np.testing.assert_allclose(levels[1], np.broadcast_to([0, 0, 2 * 0.04, 0], (4, 4, 4)), atol=1e-4)
+    np.testing.assert_allclose(slopes(np.array([0.0, 3.0, -1.0])), (0, 8), rtol=1e-5)
+
+
+def test_leaves_keep_their_area_on_all_levels() -> None:
+    """Plain means would lift noise above the cutoff everywhere or nowhere."""
+    opacity = np.random.default_rng(0).random((64, 64, 1)).astype(np.float32)
+    for cutoff in (0.1, 0.5, 0.95):
+        for level in on_gpu.opacity_levels(opacity, cutoff)[1:4]:
+            assert (level >= cutoff).mean() == pytest.approx(1 - cutoff, abs=0.03)
+    assert all((level == 1).all() for level in on_gpu.opacity_levels(np.ones((4, 4, 1)), 0.5))
+
+
+def test_opposite_directions_brush_alike() -> None:
+    rng = np.random.default_rng(0)
+    d = rng.normal(size=(9, 2))
+    np.testing.assert_allclose(doubled_angle(d), doubled_angle(-3 * d), atol=1e-6)
+
+
+@pytest.mark.parametrize("part", ["diffuse", "opacity"])
+def test_pictures_are_drawn_unmirrored_and_upright(device, part: str) -> None:
+    texels = LETTER.repeat(8, 0).repeat(8, 1)[..., None]
+    texels = texels.repeat(3, axis=2) if part == "diffuse" else texels
+    scene = square(Material(name="m", kd=1.0), MaterialTextures(**{part: picture(texels)}))
+    image = Renderer(device, scene).image(FrameState(FRONT, 80, 80))
+    np.testing.assert_allclose(image[8::16, 10::20, 0], LETTER, atol=0.02)
+
+
+def test_a_uv_transform_repeats_and_shifts(device) -> None:
+    texels = np.zeros((16, 16, 3))
+    texels[8:, :8] = 1  # lower left
+    lies = replace(picture(texels), uv_transform=((2.0, 0.0, 0.0), (0.0, 1.0, 0.5)))
+    image = Renderer(device, square(Material(name="m", kd=1.0), MaterialTextures(diffuse=lies))).image(
+        FrameState(FRONT, 64, 64)
+    )
+    np.testing.assert_allclose(image[16::32, 8::16, 0], [[1, 0, 1, 0], [0, 0, 0, 0]], atol=0.02)
+
+
+def test_what_is_behind_a_hole_is_seen(device) -> None:
+    scene = square(Material(name="m", kd=1.0), MaterialTextures(opacity=constant(0.4)), np.full((6, 2, 2, 3), 0.25))
+    renderer = Renderer(device, scene)
+    np.testing.assert_allclose(renderer.image(FrameState(FRONT, 8, 8)), 0.25, rtol=1e-3)
+    solid = replace(scene, textures={"m": replace(scene.textures["m"], cutoff=0.3)})
+    np.testing.assert_allclose(Renderer(device, solid).image(FrameState(FRONT, 8, 8)), 1.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize("integrator", ["rings", "fis", "lobe-4.24", "lobe-4.25", "qmc", "split-sum"])
+def test_a_roughness_picture_equals_a_material_of_that_roughness(device, integrator: str) -> None:
+    """Half of everything: the samples move, the filter narrows, as a material of half the numbers has it."""
+    lobe = Lobe(mx=0.2, my=0.12, r0=0.6, k=0.8, alpha=0.2)
+    if integrator == "split-sum":
+        lobe = lobe.model_copy(update={"alpha": 0.0})
+    half = lobe.model_copy(update={"mx": 0.1, "my": 0.06, "k": (0.4, 0.8, 1.6)})
+    light = cube_of(smooth_light)
+    pictures = MaterialTextures(roughness=constant(0.5), specular=constant(0.5, 1.0, 2.0))
+    state = FrameState(FRONT, 24, 24, integrator=integrator, n=9, accumulate=0, antialias=False)
+    textured = square(Material(name="m", lobes=(lobe,)), pictures, light)
+    plain = square(Material(name="m", lobes=(half,)), MaterialTextures(), light)
+    got, expected = (Renderer(device, scene).image(state) for scene in (textured, plain))
+    loose = {"split-sum": 0.03, "lobe-4.24": 0.02, "lobe-4.25": 0.02}
+    np.testing.assert_allclose(got, expected, rtol=loose.get(integrator, 4e-3))
+
+
+def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
+    """One-texel ridges, of which a pixel sees hundreds, reflect as wide along t as a lobe of both variances."""
+    normals = np.zeros((64, 64, 3))
+    normals[..., 2], normals[:, ::2, 0], normals[:, 1::2, 0] = 1, 0.1, -0.1
+    textures = MaterialTextures(normal=replace(picture(normals), uv_transform=((64.0, 0, 0), (0, 64.0, 0))))
+    lobe = Lobe(mx=0.1, my=0.1, r0=1.0)
+    wide = lobe.model_copy(update={"mx": float(np.sqrt(0.01 + 2 * 0.01))})
+    light = cube_of(smooth_light)
+    state = FrameState(FRONT, 16, 16, n=64, integrator="qmc")
+    got = Renderer(device, square(Material(name="m", lobes=(lobe,)), textures, light)).converged(state, 256)
+    expected = Renderer(device, square(Material(name="m", lobes=(wide,)), MaterialTextures(), light)).converged(
+        state, 256
+    )
+    np.testing.assert_allclose(got, expected, rtol=0.02)
+
+
+def test_drawn_pictures_equal_path_traced_ones(device, tmp_path) -> None:
+    """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
+    from lambent.bake.engine import engine
+    from lambent.core.errors import UserError
+
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    from lambent.bake.environment import environment_cube
+    from lambent.bake.reference import render_reference
+    from lambent.core.images import write_image
+    from lambent.scenes.scene import ImageEnvironment
+
+    theta, phi = np.meshgrid((np.arange(32) + 0.5) * np.pi / 32, (np.arange(64) + 0.5) * np.pi / 32, indexing="ij")
+    w = np.stack([np.sin(theta) * np.sin(phi - np.pi), np.cos(theta), -np.sin(theta) * np.cos(phi - np.pi)], axis=-1)
+    path = tmp_path / "light.exr"
+    write_image(path, smooth_light(w).astype(np.float32))
+    environment = ImageEnvironment(path)
+    v, u = np.meshgrid((np.arange(32) + 0.5) / 32, (np.arange(32) + 0.5) / 32, indexing="ij")
+    turn = np.arctan2(0.5 - v, u - 0.5)
+    textures = MaterialTextures(
+        specular=picture(np.stack([0.2 + u, 1.2 - u, 0.5 + v], axis=-1)),
+        roughness=picture((0.4 + 1.6 * u)[..., None]),
+        normal=picture(np.stack([0.3 * np.sin(12 * u), 0.3 * np.cos(9 * v), np.ones_like(u)], axis=-1)),
+        direction=picture(np.stack([np.cos(turn), np.sin(turn)], axis=-1)),
+        opacity=picture((np.hypot(u - 0.7, v - 0.3) > 0.2)[..., None]),
+    )
+    material = Material(name="m", lobes=(Lobe(mx=0.25, my=0.06, k=0.8, r0=0.6, alpha=0.3),))
+    camera = Camera("c", (0.6, 0.3, 1.6), (0.0, 0.0, 0.0), fov_y_deg=34)
+    scene = Scene("s", (SceneObject("o", SQUARE, "m"),), {"m": material}, environment, textures={"m": textures})
+    traced, variance = render_reference(scene, camera, 48, 48, 256)
+    cube = environment_cube(environment, 128)
+    baked = replace(unbaked_scene({"o": SQUARE}, material, cube), textures={"m": textures})
+    drawn = Renderer(device, baked).converged(FrameState(camera, 48, 48, lookup="plain"), 256)
+    z = (drawn - traced) / np.sqrt(variance + (0.02 * traced) ** 2)
+    assert np.sqrt(np.median(z**2)) < 1
+    assert (np.abs(z) > 4).mean() < 0.03  # the hole's edge
+    np.testing.assert_allclose(drawn.mean(axis=(0, 1)), traced.mean(axis=(0, 1)), rtol=0.01)
+
+
+def test_materials_without_pictures_pay_nothing(device) -> None:
+    """No picture is read by the pipeline of a material that has none."""
+    renderer = Renderer(device, wall_scene(Material(name="m", kd=0.5), cube_of(smooth_light)))
+    assert [draw.textures for draw in renderer._draws(FrameState(FRONT, 8, 8))] == [0]
+    gloss = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1),))
+    everything = {part: constant(*[0.5] * channels) for part, channels in on_gpu.CHANNELS.items()}
+    renderer = Renderer(device, square(gloss, MaterialTextures(**everything)))
+    assert [draw.textures for draw in renderer._draws(FrameState(FRONT, 8, 8))] == [1 | 2 | 4 | 8]
+
+
+def test_light_that_a_bumpy_surface_gets_is_that_of_its_mesh(device) -> None:
+    """Irradiance is baked for the mesh's normals: a normal map bends mirrors, not the diffuse light."""
+    bumpy = MaterialTextures(normal=constant(0.5, 0.0, 1.0))
+    light = irradiance(cube_of(smooth_light), np.array([[0.0, 0, 1]]))[0]
+    image = Renderer(device, square(Material(name="m", kd=0.5), bumpy, light=tuple(light))).image(
+        FrameState(FRONT, 8, 8)
+    )
+    np.testing.assert_allclose(image, np.broadcast_to(0.5 * light / np.pi, image.shape), rtol=2e-3)
