@@ -38,11 +38,11 @@ class Recorder:
         self.recording.take(camera, now_s - self.began_s)
         return now_s - self.began_s > LONGEST_S
 
-    def stop(self) -> bool:
-        """Make a draft of what was recorded; whether there is one."""
+    def stop(self) -> TimedPath | None:
+        """Make a draft of what was recorded; None where nothing moved."""
         self.taken, self.recording = self.recording, None
         self.smooth(self.smooth_s)
-        return self.draft is not None
+        return self.draft
 
     def smooth(self, smooth_s: float) -> None:
         """Make the draft anew, smoothed more or less."""

@@ -291,10 +291,10 @@ class ViewerState:
             if self.path is not None:
                 self.path.playing = False
             self.recorder.begin(self.clock())
-        elif self.recorder.stop():
-            assert self.recorder.draft is not None
+        elif (draft := self.recorder.stop()) is not None:
             self.recorder.name = self.views.free_path_name()
-            self.say(f"recorded {self.recorder.draft.seconds:.1f} s")
+            self.path = PathPlay(draft, draft.seconds, playing=False)  # chosen, and ready to be played
+            self.say(f"recorded {draft.seconds:.1f} s")
         else:
             self.say("nothing recorded: the camera did not move")
 
