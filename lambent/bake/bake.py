@@ -250,11 +250,11 @@ class _Bake:
 
     def _builder(self, diffuse: bool, photons: bool = False) -> Any:
         from lambent.bake.emitters import balance_emitters
-        from lambent.bake.measured_materials import grids_of
+        from lambent.bake.measured_materials import lookups_of
         from lambent.bake.mitsuba_scene import SceneBuilder
 
-        grids = grids_of(self.scene, photons=photons, progress=self.progress)
-        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse, measured=grids)
+        tables = lookups_of(self.scene, photons=photons, progress=self.progress)
+        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse, measured=tables)
         balance_emitters(builder)
         return builder
 

@@ -5,23 +5,18 @@ The renderer shows the document, a fit of the table; the light of the bake is th
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
+from pathlib import Path
 
-from lambent.core.frames import Floats
+from lambent.core.files import sha256_of
 from lambent.core.progress import Progress, silent
-from lambent.materials.measured.half_vector_grid import HalfVectorGrid, Sheet, grid_of
+from lambent.materials.measured.patch_sheet import Lookup, lookup_of
 from lambent.materials.measured.registry import load
 from lambent.scenes.scene import Scene
 
 
-class _Reversed(Sheet):
-    """Light and viewer exchanged: what a photon meets, whose `si.wi` is where the light comes from."""
-
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        return super().eval(wo, wi)
-
-
-def grids_of(scene: Scene, *, photons: bool = False, progress: Progress = silent) -> Mapping[str, HalfVectorGrid]:
+def lookups_of(scene: Scene, *, photons: bool = False, progress: Progress = silent) -> Mapping[str, Lookup]:
     """The tables of a scene's materials, by the material's name; for `photons` with light and viewer exchanged.
 
     Raises
@@ -29,6 +24,12 @@ def grids_of(scene: Scene, *, photons: bool = False, progress: Progress = silent
     UserError
         Where a file cannot be read.
     """
-    worn = {o.material for o in scene.objects}
-    tables = {name: load(file) for name, file in scene.measured.items() if name in worn}
-    return {name: grid_of(_Reversed(table) if photons else table, None, progress) for name, table in tables.items()}
+    worn = {o.material for o in scene.objects} & set(scene.measured)
+    return {
+        name: _lookup(scene.measured[name], sha256_of(scene.measured[name]), photons, progress) for name in sorted(worn)
+    }
+
+
+@functools.lru_cache(maxsize=8)
+def _lookup(file: Path, digest: str, photons: bool, progress: Progress) -> Lookup:
+    return lookup_of(load(file), None, progress, reverse=photons)

@@ -1,8 +1,8 @@
 """From photons per texel to irradiance: flux over area, averaged over neighbours on the same surface.
 
 The areas are exact, those of what of a triangle lies in a texel's square, so no border is darker than its middle and
-no energy is lost. The kernel is the same for flux and area: uniform light stays uniform whatever is missing around. It is narrow, because
-noise that neighbours share is what the denoiser cannot tell from light.
+no energy is lost. The kernel is the same for flux and area: uniform light stays uniform whatever is missing around. It
+is narrow, because noise that neighbours share is what the denoiser cannot tell from light.
 """
 
 from __future__ import annotations

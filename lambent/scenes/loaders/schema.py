@@ -166,6 +166,7 @@ class SceneDocument(Section):
     environment: Annotated[SunSkySection | ImageSection | ConstantSection, Field(discriminator="kind")] | None = None
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table it scatters by in bakes
     assign: dict[str, str] = Field(default_factory=dict)  # pattern over objects and materials -> material
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[PointSection | SpotSection | DirectionalSection, Field(discriminator="kind")], ...] = ()

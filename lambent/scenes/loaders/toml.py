@@ -91,6 +91,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         sources=(path, *(s for p in parts for s in p.sources), *sources),
         warnings=(*whole.warnings, *unfit),
         textures={name: t for name, t in whole.textures.items() if name not in named},
+        measured=_measured(document, materials, path),
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),
@@ -155,6 +156,15 @@ def _materials(document: SceneDocument, path: Path) -> tuple[dict[str, Material]
         else:
             materials[name] = material_from({"name": name, **table}, where)
     return materials, tuple(sources)
+
+
+def _measured(document: SceneDocument, materials: Mapping[str, Material], path: Path) -> dict[str, Path]:
+    """Files of the tables that materials scatter by while the scene is baked."""
+    for name in document.measured:
+        if name not in materials:
+            hint = did_you_mean(name, materials) or f"describe it under [materials.{name}]"
+            raise UserError("unknown material", file=path, field=f"measured.{name}", got=name, hint=hint)
+    return {name: inside_scene(path, f"measured.{name}", file) for name, file in document.measured.items()}
 
 
 def _material_of_file(source: Path, field: str, path: Path) -> Material:
