@@ -170,7 +170,8 @@ class Pictures:
                 state.filming = self._filming(state, wanted)
             except UserError as error:
                 state.say(f"no film: {error}")
-        if state.filming is None or not state.filming.step():
+        # A frame of a film can be slow: events are answered first, so that it can be cancelled.
+        if state.filming is None or state.answering or not state.filming.step():
             return
         film, state.filming = state.filming, None
         state.say(f"no film: {film.error}" if film.error else f"saved {film.file}, {film.done} frames")

@@ -1,0 +1,66 @@
+"""False colour: what a colour means, which numbers the scale bears, and parity with the shader."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lambent.core.colour import neutral, shown
+from lambent.core.errors import UserError
+from lambent.core.false_colour import STOPS, Range, false_colour, fitting_range, number, photometric, with_scale
+
+
+def test_white_of_one_watt_is_179_candela():
+    assert photometric(np.ones(3)) == pytest.approx(179)
+    assert photometric(np.array([0.0, 1.0, 0.0])) == pytest.approx(179 * 0.7152)
+
+
+@pytest.mark.parametrize(("scale", "middle"), [(Range(1, 100), 10.0), (Range(0, 100, log=False), 50.0)])
+def test_the_scale_runs_from_low_to_high(scale, middle):
+    colours = false_colour(np.array([scale.low, middle, scale.high]), scale)
+    np.testing.assert_allclose(colours, [STOPS[0], STOPS[4], STOPS[-1]])
+    out = false_colour(np.array([scale.low - 0.1, 2 * scale.high]), scale)
+    np.testing.assert_array_equal(out, [[0, 0, 0], [1, 1, 1]])
+
+
+def test_numbers_of_the_scale_are_round():
+    assert Range(1, 100).marks() == pytest.approx([1, 2, 5, 10, 20, 50, 100])
+    assert Range(0.3, 700).marks() == pytest.approx([0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500])
+    assert Range(0, 800, log=False).marks() == pytest.approx([0, 100, 200, 300, 400, 500, 600, 700, 800])
+    assert Range(33, 34).marks() == [33, 34]
+    assert [number(x) for x in (0, 0.002, 1.5, 20, 1000, 123456)] == ["0", "0.002", "1.5", "20", "1000", "123456"]
+
+
+def test_a_range_fits_the_picture():
+    values = np.logspace(0, 2, 10_000)
+    assert fitting_range(values) == Range(1.0, 100.0)
+    assert fitting_range(values, log=False) == Range(0.0, 100.0, log=False)
+    wide = fitting_range(np.logspace(-6, 3, 10_000))
+    assert wide.high / wide.low <= 2e3, "dark corners do not stretch the scale"
+    for odd in (np.zeros(4), np.full(4, np.nan), np.full(4, 3.0)):
+        fitting_range(odd).check()
+
+
+@pytest.mark.parametrize("scale", [Range(0, 1), Range(5, 5), Range(9, 1), Range(math.nan, 1), Range(1, math.inf)])
+def test_impossible_ranges_are_refused(scale):
+    with pytest.raises(UserError, match="range of luminance"):
+        scale.check()
+
+
+def test_the_bar_stands_at_the_right_and_the_rest_is_kept():
+    picture = np.full((200, 300, 3), 90, np.uint8)
+    seen = with_scale(picture, Range(1, 100))
+    assert (seen[:, :200] == 90).all() and seen.shape == picture.shape
+    reds = (np.abs(seen[:, 200:].astype(int) - 255 * STOPS[-1]) < 12).all(axis=-1)
+    blues = (np.abs(seen[:, 200:].astype(int) - 255 * STOPS[1]) < 12).all(axis=-1)
+    assert 0 < np.argwhere(reds)[:, 0].mean() < np.argwhere(blues)[:, 0].mean()
+    assert with_scale(picture[:20, :20], Range(1, 100)).shape == (20, 20, 3)
+
+
+def test_neutral_keeps_colours_and_rolls_highlights_off():
+    dark = np.array([0.4, 0.3, 0.2])
+    np.testing.assert_allclose(neutral(dark), dark - 0.04)
+    bright = neutral(np.array([[1.0, 1.0, 1.0], [50.0, 20.0, 20.0], [0.9, 0.5, 0.2]]))
+    assert (bright <= 1).all() and bright[1].min() > 0.8, "highlights lose their saturation"
+    assert bright[0, 0] == pytest.approx(1 - 0.24**2 / (0.96 + 0.24 - 0.76))
+    np.testing.assert_allclose(shown(np.array([[1e9, 0, 0]]), "linear", -40), [[np.float64(0.0)] * 3], atol=0.05)

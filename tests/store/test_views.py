@@ -1,0 +1,89 @@
+"""views.json: saved whole, read with suspicion, and never mixed up with what is baked."""
+
+import json
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.store.camera_paths import TimedPath, camera_at
+from lambent.store.contract import CameraRecord, PathRecord, SceneRecord
+from lambent.store.views import FILE, Views, change_views, checked_name, free_name, read_views, with_views
+
+A = CameraRecord(name="a", position=(0, 1, 0), target=(0, 1, -1))
+B = CameraRecord(name="b", position=(2, 1, 0), target=(2, 1, -1), fov_y_deg=60)
+WAY = TimedPath(name="w", keys=(A, A, B), seconds=3.0, times_s=(0.0, 2.0, 3.0))
+
+
+def test_round_trip(tmp_path):
+    assert read_views(tmp_path) == Views()
+    saved = Views(cameras=(A, B), paths=(WAY,))
+    assert change_views(tmp_path, lambda views: saved) == saved == read_views(tmp_path)
+    change_views(tmp_path, lambda views: views.model_copy(update={"cameras": (*views.cameras, A)}))
+    assert [c.name for c in read_views(tmp_path).cameras] == ["a", "b", "a"]
+    assert [p.name for p in tmp_path.iterdir()] == [FILE]
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        (lambda d: d.update(version=2), "version"),
+        (lambda d: d.update(more=1), "more"),
+        (lambda d: d["cameras"][0].update(position=[0, float("nan"), 0]), "not finite"),
+        (lambda d: d["cameras"][0].update(fov_y_deg=180), "sees no angle"),
+        (lambda d: d["paths"][0].update(times_s=[0, 3]), "one time per key"),
+        (lambda d: d["paths"][0].update(times_s=[0, 3, 3]), "begin at 0, grow"),
+        (lambda d: d["paths"][0].update(seconds=9), "begin at 0, grow"),
+        (lambda d: d["paths"][0].update(keys=[], times_s=[]), "one time per key"),
+    ],
+)
+def test_damage_is_said_and_nothing_is_overwritten(tmp_path, damage, word):
+    document = Views(cameras=(A,), paths=(WAY,)).model_dump(mode="json")
+    damage(document)
+    (tmp_path / FILE).write_text(json.dumps(document))
+    before = (tmp_path / FILE).read_bytes()
+    for attempt in (lambda: read_views(tmp_path), lambda: change_views(tmp_path, lambda views: views)):
+        with pytest.raises(UserError, match=word):
+            attempt()
+    assert (tmp_path / FILE).read_bytes() == before
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"format": "lambent-store", "version": 1}', "[" * 100_000])
+def test_other_files_are_refused(tmp_path, text):
+    (tmp_path / FILE).write_text(text)
+    with pytest.raises(UserError, match=r"views\.json"):
+        read_views(tmp_path)
+
+
+def test_a_folder_that_is_gone_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        change_views(tmp_path / "file", lambda views: views)
+
+
+def test_names():
+    assert checked_name("  my/view ", {"other"}) == "my/view"
+    assert free_name("view", {"view 1", "view 3"}) == "view 2"
+    for bad in ("", "  ", "a\nb", "x" * 81, "taken"):
+        with pytest.raises(UserError):
+            checked_name(bad, {"taken"})
+
+
+def test_the_scene_hides_saved_names():
+    scene = SceneRecord(
+        name="s", objects=(), materials={}, cameras=(A,), paths=(PathRecord(name="w", keys=(A, B), seconds=1),),
+        bounds=((0, 0, 0), (1, 1, 1)),
+    )  # fmt: skip
+    whole = with_views(scene, Views(cameras=(A.model_copy(update={"fov_y_deg": 9}), B), paths=(WAY,)))
+    assert whole.cameras == (A, B) and whole.paths == scene.paths
+
+
+def test_a_recorded_path_keeps_its_times():
+    """It stands still for two of its three seconds; then it walks, through its keys."""
+    for time_s, x in ((-1, 0), (0, 0), (2, 0), (3, 2), (9, 2)):
+        assert camera_at(WAY, time_s).position == pytest.approx((x, 1, 0)), time_s
+    assert camera_at(WAY, 1.0).position[0] == pytest.approx(0, abs=0.2)
+    assert 0.3 < camera_at(WAY, 2.5).position[0] < 1.5
+    assert camera_at(WAY, 2.5).name == "w" and 45 < camera_at(WAY, 2.5).fov_y_deg < 60
+    straight = tuple(A.model_copy(update={"position": (float(k), 0.0, 0.0)}) for k in range(4))
+    even = TimedPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
+    assert [camera_at(even, t).position[0] for t in (1.25, 1.5, 1.75)] == pytest.approx([1.25, 1.5, 1.75])
