@@ -14,6 +14,7 @@ from lambent.core.plain import plain
 
 ALBEDO_AT_DEG = (0, 30, 60)
 HEAD_BYTES = 16
+SCENE_BYTES = 1 << 16  # in which a Mitsuba scene says that it is one
 PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
 Facts = dict[str, Any]
 
@@ -41,18 +42,23 @@ def command(
 
 def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
     """The function that understands a file, chosen by its place and its first bytes."""
+    from lambent.scenes.loaders.mitsuba.document import is_scene as is_mitsuba_scene
+
     path = Path(file)
-    if file.startswith("builtin:") or path.suffix.lower() in (".toml", ".glb", ".gltf", ".obj"):
+    if file.startswith("builtin:") or path.suffix.lower() in (".toml", ".glb", ".gltf", ".obj", ".ply"):
         return inspect_scene
     if path.is_dir():
         return inspect_store
     try:
         with path.open("rb") as stream:
             head = stream.read(HEAD_BYTES)
+            start = head + stream.read(SCENE_BYTES)
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror})", file=file) from error
     if head.startswith(PICTURES):
         return inspect_picture
+    if is_mitsuba_scene(start):
+        return inspect_scene
     if head.lstrip().startswith(b"{"):
         return inspect_material
     return inspect_table

@@ -19,6 +19,11 @@ def validate(scene: Scene) -> list[str]:
         said += [f"{o.name}: {what}" for what in mesh_faults(o.mesh)]
         if o.material not in scene.materials:
             said.append(f"{o.name}: its material {o.material} is not described")
+        textures = scene.textures.get(o.material)
+        if textures is not None and (textures.normal is not None or textures.direction is not None):
+            mirrored = mirrored_share(o.mesh)
+            if mirrored > 0.01:
+                said.append(f"{o.name}: uv are mirrored on {mirrored:.0%} of its area: its normal map is turned there")
     if scene.environment is None and not scene.lights and not any(any(o.emission) for o in scene.objects):
         said.append("nothing gives light")
     if not scene.cameras:
@@ -58,6 +63,15 @@ def mesh_faults(mesh: Mesh) -> list[str]:
     if np.ptp(mesh.uv, axis=0).max() == 0:
         said.append("has no uv")
     return said
+
+
+def mirrored_share(mesh: Mesh) -> float:
+    """Share of the area on which v runs against n x t, as on halves that share one picture."""
+    a, b, c = (mesh.uv[mesh.faces[:, i]].astype(float) for i in range(3))
+    e1, e2 = b - a, c - a
+    turn = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+    area = areas(mesh.positions, mesh.faces)
+    return float(area[turn < 0].sum() / max(area.sum(), 1e-30))
 
 
 def _facing(mesh: Mesh) -> Floats:

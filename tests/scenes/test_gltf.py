@@ -6,6 +6,7 @@ import base64
 import json
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -257,6 +258,9 @@ def test_normal_maps_and_the_direction_of_anisotropy(tmp_path: Path) -> None:
     assert textures.normal is not None and textures.direction is not None
     assert np.allclose(textures.normal.texels, [[(0, 0, 1), (1, 0, 0)]], atol=0.02)
     assert np.allclose(textures.direction.texels, [[(0, 1), (-1, 0)]], atol=0.02)  # turned by a right angle
+    assert validate(scene) == []
+    mirrored = replace(scene.objects[0], mesh=replace(scene.objects[0].mesh, uv=scene.objects[0].mesh.uv * (-1, 1)))
+    assert "mirrored on 100%" in validate(replace(scene, objects=(mirrored,)))[0]
     lobe = scene.materials["m"].lobes[0]
     assert lobe.my == pytest.approx(0.09) and lobe.mx == pytest.approx(0.09 + 0.91 * (0.8 * 128 / 255) ** 2, rel=1e-3)
 

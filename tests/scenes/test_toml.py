@@ -12,7 +12,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
 from lambent.scenes.loaders.schema import SceneDocument, known_keys
-from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 MATERIALS = """
@@ -120,6 +120,8 @@ WRONG = {
     MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
     "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
     "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
+    MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",
+    "variant = 'oak'": r"variant: unknown variant; found oak; the geometry has none",
     "[[paths]]\nname='a'\nkeys=[]": r"paths.0.keys.*at least 2",
     "[[lights]]\nkind='laser'": r"lights.0.*laser",
     "name = ": r"not a TOML document",
@@ -135,6 +137,71 @@ def test_what_is_wrong_is_one_line_that_names_file_and_field(tmp_path: Path, tex
     said = str(caught.value)
     assert re.search(WRONG[text], said), said
     assert "\n" not in said and said.startswith(str(path)), said
+
+
+ASSIGN = (
+    MATERIALS
+    + """
+[assign]
+"s*" = "metal"
+"gre?n" = "red"
+"Wood*" = "white"
+"""
+)
+
+
+def test_materials_are_assigned_by_pattern(tmp_path: Path) -> None:
+    """Patterns fit names of objects and of the materials they came with; [objects] has the last word."""
+    plain = load_scene(written(tmp_path, MATERIALS))
+    green = [o.name for o in plain.objects if o.material == "green"]
+    scene = load_scene(written(tmp_path, ASSIGN))
+    assert green and all(scene.object(name).material == "red" for name in green)
+    assert scene.object("sphere").material == "metal"
+    assert [w for w in scene.warnings if "assign" in w] == [
+        "assign.Wood* fits no object and no material: see the names with `lambent inspect`"
+    ]
+    over = load_scene(written(tmp_path, ASSIGN + '[objects.sphere]\nmaterial = "black"\n'))
+    assert over.object("sphere").material == "black"
+    near = load_scene(written(tmp_path, MATERIALS + '[assign]\nspher = "metal"\n'))
+    assert "assign.spher fits no object and no material: did you mean 'sphere'?" in near.warnings
+
+
+def test_a_material_of_the_scene_puts_away_the_files_picture(tmp_path: Path) -> None:
+    """Described anew or assigned, a material of the geometry file loses its texture; two files' names stay apart."""
+    from PIL import Image
+
+    Image.fromarray(np.uint8([[[255, 0, 0], [0, 0, 0]]])).save(tmp_path / "wood.png")
+    square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nmtllib {}.mtl\nusemtl Wood_01\nf 1/1 2/2 3/3\n"
+    for name, line in (("a", "map_Kd wood.png"), ("b", "Kd 0.1 0.1 0.1")):
+        (tmp_path / f"{name}.obj").write_text(f"o {name}\n" + square.format(name))
+        (tmp_path / f"{name}.mtl").write_text(f"newmtl Wood_01\n{line}\n")
+    head = HEAD.replace('"builtin:box"', '["a.obj", "b.obj"]')
+    scene = load_scene(written(tmp_path, "", head))
+    assert set(scene.textures) == {"Wood_01"} and scene.object("b").material == "Wood_01_2"
+    assert "the second is now Wood_01_2" in " ".join(scene.warnings)
+    walnut = "[materials.walnut]\nkd = 0.3\n"
+    scene = load_scene(written(tmp_path, walnut + '[assign]\n"Wood*" = "walnut"\n', head))
+    assert {o.material for o in scene.objects} == {"walnut"} and "walnut" not in scene.textures
+    scene = load_scene(written(tmp_path, "[materials.Wood_01]\nkd = 0.3\n", head))
+    assert scene.object("a").material == "Wood_01" and scene.textures == {}
+
+
+def test_a_measurement_is_no_material_yet(tmp_path: Path) -> None:
+    (tmp_path / "oak.txt").write_text("theta_i phi_i theta_o phi_o brdf\n" + "0 0 30 0 0.1\n0 0 60 0 0.1\n" * 4)
+    with pytest.raises(UserError, match=r"materials.oak.file: is a measurement.*lambent fit oak.txt -o oak.json"):
+        load_scene(written(tmp_path, '[materials.oak]\nfile = "oak.txt"\n'))
+
+
+def test_a_mitsuba_scene_as_geometry(tmp_path: Path) -> None:
+    """Its light and cameras come with it, unless the scene says otherwise."""
+    (tmp_path / "room.xml").write_text("""<scene version="3.0.0"><shape type="cube" id="box"/>
+        <emitter type="constant"><rgb name="radiance" value="0.5"/></emitter><sensor type="perspective" id="eye">
+        <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0"/></transform></sensor></scene>""")
+    head = HEAD.replace("builtin:box", "room.xml")
+    scene = load_scene(written(tmp_path, "", head))
+    assert scene.environment == ConstantEnvironment((0.5,) * 3) and [c.name for c in scene.cameras] == ["eye"]
+    own = load_scene(written(tmp_path, "[environment]\nkind = 'constant'\nradiance = [1.0, 2.0, 3.0]\n", head))
+    assert own.environment == ConstantEnvironment((1, 2, 3))
 
 
 @pytest.mark.parametrize("geometry", ["../room.glb", "/etc/passwd", "a/../../b.glb"])

@@ -15,6 +15,7 @@ from lambent.scenes.loaders.gltf import read_gltf
 from lambent.scenes.loaders.mitsuba.scene import read_mitsuba
 from lambent.scenes.loaders.obj import read_obj
 from lambent.scenes.loaders.parts import Parts
+from lambent.scenes.loaders.ply import read_ply
 from lambent.scenes.loaders.toml import inside_scene, load_toml
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.validation import size_warnings
@@ -22,7 +23,7 @@ from lambent.scenes.validation import size_warnings
 BUILTIN_PREFIX = "builtin:"
 BUILTIN: dict[str, Callable[[], tuple[SceneObject, ...]]] = {"room": room, "box": box}
 READERS: dict[str, Callable[[Path, Path | None], Parts]] = {
-    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".xml": read_mitsuba
+    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".xml": read_mitsuba, ".ply": read_ply,
 }  # fmt: skip
 
 
@@ -32,8 +33,8 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj or Mitsuba's .xml; what such a
-        file does not tell, light and a camera, it gets.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light
+        and a camera, where such a file has none, are added.
 
     Raises
     ------

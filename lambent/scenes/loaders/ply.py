@@ -10,7 +10,11 @@ import numpy as np
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.frames import Floats
-from lambent.scenes.loaders.polygons import Ints, triangulate
+from lambent.materials.document import Material
+from lambent.scenes.loaders.parts import Parts
+from lambent.scenes.loaders.polygons import Ints, smooth_normals, triangulate
+from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.scene import SceneObject
 
 LIMIT_BYTES = 4 << 30
 HEADER_MAX = 1 << 16
@@ -77,6 +81,21 @@ def read(path: Path) -> Arrays:
     named = next((pair for pair in UV_NAMES if all(n in vertex for n in pair)), None)
     uv = np.stack([vertex[n] for n in named], axis=-1) if named else None
     return Arrays(positions, normals, uv, corners[places])
+
+
+def read_ply(path: Path, root: Path | None = None) -> Parts:
+    """A file as one grey object; v points up, missing normals are smooth."""
+    arrays = read(path)
+    normals = arrays.normals
+    if normals is None and len(arrays.triangles):
+        normals = np.zeros_like(arrays.positions)
+        made = smooth_normals(arrays.positions, arrays.triangles, arrays.triangles)
+        normals[: len(made)] = made
+    mesh, said = mesh_of(arrays.positions, arrays.triangles, normals, arrays.uv, None, name=path.stem, file=path)
+    if mesh is None:
+        raise UserError("holds no triangles", file=path, hint="; ".join(said) or None)
+    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
+    return Parts((SceneObject(path.stem, mesh, grey.name),), {grey.name: grey}, sources=(path,), warnings=tuple(said))
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:

@@ -24,24 +24,31 @@ from lambent.scenes.loaders.surface import BLACK, ROUGHNESS_MIN, Gloss, Surface,
 from lambent.scenes.loaders.varying import Varying, absolute, combined, constant
 
 GREY = 0.5
+GLOSSES_MAX = 16
 WHITE = np.ones(3)
 NOTHING = ("null",)  # surfaces that are not there
 
 
 def surface_of(plugin: Plugin) -> Surface:
     """The surface a BSDF describes; one of an unknown kind is grey, or what is nested in it."""
-    make = KINDS.get(plugin.type)
-    if make is None:
-        inner = plugin.objects("bsdf")
-        if plugin.type == "measured":
-            plugin.say("measured files in it are not read, it is grey: fit it and assign the fit")
-        else:
-            instead = "what is nested in it stands" if inner else "it is grey"
-            plugin.say(f"unknown, {instead}")
-        return surface_of(inner[0]) if inner else grey()
-    surface = make(plugin)
-    plugin.say_unread()
-    return surface
+    known = plugin.reading.surfaces
+    key = id(plugin.element)
+    if key not in known:
+        surface = KINDS.get(plugin.type, _unknown)(plugin)
+        if len(surface.glosses) > GLOSSES_MAX:
+            raise plugin.element.error("too many lobes", got=len(surface.glosses), expected=f"at most {GLOSSES_MAX}")
+        plugin.say_unread()
+        known[key] = surface
+    return known[key]
+
+
+def _unknown(plugin: Plugin) -> Surface:
+    inner = plugin.objects("bsdf")
+    if plugin.type == "measured":
+        plugin.say("measured files in it are not read, it is grey: fit it and assign the fit")
+    else:
+        plugin.say(f"unknown, {'what is nested in it stands' if inner else 'it is grey'}")
+    return surface_of(inner[0]) if inner else grey()
 
 
 def normal_reflectance(eta: float) -> float:

@@ -18,8 +18,8 @@ from lambent.scenes.loaders.place import named
 LIMIT_BYTES = 256 << 20
 ELEMENTS_MAX, DEPTH_MAX, FILES_MAX, TEXT_MAX = 1_000_000, 64, 64, 1 << 20
 OLD_TAGS = {"camera": "sensor", "luminaire": "emitter", "lookAt": "lookat"}
-OLD_NAMES = {"int_i_o_r": "int_ior", "ext_i_o_r": "ext_ior"}
 _PARAMETER = re.compile(r"\$(\w+)")
+_SCENE = re.compile(rb"(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<scene[\s>/]", re.DOTALL)
 _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 
 
@@ -70,8 +70,7 @@ def snake(name: str) -> str:
 
 def is_scene(head: bytes) -> bool:
     """Whether a file that begins with `head` is a Mitsuba scene."""
-    plain = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
-    return plain.startswith(b"<") and re.search(rb"<scene[\s>/]", plain) is not None
+    return _SCENE.match(head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe")) is not None
 
 
 def load(path: Path, root: Path) -> Document:

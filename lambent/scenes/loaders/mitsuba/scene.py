@@ -17,14 +17,14 @@ from lambent.materials.document import Material
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
 from lambent.scenes.loaders.mitsuba.document import load
-from lambent.scenes.loaders.mitsuba.shapes import mesh_of_shape, stem_of
+from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of, floats_of
 from lambent.scenes.loaders.parts import Parts, unique_name
 from lambent.scenes.loaders.surface import finished
 from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject
 
 TRIANGLES_MAX = 20_000_000
-GROUPS = ("shapegroup", "merge")
+GROUPS = ("shapegroup", "instance", "merge")
 LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
 UNREAD = {"medium": "participating media are not read", "volume": "volumes are not read",
           "subsurface": "subsurface scattering is not read"}  # fmt: skip
@@ -54,6 +54,7 @@ class _Scene:
         self._by_element: dict[int, str] = {}
         self._names: set[str] = set()
         self._material_names: set[str] = set()
+        self._local: dict[int, Made] = {}
         self._triangles = 0
         self._warnings: list[str] = []
 
@@ -92,7 +93,7 @@ class _Scene:
         if shape.type == "shapegroup":
             return  # what instances show
         if shape.type == "merge":
-            for inner in shape.objects("shape"):
+            for inner in shape.objects("shape", refs=False):
                 self._add_shape(inner, world)
             return
         emission = lights.emission_of(shape)
@@ -104,7 +105,7 @@ class _Scene:
             shape.say("left out, it has no surface (null)")
             return
         wanted = stem_of(shape)
-        mesh, said = mesh_of_shape(shape, wanted, world)
+        mesh, said = mesh_of_shape(shape, wanted, world, self._local)
         self._warnings += said
         if mesh is None:
             return
@@ -123,7 +124,9 @@ class _Scene:
         for group in shape.objects("shape"):
             if group.type != "shapegroup":
                 shape.say("its shape is not a shapegroup")
-            for inner in group.objects("shape"):
+            for inner in group.objects("shape", refs=False):
+                if inner.type in GROUPS:
+                    raise inner.element.error("groups within groups are not read")
                 self._add_shape(inner, placed)
         shape.say_unread()
 

@@ -18,18 +18,27 @@ from lambent.scenes.loaders.polygons import Ints, smooth_normals
 from lambent.scenes.loaders.repair import mesh_of
 from lambent.scenes.scene import Mesh
 
-AROUND, ROWS = 96, 48  # quads of a sphere
+AROUND, ROWS = 80, 40  # quads of a sphere
 UNSCALED = 1e-18  # determinant of a transform that leaves nothing
 Made = tuple[Mesh | None, list[str], bool]  # the mesh, what was repaired, whether its normals come from its faces
 
 
-def mesh_of_shape(plugin: Plugin, name: str, world: Floats) -> tuple[Mesh | None, list[str]]:
-    """Mesh of a shape under `world` (4, 4) and what was repaired; None where nothing is left."""
+def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Made]) -> tuple[Mesh | None, list[str]]:
+    """Mesh of a shape under `world` (4, 4) and what was repaired; None where nothing is left.
+
+    `known` remembers the shapes of instances before they are moved.
+    """
     make = KINDS.get(plugin.type)
     if make is None:
         return None, [f"{plugin.label}: left out, a shape of an unknown kind"]
     to_world = world @ plugin.transform()
-    local, said, from_faces = make(plugin, name)
+    key = id(plugin.element)
+    if key in known:
+        local, said, from_faces = known[key]
+        plugin.ignore("center", "radius", "p0", "p1", "filename", "shape_index", "face_normals", "flip_tex_coords")
+        said = []
+    else:
+        local, said, from_faces = known[key] = make(plugin, name)
     if local is None:
         return None, said
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:

@@ -14,12 +14,13 @@ from lambent.core.frames import Floats, normalize
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 from lambent.scenes.loaders.pictures import Pictures
 from lambent.scenes.loaders.place import named
+from lambent.scenes.loaders.surface import Surface
 
 OBJECTS = {
     "bsdf", "texture", "shape", "emitter", "sensor", "film", "sampler", "rfilter", "medium", "phase", "volume",
     "integrator", "subsurface",
 }  # fmt: skip
-PLUGINS_MAX = 200_000
+PLUGINS_MAX = 400_000
 NESTING_MAX = 32
 # Filters, caches, samplers: how Mitsuba works, not what the scene is.
 MACHINERY = {
@@ -35,6 +36,7 @@ class Reading:
     def __init__(self, document: Document) -> None:
         self.document, self.pictures = document, Pictures()
         self.said: list[str] = []
+        self.surfaces: dict[int, Surface] = {}  # by BSDF element: one that is referred to often is read once
         self.sources = list(document.sources)
         self._plugins = 0
 
@@ -51,7 +53,7 @@ class Reading:
 class Plugin:
     """A plugin's element and its parameters, each remembered once it was asked for."""
 
-    def __init__(self, element: Element, reading: Reading, trail: tuple[int, ...] = ()) -> None:
+    def __init__(self, element: Element, reading: Reading, trail: tuple[int, ...] = (), within: str = "") -> None:
         reading.count_plugin(element)
         if id(element) in trail:
             raise element.error("contains itself", got=element.id)
@@ -59,6 +61,7 @@ class Plugin:
             raise element.error("is nested too deep", expected=f"at most {NESTING_MAX}")
         self.element, self.reading = element, reading
         self._trail = (*trail, id(element))
+        self._within = element.id or within
         self._values: dict[str, Element] = {}
         self._objects: list[tuple[str, Element]] = []
         for child in element.children:
@@ -83,17 +86,19 @@ class Plugin:
 
     @property
     def label(self) -> str:
-        """What to call it in a warning."""
-        return " ".join(filter(None, (self.element.tag, self.element.id, self.type and f"({self.type})")))
+        """What to call it in a warning: by its id, or that of what it is in."""
+        return " ".join(filter(None, (self.element.tag, self._within, self.type and f"({self.type})")))
 
     def say(self, text: str) -> None:
         self.reading.say(f"{self.label}: {text}")
 
-    def objects(self, tag: str, name: str | None = None) -> list[Plugin]:
-        """Plugins of one kind within it, in order; of one name where that is given."""
+    def objects(self, tag: str, name: str | None = None, *, refs: bool = True) -> list[Plugin]:
+        """Plugins of one kind within it, in order; of one name where that is given; `refs` with those referred to."""
         found = [(n, e) for n, e in self._objects if e.tag == tag and name in (None, n)]
+        if not refs:
+            found = [(n, e) for n, e in found if any(e is child for child in self.element.children)]
         self._asked |= {n or e.tag for n, e in found}
-        return [Plugin(e, self.reading, self._trail) for _, e in found]
+        return [Plugin(e, self.reading, self._trail, self._within) for _, e in found]
 
     def has(self, *names: str) -> bool:
         return any(n in self._values or any(n == o for o, _ in self._objects) for n in names)
@@ -258,8 +263,9 @@ def _blackbody(element: Element) -> Floats:
 def transform_of(element: Element) -> Floats:
     """(4, 4) of a transform: its parts one after the other, each applied to what the others made."""
     matrix = np.eye(4)
-    for part in element.children:
-        matrix = _part(part) @ matrix
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by whoever asked
+        for part in element.children:
+            matrix = _part(part) @ matrix
     return matrix
 
 
