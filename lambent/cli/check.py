@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lambent.materials.document import Material
     from lambent.materials.measured.protocol import MeasuredTable
     from lambent.materials.models.model import Model
+    from lambent.materials.normalise import Normalisation
 
 
 def command(
@@ -24,6 +25,10 @@ def command(
         list[str] | None, typer.Option("--set", help="Parameter of a model: NAME=VALUE or NAME=R,G,B; repeatable.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same report.")] = 0,
+    normalise: Annotated[
+        bool, typer.Option("--normalise", help="Write a document's energy-safe version instead: alpha lowered, then k.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("-o", help="With --normalise: document to write (.json).")] = None,
     json: Json = False,
 ) -> None:
     """Check reciprocity, energy, and the sampler by chi-square and hemisphere integrals.
@@ -31,7 +36,11 @@ def command(
     Of a measured table the percentages are reported, and what no device explains fails.
     The exit code is 1 when the check fails.
 
+    --normalise says what changed and by how much; where no direction returns more than arrives, nothing is written.
+
     Example: lambent check brushed.json
+
+    Example: lambent check brushed.json --normalise -o brushed-safe.json
 
     Example: lambent check ward --set mx=0.05 --set my=0.3
     """
@@ -41,6 +50,9 @@ def command(
     from lambent.materials.models.model import Model
 
     report: CheckReport | TableReport
+    if normalise or output is not None:
+        _normalise(subject, values or [], normalise, output, seed, json)
+        return
     found = _subject(subject, values or [])
     with progress_bar() as progress:
         if isinstance(found, Material | Model):
@@ -52,6 +64,31 @@ def command(
     show(report.to_json(), text, json)
     if not report.passed:
         raise typer.Exit(1)
+
+
+def _normalise(subject: str, values: list[str], asked: bool, output: Path | None, seed: int, json: bool) -> None:
+    """Write the energy-safe version of a material document, where it needs one."""
+    from lambent.core.images import check_writable
+    from lambent.materials.document import Material
+    from lambent.materials.models.model import Model
+    from lambent.materials.normalise import normalisation
+
+    if not asked or output is None:
+        lacks = "-o is" if output is None else "--normalise is"
+        raise UserError("--normalise and -o go together", hint=f"{lacks} missing: --normalise -o OUT.json")
+    check_writable(output, (".json",))
+    found = _subject(subject, values)
+    if not isinstance(found, Material):
+        hint = None if isinstance(found, Model) else f"fit it first: lambent fit {subject} -o material.json"
+        kind = "a model" if isinstance(found, Model) else "a table"
+        got, file = (subject, None) if isinstance(found, Model) else (None, subject)
+        raise UserError(f"only material documents can be normalised, not {kind}", file=file, got=got, hint=hint)
+    with progress_bar() as progress:
+        done = normalisation(found, seed, progress)
+    if done.needed:
+        done.after.save(output)
+    facts = done.to_json() | {"written": output if done.needed else None}
+    show(facts, describe_normalisation(done, output), json)
 
 
 def _subject(name: str, values: list[str]) -> Material | MeasuredTable | Model:
@@ -101,6 +138,26 @@ def describe_table(report: TableReport) -> str:
         for one in report.integrals
     ]
     return _with_verdict(rows + _sampler_rows(report.sampler), report)
+
+
+def describe_normalisation(done: Normalisation, output: Path) -> str:
+    """What changed, by how much under the metrics, and what was written."""
+    from lambent.materials.fitting.metrics import METRICS
+
+    where = "highest albedo {:.4f} at theta {:g} deg, phi {:g} deg"
+    if not done.needed:
+        return f"{where.format(*done.highest[0])}: nothing exceeds 1, nothing written"
+    rows: list[tuple[str, ...]] = [("changed", "before", "after")]
+    rows += [(name, _shown(was), _shown(now)) for name, (was, now) in done.changed.items()]
+    rows.append(("highest albedo", *(f"{albedo:.4f} at theta {theta:g} deg" for albedo, theta, _ in done.highest)))
+    errors: list[tuple[str, ...]] = [("error", "absolute", "unit", "of its size")]
+    errors += [(name, f"{value:.3g}", METRICS[name].unit, f"{done.share[name]:.2%}")
+               for name, value in done.errors.items()]  # fmt: skip
+    return f"{table(rows)}\n\n{table(errors)}\n\n{output}: written"
+
+
+def _shown(value: float | tuple[float, ...]) -> str:
+    return " ".join(f"{number:.4g}" for number in (value if isinstance(value, tuple) else (value,)))
 
 
 def _energy_rows(furnace: Furnace) -> list[tuple[str, ...]]:

@@ -1,15 +1,21 @@
-"""A material that returns more light than arrives, made one that does not."""
+"""A material that returns more light than arrives, made one that does not, and how much that changes it."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.frames import Floats
+from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check import furnace
 from lambent.materials.document import RGB, Lobe, Material
+from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
+from lambent.materials.fitting.metrics import errors_of
 
 MARGIN = 0.999  # for the furnace's own error
 HALVINGS = 6  # of the interval in which alpha's factor lies
@@ -17,7 +23,77 @@ ROUGHLY = 1 << 11  # samples of the furnace meanwhile; `with_less_k` has the las
 PAIRS = 20_000
 
 
-def normalised(material: Material, seed: int = 0) -> Material:
+NOTE = "normalised so that no direction returns more than arrives; the errors are those of before"
+
+
+@dataclass(frozen=True)
+class Normalisation:
+    """A material before and after `normalised`, and what that did.
+
+    Attributes
+    ----------
+    before, after : Material
+        The same object where nothing exceeded 1.
+    highest : tuple of (albedo, theta_deg, phi_deg)
+        Largest directional albedo before and after, and where.
+    changed : dict
+        Parameter -> its values before and after.
+    errors, share : dict of float
+        Metric name -> E between both, in the metric's unit, and as a share of E between `before` and black.
+    """
+
+    before: Material
+    after: Material
+    highest: tuple[tuple[float, float, float], tuple[float, float, float]]
+    changed: dict[str, tuple[Any, Any]]
+    errors: dict[str, float]
+    share: dict[str, float]
+
+    @property
+    def needed(self) -> bool:
+        return self.after is not self.before
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers, strings and lists; the materials as documents."""
+        documents = {name: getattr(self, name).model_dump(mode="json") for name in ("before", "after")}
+        figures = {name: getattr(self, name) for name in ("changed", "errors", "share")}
+        keys = ("albedo", "theta_deg", "phi_deg")
+        return documents | figures | {"highest": [dict(zip(keys, one, strict=True)) for one in self.highest]}
+
+
+def normalisation(material: Material, seed: int = 0, progress: Progress = silent) -> Normalisation:
+    """`normalised`, with its account; seconds to a minute, deterministic for a seed.
+
+    Raises
+    ------
+    UserError
+        Where the diffuse terms alone exceed 1.
+    """
+    after = normalised(material, seed, progress)
+    before = furnace(material, seed=seed).highest
+    if after is material:
+        return Normalisation(material, material, (before, before), {}, {}, {})
+    samples = pairs_of(material, CHECK_LOG2, seed).samples
+    f = MaterialBSDF(after).eval(samples.wi, samples.wo)[:, : samples.f.shape[1]]
+    errors, black = errors_of(samples, f), errors_of(samples, np.zeros_like(f))
+    share = {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}
+    if after.provenance is not None:
+        notes = (*after.provenance.notes, NOTE)
+        after = after.model_copy(update={"provenance": after.provenance.model_copy(update={"notes": notes})})
+    highest = before, furnace(after, seed=seed).highest
+    return Normalisation(material, after, highest, _changed(material, after), errors, share)
+
+
+def _changed(before: Material, after: Material) -> dict[str, tuple[Any, Any]]:
+    return {
+        f"lobes[{i}].{name}": (was, now)
+        for i, (old, new) in enumerate(zip(before.lobes, after.lobes, strict=True))
+        for name, was in old.model_dump().items()
+        if was != (now := getattr(new, name))
+    }
+
+
+def normalised(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
     """The material changed so that no furnace angle (theta up to 89 degrees) exceeds 1.
 
     Of two remedies the one that changes the looks less (`change`): all k scaled, per channel; or all alpha scaled
@@ -32,9 +108,12 @@ def normalised(material: Material, seed: int = 0) -> Material:
     diffuse = np.add(material.kd, material.kt_d)
     if diffuse.max() > 1:
         raise UserError("diffuse terms exceed 1 without any lobe", field="kd + kt_d", got=diffuse.tolist())
+    progress(0, HALVINGS + 2, "normalising")
     if not _excess(material, seed).any():
         return material
-    remedies = with_less_k(material, seed), with_less_k(with_less_alpha(material, seed), seed)
+    flatter = with_less_alpha(material, seed, progress)
+    remedies = with_less_k(material, seed), with_less_k(flatter, seed)
+    progress(HALVINGS + 2, HALVINGS + 2, "normalised")
     return min(remedies, key=lambda remedy: change(material, remedy, seed))
 
 
@@ -45,10 +124,11 @@ def with_less_k(material: Material, seed: int = 0) -> Material:
     return material.model_copy(update={"lobes": tuple(_scaled(lobe, scale) for lobe in material.lobes)})
 
 
-def with_less_alpha(material: Material, seed: int = 0) -> Material:
+def with_less_alpha(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
     """All alpha scaled by the largest factor with which nothing exceeds 1; 0 where none is small enough."""
     low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
+    for halving in range(HALVINGS):
+        progress(1 + halving, HALVINGS + 2, "normalising")
         middle = (low + high) / 2
         low, high = (low, middle) if _excess(_flatter(material, middle), seed, ROUGHLY).any() else (middle, high)
     return _flatter(material, low)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lambent.materials import check, check_table
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Lobe, Material, load_material
 from lambent.materials.measured import half_vector_grid
 from lambent.materials.measured.gonio_text import write_gonio
 from lambent.materials.measured.synthetic import Setup, synthesise
@@ -62,3 +62,51 @@ def test_files_take_no_parameters(refused, tmp_path):
 def test_an_empty_document(refused, tmp_path):
     (tmp_path / "m.json").write_text("{}")
     assert "nothing of how it scatters" in refused("check", tmp_path / "m.json")
+
+
+STEEP = Material(kd=0.1, lobes=(Lobe(mx=0.4, my=0.4, k=0.8, r0=1, alpha=1),))
+
+
+@pytest.fixture
+def one_azimuth(monkeypatch):
+    """Isotropic materials need no more."""
+    monkeypatch.setattr(check, "PHI_DEG", (0.0,))
+
+
+@pytest.mark.usefixtures("one_azimuth")
+def test_normalise_writes_the_safe_version(lambent, tmp_path):
+    STEEP.save(tmp_path / "m.json")
+    outcome = lambent("check", tmp_path / "m.json", "--normalise", "-o", tmp_path / "safe.json", "--json")
+    assert outcome.code == 0 and outcome.json["written"] == str(tmp_path / "safe.json")
+    before, after = outcome.json["highest"]
+    assert before["albedo"] > 1 >= after["albedo"] and outcome.json["share"]["cuberoot"] > 0
+    safe = load_material(tmp_path / "safe.json")
+    assert 0 < safe.lobes[0].alpha < 1 and outcome.json["changed"]["lobes[0].alpha"] == [1, safe.lobes[0].alpha]
+    again = lambent("check", tmp_path / "safe.json", "--normalise", "-o", tmp_path / "again.json")
+    assert again.code == 0 and "nothing written" in again.out and not (tmp_path / "again.json").exists()
+
+
+@pytest.mark.usefixtures("one_azimuth")
+def test_normalise_says_what_changed(lambent, tmp_path):
+    STEEP.save(tmp_path / "m.json")
+    outcome = lambent("check", tmp_path / "m.json", "--normalise", "-o", tmp_path / "safe.json")
+    assert "lobes[0].alpha" in outcome.out and "cuberoot" in outcome.out and "safe.json: written" in outcome.out
+
+
+def test_only_documents_are_normalised(refused, tmp_path):
+    out = tmp_path / "out.json"
+    assert "not a model" in refused("check", "ward", "--normalise", "-o", out)
+    setup = Setup((0.0, 30.0, 60.0), step_deg=20, fine_deg=10, noise=0.0, floor=0.0)
+    write_gonio(tmp_path / "m.txt", synthesise(STEEP, setup))
+    assert "fit it first" in refused("check", tmp_path / "m.txt", "--normalise", "-o", out)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [(["--normalise"], "-o is missing"), (["-o", "x.json"], "--normalise is missing"),
+     (["--normalise", "-o", "x.png"], "expected .json")],
+)  # fmt: skip
+def test_normalise_and_its_output_go_together(refused, tmp_path, monkeypatch, arguments, complaint):
+    monkeypatch.chdir(tmp_path)
+    assert complaint in refused("check", "ward", *arguments)

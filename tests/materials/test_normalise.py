@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.materials import check
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check import check_sampler, furnace
-from lambent.materials.document import Lobe, Material
-from lambent.materials.normalise import change, normalised, with_less_alpha, with_less_k
+from lambent.materials.document import Lobe, Material, Provenance
+from lambent.materials.normalise import NOTE, change, normalisation, normalised, with_less_alpha, with_less_k
 from tests.materials.test_check import BRUSHED, FOIL
 
 STEEP = Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))
@@ -39,3 +40,35 @@ def test_normalised_leaves_alone_what_needs_nothing():
 def test_normalised_refuses_diffuse_terms_over_one():
     with pytest.raises(UserError, match="kd"):
         normalised(Material(kd=0.8, kt_d=0.3))
+
+
+@pytest.fixture
+def one_azimuth(monkeypatch):
+    """Isotropic materials need no more."""
+    monkeypatch.setattr(check, "PHI_DEG", (0.0,))
+
+
+@pytest.mark.usefixtures("one_azimuth")
+def test_the_account_names_what_changed_and_by_how_much():
+    provenance = Provenance(source="steep.txt", notes=("first",))
+    done = normalisation(STEEP.model_copy(update={"provenance": provenance}))
+    assert done.needed and done.highest[0][0] > 1 >= done.highest[1][0]
+    was, now = done.changed["lobes[0].alpha"]
+    assert was == 1 and now == done.after.lobes[0].alpha
+    assert "lobes[0].mx" not in done.changed
+    assert set(done.errors) == set(done.share) and all(0 < share < 1 for share in done.share.values())
+    assert done.after.provenance.notes == ("first", NOTE)
+
+
+@pytest.mark.usefixtures("one_azimuth")
+def test_scaling_k_is_an_error_of_its_share():
+    """k alone is scaled where alpha is 0: f of the lobe by one factor, so L1 is that share of a lobe without kd."""
+    done = normalisation(Material(lobes=(Lobe(k=1.6, mx=0.2, my=0.2, r0=1),)))
+    was, now = done.changed["lobes[0].k"]
+    assert list(done.changed) == ["lobes[0].k"] and was == (1.6, 1.6, 1.6)
+    assert done.share["l1"] == pytest.approx(1 - now[0] / 1.6, rel=1e-6)
+
+
+def test_the_account_of_what_needs_nothing():
+    done = normalisation(BRUSHED)
+    assert not done.needed and done.after is BRUSHED and not done.changed and not done.errors
