@@ -214,6 +214,7 @@ class PatchSheet:
 
 
 Lookup = HalfVectorGrid | PatchSheet
+_TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow the mirror direction between viewers
 
 
 def lookup_of(
@@ -224,7 +225,11 @@ def lookup_of(
     `reverse`: the light's direction is given and the viewer's is sampled; `wi` and `wo` are exchanged in all methods.
     """
     sheet = patch_sheet_of(table, reverse=reverse)
-    return sheet if sheet is not None else grid_of(Reversed(table) if reverse else table, shape, progress)
+    if sheet is not None:
+        return sheet
+    if shape is None and isinstance(table, LbnlTable) and table.info.isotropic:
+        shape = _TREE
+    return grid_of(Reversed(table) if reverse else table, shape, progress)
 
 
 def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:
