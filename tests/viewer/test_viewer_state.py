@@ -99,7 +99,8 @@ def test_a_material_is_saved_as_it_is_now(state, tmp_path):
     state.edits.change("brass", edited)
     state.file_names["brass"] = "new brass.json"
     state.save_material("brass")
-    assert load_material(tmp_path / "new brass.json") == edited
+    saved = load_material(tmp_path / "new brass.json")
+    assert saved.lobes == edited.lobes and saved.kd == edited.kd
     assert state.messages[-1].text == "saved new brass.json"
 
 
@@ -131,3 +132,38 @@ def test_a_path_plays_to_its_end_and_again(state, scene):
     assert not state.playing and state.camera.position == pytest.approx(tour.keys[1].position)
     state.toggle(tour)
     assert state.playing and state.path.time_s == 0
+
+
+def test_unsaved_materials_are_known_and_rescued(state, tmp_path):
+    assert state.unsaved == ()
+    state.edits.change("brass", rougher(state.scene.materials["brass"], 0.2))
+    state.edits.end_stroke()
+    assert state.unsaved == ("brass",)
+    state.save_material("brass")
+    assert state.unsaved == ()
+    state.edits.change("brass", rougher(state.scene.materials["brass"], 0.4))
+    assert state.unsaved == ("brass",)
+    (path,) = state.rescue_materials()
+    assert path == tmp_path / "brass-rescued-001.json" and load_material(path).lobes[0].mx == 0.4
+    state.edits.undo()
+    state.edits.reset("brass")
+    assert state.unsaved == ()
+
+
+def test_a_material_that_was_changed_by_hand_says_so(state, tmp_path):
+    state.save_material("brass")
+    assert load_material(tmp_path / "brass.json").provenance == state.scene.materials["brass"].provenance
+    state.edits.change("brass", rougher(state.scene.materials["brass"], 0.2))
+    state.save_material("brass")
+    assert load_material(tmp_path / "brass.json").provenance.notes == ("edited by hand",)
+
+
+def test_who_grows_is_lifted(state):
+    before = state.camera
+    state.set_eye_height(state.walker.eye_height_m + 0.3)
+    assert state.camera.position[1] == pytest.approx(before.position[1] + 0.3)
+    state.flying = True
+    state.set_eye_height(1.0)
+    assert state.camera.position[1] == pytest.approx(before.position[1] + 0.3)
+    state.set_fov(20.0)
+    assert state.camera.fov_y_deg == 20

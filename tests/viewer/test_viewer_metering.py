@@ -1,0 +1,131 @@
+"""The meter, the comparison and the marks: numbers that can be worked out by hand."""
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.false_colour import LM_PER_W
+from lambent.core.metrics import flip_error
+from lambent.core.progress import Cancelled, silent
+from lambent.realtime.baked import Probe
+from lambent.store.contract import CameraRecord
+from lambent.viewer.comparison import Comparison, Errors, difference
+from lambent.viewer.filming import film_file
+from lambent.viewer.flip_worker import flip_beside
+from lambent.viewer.markers import Markers, mirror_ball, outline, projected
+from lambent.viewer.metering import KEY, read
+
+CAMERA = CameraRecord(name="c", position=(0, 1, 5), target=(0, 1, 0), fov_y_deg=90)
+
+
+def test_a_reading_by_hand():
+    picture = np.ones((40, 60, 3), np.float32)
+    picture[:20] = 0.01
+    reading = read(picture)
+    assert reading.mean == pytest.approx(LM_PER_W * 0.505, rel=1e-5)
+    assert reading.log_mean == pytest.approx(LM_PER_W * 0.1, rel=1e-5)
+    assert reading.exposure_ev == pytest.approx(np.log2(KEY / 0.1), rel=1e-5)
+    assert reading.counts.sum() == 2400 and np.count_nonzero(reading.counts) == 2
+    brightest = np.flatnonzero(reading.counts)[-1]
+    assert reading.edges[brightest] <= LM_PER_W <= reading.edges[brightest + 1]
+
+
+def test_black_and_broken_pictures():
+    assert read(np.zeros((8, 8, 3))) is None
+    picture = np.full((8, 8, 3), 2.0)
+    picture[0, 0] = np.nan
+    picture[1, 1] = 0
+    assert read(picture).log_mean == pytest.approx(2 * LM_PER_W)
+    assert abs(read(np.full((8, 8, 3), 1e-9)).exposure_ev) == 12
+
+
+def test_the_difference_is_relative_to_b():
+    b = np.full((4, 4, 3), 2.0)
+    np.testing.assert_allclose(difference(1.1 * b, b), 10, rtol=1e-6)
+    b[0, 0] = 0.0
+    assert np.isfinite(difference(b + 0.1, b)).all()
+
+
+def test_flip_of_another_process_is_the_same():
+    a, b = np.random.default_rng(3).random((2, 40, 50, 3)).astype(np.float32)
+    np.testing.assert_allclose(flip_beside(a, b, silent), flip_error(a, b), atol=1e-6)
+
+
+def test_flip_can_be_cancelled():
+    def stop(done, total, what):
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        flip_beside(np.zeros((64, 64, 3)), np.zeros((64, 64, 3)), stop)
+
+
+def test_figures_and_maps():
+    comparison, errors = Comparison(mode="error map"), Errors()
+    b = np.random.default_rng(5).random((32, 32, 3)).astype(np.float32)
+    assert errors.due("here", 1)
+    errors.compare(comparison, 1.2 * b, b, "linear", 0.0, 1, 8)
+    assert not errors.due("here", 1) and errors.due("here", 2)
+    errors._work.wait()
+    errors.tick(comparison)
+    figures = comparison.figures
+    assert figures.of == figures.flip_of == 8 and figures.difference_percent > 5
+    assert 10 < figures.psnr_db < 40 and 0 < figures.flip_mean < 1
+    by_difference = errors.picture
+    assert by_difference.shape == (32, 32, 4) and (by_difference[..., 3] == 255).all()
+    comparison.kind = "FLIP"
+    errors.tick(comparison)
+    assert errors.picture.shape == (32, 32, 4) and (errors.picture != by_difference).any()
+    assert errors.due("elsewhere", 1) and errors.picture is None
+
+
+def test_places_on_the_screen():
+    places, depths = projected(CAMERA, np.array([[0, 1, 0], [5, 1, 0], [0, 6, 0], [0, 1, 9.0]]), aspect=2.0)
+    np.testing.assert_allclose(places[:3], [[0.5, 0.5], [0.75, 0.5], [0.5, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(depths, [5, 5, 5, -4])
+
+
+def test_outlines_are_cut_at_the_eye():
+    floor = np.array([[-1, 0, 9], [1, 0, 9], [1, 0, 0], [-1, 0, 0.0]])
+    line = outline("floor", floor, CAMERA, 1.0)
+    assert len(line.points) == 4 and np.isfinite(line.points).all()
+    assert max(y for _, y in line.points) > 1, "it reaches below the picture"
+    assert outline("behind", floor + np.array([0, 0, 20]), CAMERA, 1.0) is None
+
+
+def test_a_mirror_ball_shows_what_is_behind_the_viewer_in_its_middle():
+    cube = np.zeros((6, 8, 8, 3), np.float32)
+    cube[4, ..., 0] = 5  # +z: where the camera stands
+    cube[0, ..., 1] = 5  # +x: to the right
+    ball = mirror_ball(cube, CAMERA, (0, 1, 0), 41, "linear", 0.0)
+    assert ball[20, 20, 0] == 255 and ball[20, 20, 1] == 0
+    assert ball[20, 34, 1] == 255 and ball[20, 6, 1] == 0
+    assert ball[0, 0, 3] == 0 and ball[20, 20, 3] == 255
+
+
+def test_balls_of_probes():
+    markers = Markers(
+        {"lamp": Probe((0, 1, 0), np.ones((6, 4, 4, 3))), "gone": Probe((0, 1, 9), np.ones((6, 4, 4, 3)))}
+    )
+    markers.update(CAMERA, 1.5, 600, "filmic", 0.0)
+    (ball,) = markers.balls
+    assert (ball.name, ball.x, ball.y) == ("lamp", 0.5, 0.5)
+    assert set(markers.images) == {"probe lamp"} and markers.images["probe lamp"].shape[2] == 4
+    before = markers.images["probe lamp"]
+    markers.update(CAMERA, 1.5, 600, "filmic", 0.0)
+    assert markers.images["probe lamp"] is before
+    markers.clear()
+    assert markers.balls == () and markers.images == {}
+
+
+@pytest.mark.parametrize(
+    "name", ["", "tour", ".mp4", "tour.avi", "no/such/tour.mp4", "a#b#.png", "folder.mp4", "a\n.mp4"]
+)
+def test_names_of_films_that_are_none(tmp_path, name):
+    (tmp_path / "folder.mp4").mkdir()
+    with pytest.raises(UserError):
+        film_file(tmp_path, name)
+
+
+def test_names_of_films(tmp_path):
+    for name in ("tour.mp4", "t.MP4", "tour-####.png", "tour.exr"):
+        assert film_file(tmp_path, f" {name} ") == tmp_path / name

@@ -1,0 +1,160 @@
+"""What the walk window draws besides the picture, on a real adapter, without a window."""
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.false_colour import Range, false_colour, photometric
+from lambent.core.images import read_encoded, read_image
+from lambent.realtime.device import choose_adapter, open_device
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.store.contract import PathRecord
+from lambent.store.store import Store
+from lambent.viewer.comparison import Comparison
+from lambent.viewer.filming import FilmOptions
+from lambent.viewer.input import Rect
+from lambent.viewer.picture import CHOICES
+from lambent.viewer.pictures import Pictures
+from lambent.viewer.state import ViewerState
+from tests.viewer.small_store import FRONT, SIDE, write_small_store
+
+PLACE = Rect(0, 0, 96, 64)
+
+
+@pytest.fixture(scope="module")
+def renderer(tmp_path_factory):
+    try:
+        choose_adapter()
+    except UserError as error:
+        pytest.skip(str(error))
+    return Renderer(open_device(), Store.open(write_small_store(tmp_path_factory.mktemp("pictures") / "small")))
+
+
+@pytest.fixture
+def state(renderer, tmp_path):
+    state = ViewerState.of(renderer.scene.record, CHOICES, "walk", folder=tmp_path)
+    state.comparison, state.film, state.adaptive_resolution = Comparison(), FilmOptions(), False
+    state.now_s = 0.0
+    state.clock = lambda: state.now_s
+    return state
+
+
+def drawn(pictures, state, steps=1, dt_s=1.0):
+    for _ in range(steps):
+        pictures.update(state, PLACE, 1.0)
+        state.now_s += dt_s
+
+
+def test_false_colour_of_the_shader_is_that_of_numpy(renderer):
+    frame = FrameState(FRONT, 96, 64, view_transform="false-colour", scale=Range(5, 300))
+    expected = false_colour(photometric(renderer.image(frame)), frame.scale)
+    np.testing.assert_allclose(renderer.display_image(frame) / 255, expected, atol=0.02)
+
+
+def test_the_light_map_shows_irradiance(renderer):
+    irradiance = renderer.image(FrameState(FRONT, 96, 64, show="light-map"))
+    np.testing.assert_allclose(irradiance[-1], 2.0, rtol=1e-3)
+    assert irradiance[0].max() == 0, "the sky has none"
+
+
+def test_near_things_are_cut_away(renderer):
+    whole, cut = (renderer.image(FrameState(FRONT, 96, 64, near_m=near)) for near in (None, 4.0))
+    assert np.abs(whole[32, 48] - cut[32, 48]).max() > 0.05, "the ball at three metres is gone"
+    np.testing.assert_allclose(whole[:8], cut[:8], atol=1e-3)
+
+
+def test_the_meter_sets_the_exposure(renderer, state):
+    pictures = Pictures(renderer)
+    drawn(pictures, state)
+    assert state.meter.reading is None, "nobody looks at it"
+    state.meter.expose_wanted = True
+    drawn(pictures, state)
+    assert state.exposure_ev == pytest.approx(state.meter.reading.exposure_ev)
+    state.view_transform = "false-colour"
+    drawn(pictures, state)
+    assert state.scale == state.meter.reading.ranges[0] and not state.meter.fit_wanted
+
+
+def test_what_is_under_the_cursor(renderer, state):
+    pictures = Pictures(renderer)
+    state.meter.readout_on = True
+    state.show, state.meter.cursor = "light-map", (0.1, 0.95)
+    drawn(pictures, state)
+    assert state.meter.under_cursor == pytest.approx((2, 2, 2), rel=1e-3)
+    state.meter.cursor = (0.5, 0.01)
+    drawn(pictures, state)
+    assert state.meter.under_cursor == (0, 0, 0)
+    state.meter.cursor = None
+    drawn(pictures, state)
+    assert state.meter.under_cursor is None
+
+
+def test_side_by_side_with_the_reference(renderer, state):
+    pictures = Pictures(renderer)
+    state.comparison.mode = "side by side"
+    drawn(pictures, state, 12)
+    figures = state.comparison.figures
+    assert len(pictures.views) == 2 and figures.of >= 8
+    assert 20 < figures.psnr_db < 80
+    assert state.comparison.a_label == "rings" and "qmc" in state.comparison.b_label
+    state.camera = SIDE
+    drawn(pictures, state, dt_s=0.01)
+    assert state.comparison.figures is None, "figures of another place are not shown"
+    state.comparison.mode = "off"
+    drawn(pictures, state)
+    assert len(pictures.views) == 1
+
+
+def test_an_integrator_agrees_with_itself(renderer, state):
+    pictures = Pictures(renderer)
+    state.comparison.mode, state.comparison.integrator = "error map", "rings"
+    drawn(pictures, state, 4)
+    assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
+    assert (pictures.images["error map"][..., :3] == 0).all()
+
+
+def film(pictures, state, name):
+    state.film.file_name, state.film.size = name, "640 x 360"
+    state.film_wanted = PathRecord(name="short", keys=(FRONT, SIDE), seconds=0.1)
+    drawn(pictures, state)
+
+
+def test_films_and_rows_of_pictures(renderer, state, tmp_path):
+    pictures = Pictures(renderer)
+    for name in ("a.mp4", "b-##.png", "c.exr"):
+        film(pictures, state, name)
+        for _ in range(100):
+            if state.filming is None:
+                break
+            drawn(pictures, state)
+        assert "3 frames" in state.messages[-1].text
+    names = ["a.mp4", "b-01.png", "b-02.png", "b-03.png", "c-0001.exr", "c-0002.exr", "c-0003.exr"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == names
+    assert read_encoded(tmp_path / "b-01.png").shape == read_image(tmp_path / "c-0001.exr").shape == (360, 640, 3)
+
+
+def test_a_film_can_be_cancelled_and_leaves_nothing(renderer, state, tmp_path):
+    pictures = Pictures(renderer)
+    film(pictures, state, "a.mp4")
+    assert not state.filming.over and list(tmp_path.iterdir())
+    state.answering = True
+    done = state.filming.done
+    drawn(pictures, state)
+    assert state.filming.done == done, "events come first"
+    state.filming.cancel()
+    state.filming = None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
+    pictures = Pictures(renderer)
+    film(pictures, state, "no/such.mp4")
+    assert "no film: " in state.messages[-1].text and state.filming is None
+    film(pictures, state, "b.png")
+    (tmp_path / "b-0001.png").unlink(missing_ok=True)
+    (tmp_path / "b-0002.png").mkdir()
+    (tmp_path / "b-0001.png").mkdir()
+    (tmp_path / "b-0003.png").mkdir()
+    for _ in range(5):
+        drawn(pictures, state)
+    assert state.filming is None and "could not be written" in state.messages[-1].text
