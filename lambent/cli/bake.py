@@ -37,7 +37,7 @@ class Kind(StrEnum):
 
 
 def command(
-    scene: Annotated[str, typer.Argument(help="scene.toml, a glTF file, or builtin:room.")],
+    scene: Annotated[str, typer.Argument(help="scene.toml, glTF, OBJ, Mitsuba XML, or builtin:room.")],
     output: Annotated[Path, typer.Option("-o", help="Folder of the store.")],
     only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and what it needs. Repeatable.")] = None,
     quality: Annotated[Quality, typer.Option(help="How much work to put in.")] = Quality.preview,

@@ -53,6 +53,9 @@ class Texture:
 class MaterialTextures:
     """What varies over a surface: each picture multiplies numbers of the material's document, but for the last three.
 
+    The document holds the mean of what varies, so that it is right without its textures; a texture that multiplies is
+    texel / mean, at most the largest half float. Of a masked surface the mean is that of what is to be seen.
+
     diffuse (3 channels): kd and kt_d. specular (3): k of every lobe. roughness (1): mx and my of every lobe.
     normal (3): the shading normal in the frame (t, b, n), components from -1 to 1.
     direction (2): cosine and sine of the angle by which t is turned about n.
