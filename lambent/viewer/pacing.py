@@ -74,6 +74,8 @@ class Pacer:
             return
         full_s = seconds / plan.scale**2  # two thirds of the cost is texture filtering, so pixels are what counts
         fits = next((s for s in SCALES if full_s * s * s <= self._budget_s), SCALES[-1])
-        larger_fits_well = fits > self.moving_scale and full_s * fits * fits <= 0.7 * self._budget_s
-        if fits < self.moving_scale or larger_fits_well:
+        fits_well = next((s for s in SCALES if full_s * s * s <= 0.7 * self._budget_s), SCALES[-1])
+        if fits < self.moving_scale:
             self.moving_scale = fits
+        elif fits_well > self.moving_scale:
+            self.moving_scale = fits_well

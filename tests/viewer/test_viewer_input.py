@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from lambent.viewer import cameras
+from lambent.viewer.comparison import Comparison
 from lambent.viewer.input import Input, Rect
 from lambent.viewer.picking import Geometry
 from lambent.viewer.state import PathPlay, ViewerState
+from lambent.viewer.views import SavedViews
 
 
 @pytest.fixture
@@ -136,3 +138,39 @@ def test_undo_and_redo_by_keys(mouse, state):
     send(mouse, state, "key_down", key="Z", modifiers=("Control", "Shift"))
     assert state.edits.current("brass").kd == (0.5, 0.5, 0.5)
     assert not mouse.walking
+
+
+def test_the_divider_is_dragged_and_the_camera_is_not(mouse, state):
+    state.comparison = Comparison(mode="side by side")
+    at = mouse.picture.x + 0.5 * mouse.picture.width
+    before = state.camera
+    drag(mouse, state, (at, 50), (at + 0.25 * mouse.picture.width, 60))
+    assert state.comparison.split == pytest.approx(0.75, abs=0.02) and state.camera == before
+    drag(mouse, state, (at, 50), (at + 40, 60))
+    assert state.camera != before
+
+
+def test_the_cursor_is_known_over_the_picture_only(mouse, state):
+    send(mouse, state, "pointer_move", x=mouse.picture.x, y=mouse.picture.y)
+    assert state.meter.cursor == pytest.approx((0, 0), abs=0.01)
+    send(mouse, state, "pointer_move", ui=True, x=mouse.picture.x, y=mouse.picture.y)
+    assert state.meter.cursor is None
+    send(mouse, state, "pointer_move", x=mouse.picture.x + mouse.picture.width, y=mouse.picture.y)
+    assert state.meter.cursor is None
+
+
+def test_keys_of_views_and_recordings(mouse, state, scene, tmp_path):
+    state.views = SavedViews(scene, tmp_path, state.say)
+    for key in ("v", "1", "3"):
+        send(mouse, state, "key_down", key=key)
+    assert state.camera.name == "view 1"
+    send(mouse, state, "key_down", key="R")
+    assert state.recorder.on
+
+
+def test_the_walkers_own_pace(mouse, state):
+    state.walker.speed_m_s = 0.5
+    before = state.camera.position
+    send(mouse, state, "key_down", key="w")
+    mouse.walk(state, 0.2)
+    assert before[2] - state.camera.position[2] == pytest.approx(0.1)

@@ -65,3 +65,16 @@ def test_accumulated_frames_do_not_count_as_motion():
     p = pacer()
     p.cost(Plan(1.0, 3), 10.0)
     assert p.moving_scale == 1.0
+
+
+def test_a_shorter_frame_time_takes_fewer_pixels():
+    p = pacer()
+    p.aim(0.1)
+    p.cost(Plan(1.0, None), 0.09)
+    assert p.moving_scale == 1.0
+    p.aim(0.02)
+    p.cost(Plan(1.0, None), 0.09)
+    assert p.moving_scale == 0.35
+    p.aim(0.1)
+    p.cost(Plan(0.35, None), 0.09 * 0.35**2)
+    assert p.moving_scale > 0.7

@@ -1,9 +1,17 @@
 """Every control of the panels does what it says to the state."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from lambent.materials.document import load_material
+from lambent.store.views import read_views
+from lambent.viewer.comparison import Comparison, Figures
+from lambent.viewer.filming import FilmOptions
+from lambent.viewer.metering import read
 from lambent.viewer.state import Statistics, ViewerState
+from lambent.viewer.views import SavedViews
 from tests.viewer.panel_driver import PanelDriver
 
 
@@ -142,3 +150,118 @@ def test_a_message_does_not_end_a_drag(panels, state):
     panels.move(*panels.point("mx", 0.9))
     panels.button(False)
     assert state.edits.current("brass").lobes[0].mx > 0.5
+
+
+@pytest.fixture
+def whole(monkeypatch, scene, choices, tmp_path):
+    """The panels of the walk window, with all that it can do."""
+    state = ViewerState.of(scene, replace(choices, view_transforms=("filmic", "false-colour")), "walk", folder=tmp_path)
+    state.views = SavedViews(scene, tmp_path, state.say)
+    state.comparison, state.film, state.notes = Comparison(), FilmOptions(), ("light map: noise 3.1 %",)
+    driver = PanelDriver(monkeypatch, state, (1400, 2200))
+    yield driver
+    driver.close()
+
+
+def pick(panels, label, index):
+    panels.click(label)
+    x, y = panels.point(label)
+    panels.move(x, y + 26 + 19 * index)
+    panels.button(True)
+    panels.button(False)
+    panels.frame()
+
+
+def test_the_camera_and_the_walker(whole):
+    state = whole.state
+    whole.drag("field of view", 0.3, 0.8)
+    assert state.camera.fov_y_deg > 80
+    whole.drag("speed", 0.5, 0.8)
+    assert state.walker.speed_m_s > 1.5
+    before = state.camera.position[1]
+    whole.drag("eye height", 0.5, 0.7)
+    assert state.camera.position[1] > before
+    whole.click("near plane by the scene's size", 0.05)
+    assert state.near_m == 0.01
+    whole.frame()
+    whole.drag("near", 0.3, 0.9)
+    assert state.near_m > 0.5
+    whole.drag("frame", 0.6, 0.2)
+    assert state.target_ms < 40
+
+
+def test_views_in_the_panel(whole, tmp_path):
+    state = whole.state
+    whole.click("##view name", 0.5)
+    whole.type("by/the door")
+    whole.click("save view##view name")
+    whole.frame(2)
+    assert [c.name for c in read_views(tmp_path).cameras] == ["by/the door"]
+    whole.click("rename...##camera")
+    whole.frame()
+    whole.click("##new camera name", 0.9)
+    whole.type("!")
+    whole.click("rename##new camera name")
+    whole.frame()
+    assert state.camera.name == "by/the door!" == state.cameras[-1].name
+    whole.click("delete##camera")
+    assert len(state.cameras) == 2 and read_views(tmp_path).cameras == ()
+
+
+def test_a_walk_is_recorded_in_the_panel(whole, tmp_path):
+    state = whole.state
+    state.clock = lambda: state.now_s
+    state.now_s = 0.0
+    whole.click("record a walk###record")
+    assert state.recorder.on
+    for k in range(10):
+        state.now_s = 0.2 * k
+        x = 0.1 * k
+        state.recorder.take(state.camera.model_copy(update={"position": (x, 1.6, 3.0)}), state.now_s)
+    whole.frame()
+    whole.click(next(label for label in whole.rects if label.endswith("###record")))
+    whole.frame()
+    assert state.path.path.name == "recorded"
+    whole.drag("smooth", 0.2, 0.9)
+    assert state.recorder.smooth_s > 1
+    whole.click("save path##path name")
+    whole.frame(2)
+    assert [p.name for p in read_views(tmp_path).paths] == ["walk 1"]
+    whole.click("delete##path")
+    assert read_views(tmp_path).paths == ()
+
+
+def test_false_colour_has_a_range(whole):
+    state = whole.state
+    pick(whole, "transform", 1)
+    assert state.view_transform == "false-colour"
+    whole.frame()
+    whole.click("decades", 0.05)
+    assert not state.scale.log
+    state.meter.fit_wanted = False
+    whole.click("fit to the picture")
+    assert state.meter.fit_wanted
+
+
+def test_comparison_film_and_marks(whole):
+    state = whole.state
+    for header in ("Light meter", "Compare", "Film", "Statistics"):
+        whole.click(header, 0.3)
+    assert state.meter.wanted
+    pick(whole, "compare", 2)
+    assert state.comparison.mode == "error map"
+    state.comparison.figures = Figures(33.3, 1.2, 64, 0.04, 32, 2)
+    whole.frame()
+    pick(whole, "map", 1)
+    assert state.comparison.kind == "FLIP"
+    whole.click("probes", 0.1)
+    whole.click("readout", 0.1)
+    assert state.marks.probes and state.meter.readout_on
+    whole.click("make film##film file")
+    assert state.film_wanted == state.scene.paths[0] and state.film.file_name == "tour.mp4"
+    state.meter.reading = read(np.full((8, 8, 3), 0.5))
+    whole.click("meter")
+    assert state.meter.expose_wanted
+    whole.click("save picture")
+    assert state.screenshot_wanted
+    assert {label for label, rect in whole.rects.items() if rect[2] > whole.io.display_size.x} == set()
