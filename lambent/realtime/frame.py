@@ -25,10 +25,10 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame_data import FRAME_DTYPE
-from lambent.realtime.integrators import INTEGRATORS, integrator
-from lambent.realtime.passes.accumulate import AccumulatePass
-from lambent.realtime.mirror import mirror_views
+from lambent.realtime.integrators import INTEGRATORS, Integrator, integrator
+from lambent.realtime.mirror import MirrorView, mirror_views
 from lambent.realtime.mirror_integrators import AUTO, planar_integrator
+from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.planar import MOST_MIRRORS, PlanarPass
 from lambent.realtime.passes.shade import Draw, ShadePass
@@ -171,11 +171,13 @@ class Renderer:
         state.check()
         started = time.perf_counter()
         draws = self._draws(state)
-        self.device.queue.write_buffer(self._frame_buffer, 0, self._frame_data(state).tobytes())
+        data = self._frame_data(state)
+        self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        views = self._mirror_views(state, data)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
         encoder = self.device.create_command_encoder()
-        calls = self._encode_light(encoder, draws, target)
+        calls = self._encode_light(encoder, draws, views, planar_integrator(state.integrator, state.planar), target)
         radiance = target.radiance
         if state.accumulate is not None:
             stamps = self._timer.writes("accumulate")
@@ -189,6 +191,7 @@ class Renderer:
             "width": state.width,
             "height": state.height,
             "draw_calls": calls,
+            "mirrors": len(views),
             "triangles": len(self.scene.faces),
             "samples_per_pixel": max((d.n * d.lobes for d in draws if d.integrator.specular), default=0),
             "encode_ms": (time.perf_counter() - started) * 1e3,
@@ -256,12 +259,18 @@ class Renderer:
             buffers.update(material, how, n)
             anisotropic = any(lobe.mx != lobe.my for lobe in material.lobes)
             bits = bits_that_show(buffers.pictures.bits, lobes, anisotropic)
-            groups[name] = (how, lobes, n, buffers.group, bits)
+            groups[name] = (material, how, lobes, n, buffers.group, bits)
         for item in self.resources.objects:
-            how, lobes, n, group, bits = groups[item.record.material]
+            material, how, lobes, n, group, bits = groups[item.record.material]
             lookup = item.light.lookup(state.lookups.get(item.record.name, state.lookup)) if lobes else "plain"
-            draws.append(Draw(item, how, lobes, n, lookup, group, bits))
+            draws.append(Draw(item, material, how, lobes, n, lookup, group, bits))
         return draws
+
+    def _mirror_views(self, state: FrameState, data: NDArray[np.void]) -> list[MirrorView]:
+        """The planar reflectors that this frame draws a mirror picture for."""
+        if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
+            return []
+        return mirror_views(data, self.scene.record.reflectors, state.width, state.height, MOST_MIRRORS)
 
     def _frame_data(self, state: FrameState) -> NDArray[np.void]:
         camera, width, height = state.camera, state.width, state.height
@@ -283,20 +292,25 @@ class Renderer:
         data["exposure"] = 2.0**state.exposure_ev
         return data
 
-    def _encode_light(self, encoder: Any, draws: list[Draw], target: Any) -> int:
+    def _encode_light(
+        self, encoder: Any, draws: list[Draw], views: list[MirrorView], planar: Integrator | None, target: Any
+    ) -> int:
         depth = {"view": target.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
         with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
         first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
         first.set_bind_group(0, self._frame_group)
         calls = self._depth.draw(first, self.resources)
         first.end()
+        if views and planar:
+            calls += self._planar.encode(encoder, views, draws, planar, self._frame_group, target, self._timer)
+            draws = self._planar.marked(views, draws)
         shade = encoder.begin_render_pass(
             color_attachments=[{"view": target.radiance.create_view(), "load_op": "clear", "store_op": "store"}],
             depth_stencil_attachment={**depth, "depth_load_op": "load"},
             **self._timer.writes("shade"),
         )
         shade.set_bind_group(0, self._frame_group)
-        calls += self._shade.draw(shade, self.resources, draws, target.radiance.format)
+        calls += self._shade.draw(shade, self.resources, draws, target.radiance.format, self._planar.shown_group)
         calls += self._sky.draw(shade, self.resources, target.radiance.format)
         shade.end()
         return calls

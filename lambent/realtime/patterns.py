@@ -150,7 +150,14 @@ def fis_table(lobe: Lobe, n: int) -> Floats:
 
 def lobe_table(lobe: Lobe, n: int) -> Floats:
     """The thesis's pattern: a centre and a ring (or a line) equally spaced in angle within the lobe's border."""
-    ring = np.concatenate([[[0.0, 0.0]], (1 - RING_XI1) * _circle(n - 1)]) if n > 1 else np.zeros((1, 2))
+    return lobe_table_at(
+        lobe, np.concatenate([[[0.0, 0.0]], (1 - RING_XI1) * _circle(n - 1)]) if n > 1 else np.zeros((1, 2))
+    )
+
+
+def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
+    """`lobe_table` of a pattern (n, 2) within the unit disc, the lobe's border at 1, in place of centre and ring."""
+    n = len(ring)
     t = (2 * np.arange(n) + 1) / n - 1
     of_border = blended(ring, np.stack([t, np.zeros(n)], axis=-1), lobe)
     share = np.hypot(of_border[:, 0], of_border[:, 1])  # 1 - xi1 (4.13)

@@ -51,7 +51,7 @@ class Targets:
 class PassTimer:
     """GPU time per pass by timestamp queries; measures nothing where the adapter has none."""
 
-    PASSES = 8
+    PASSES = 64
 
     def __init__(self, device: Any) -> None:
         self._device, self._names = device, []  # type: Any, list[str]
@@ -83,9 +83,12 @@ class PassTimer:
         self._resolved, self._names = self._names, []
 
     def read(self) -> dict[str, float]:
-        """Milliseconds per pass of the last frame; waits for the GPU."""
+        """Milliseconds of the last frame by the passes' names; waits for the GPU."""
         if not self._resolved:
             return {}
         data = self._device.queue.read_buffer(self._buffer, size=16 * len(self._resolved))
         ticks = np.frombuffer(data, np.uint64).reshape(-1, 2).astype(np.float64)
-        return {n: float(t) for n, t in zip(self._resolved, (ticks[:, 1] - ticks[:, 0]) * 1e-6, strict=True)}
+        times: dict[str, float] = {}
+        for name, ms in zip(self._resolved, (ticks[:, 1] - ticks[:, 0]) * 1e-6, strict=True):
+            times[name] = times.get(name, 0.0) + float(ms)
+        return times

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from lambent.materials.document import Material
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS
 from lambent.realtime.resources import LOOKUPS, Layouts, ObjectResources, SceneResources
@@ -16,6 +17,7 @@ class Draw:
     """One object as it is drawn in this frame."""
 
     item: ObjectResources
+    material: Material
     integrator: Integrator
     lobes: int
     n: int  # samples per lobe

@@ -1,0 +1,181 @@
+// Light of planar reflectors: where a direction meets the scene, found in the mirror picture (thesis M, 4.5.2).
+// Appended to a shader of shade.wgsl; integrators bring integrate_planar(index, wo, s, place).
+//
+// Places are kept about the mirror eye e: q = p - e. A plane is N towards e and N.q, both of the same picture.
+
+struct Mirror { // MIRROR_DTYPE in mirror.py
+    eye: vec4f,
+    row_x: vec4f, // q to clip x, y and w
+    row_y: vec4f,
+    row_w: vec4f,
+    plane: vec4f, // of the reflector, n towards the viewer
+    size: vec2f,
+    offset: vec2f,  // of the frame in the mirror picture
+    tolerance: f32, // m: how far the reflector's pixels may lie from its plane
+    focal_px: f32,
+    levels: f32,
+    number: f32, // of the reflector in this frame
+}
+
+@group(3) @binding(0) var<uniform> mirror: Mirror;
+@group(3) @binding(1) var mirror_light: texture_2d<f32>;
+@group(3) @binding(2) var mirror_planes: texture_2d<f32>;
+
+const FARTHEST = 2e4; // m
+const FADE_PX = 24.0; // beyond the edges of the mirror picture
+
+// A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre, and
+// how far (0 to 1) the mirror direction leads out of the probe's bounding planes.
+struct Place {
+    q: vec3f,
+    seen: vec4f,
+    t: f32,
+    x: vec3f,
+    leaves: f32,
+}
+
+// Where a direction meets the scene: q, distance from the pixel, the plane there, texels of the mirror picture, and how
+// far (0 to 1) the picture can be trusted: 0 well outside it.
+struct Hit {
+    q: vec3f,
+    t: f32,
+    plane: vec4f,
+    texel: vec2f,
+    inside: f32,
+}
+
+fn plane_at(texel: vec2f) -> vec4f {
+    return textureLoad(mirror_planes, vec2i(clamp(texel, vec2f(0.0), mirror.size - 1.0)), 0);
+}
+
+// Distance to a plane along w, or `otherwise` where it is not met from its front.
+fn meet(plane: vec4f, q: vec3f, w: vec3f, otherwise: f32) -> f32 {
+    let closing = -dot(plane.xyz, w);
+    let t = (dot(plane.xyz, q) - plane.w) / max(closing, 1e-6);
+    return select(otherwise, min(t, FARTHEST), closing > 1e-4 && t > 1e-4);
+}
+
+// Texels (x, y) of the mirror picture, and depth.
+fn project(q: vec3f) -> vec3f {
+    let depth = dot(mirror.row_w.xyz, q);
+    let clip = vec2f(dot(mirror.row_x.xyz, q), -dot(mirror.row_y.xyz, q)) / max(depth, 1e-6);
+    return vec3f((clip + 1.0) * 0.5 * mirror.size, depth);
+}
+
+fn inside_picture(projected: vec3f) -> f32 {
+    let beyond = max(max(-projected.xy, projected.xy - mirror.size), vec2f(0.0));
+    return select(0.0, 1.0 - smoothstep(0.0, FADE_PX, max(beyond.x, beyond.y)), projected.z > 1e-6);
+}
+
+fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
+    let q = v.p_world - mirror.eye.xyz;
+    let seen = plane_at(v.position.xy + mirror.offset);
+    let t = meet(seen, q, w_mirror, FARTHEST);
+    return Place(q, seen, t, s.x, outside_planes(s.x, w_mirror, t));
+}
+
+// From 0 to 1: whether a hit at distance t lies beyond the probe's bounding planes. The mirror eye sees below walls, which
+// end at the reflector; to it, what is outside looks like a hit to whoever looks at the foot of a wall. Only where the
+// mirror direction itself leads outside, as through a window, such hits are believed.
+fn outside_planes(x: vec3f, w: vec3f, t: f32) -> f32 {
+    var nearness = 0.0; // 1 over the distance to the nearest plane, 0 where none is met
+    for (var i = 0u; i < PLANES; i++) {
+        let height = dot(planes[i].xyz, x) + planes[i].w;
+        nearness = max(nearness, -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > 1e-3));
+    }
+    return smoothstep(1.1, 1.5, t * nearness);
+}
+
+// The three steps: the plane seen in the mirror direction, then the one seen where that is met.
+fn find_hit(place: Place, w: vec3f) -> Hit {
+    let t_first = meet(place.seen, place.q, w, place.t);
+    let first = project(place.q + t_first * w);
+    let plane = plane_at(first.xy);
+    let t = meet(plane, place.q, w, t_first);
+    let q = place.q + t * w;
+    let projected = project(q);
+    let strays = outside_planes(place.x, w, t) * (1.0 - place.leaves);
+    return Hit(q, t, plane, projected.xy, inside_picture(projected) * (1.0 - strays));
+}
+
+fn mirror_sample(texel: vec2f, level: f32) -> vec3f {
+    let wanted = clamp(level, 0.0, mirror.levels - 1.0);
+    let uv = clamp(texel, vec2f(0.5), mirror.size - 0.5) / mirror.size;
+    let found = textureSampleLevel(mirror_light, linear_sampler, uv, wanted);
+    return found.rgb / max(found.a, 1e-3);
+}
+
+// Level at which a texel covers the solid angle of a sample: omega t^2/D^2 |N.v|/|N.wi| f^2/cos^3 texels, D and v from
+// the mirror eye, cos from the picture's axis.
+fn level_of(hit: Hit, w: vec3f, half_log2_omega: f32) -> f32 {
+    let d = length(hit.q);
+    let cosine = dot(mirror.row_w.xyz, hit.q) / d;
+    let turned = abs(dot(hit.plane.xyz, hit.q)) / (d * max(abs(dot(hit.plane.xyz, w)), 1e-4));
+    return half_log2_omega + log2(hit.t / d * mirror.focal_px) + 0.5 * log2(clamp(turned, 0.1, 4.0))
+        - 1.5 * log2(max(cosine, 1e-3));
+}
+
+// Light from direction w (world) in the mirror picture; a: how far it can be trusted. No branch: software Vulkan (Mesa
+// 22.3) crashes on textures that are sampled within branches of a loop.
+fn planar_incident(place: Place, w: vec3f, half_log2_omega: f32) -> vec4f {
+    let hit = find_hit(place, w);
+    return vec4f(mirror_sample(hit.texel, level_of(hit, w, half_log2_omega)), hit.inside);
+}
+
+// Samples that the mirror picture does not hold, for one look-up in the probe in their mean direction.
+struct Beyond {
+    gain: vec3f,
+    w: vec3f,
+    omega: f32, // sr
+}
+
+fn from_probe(s: Surface, beyond: Beyond) -> vec3f {
+    if (beyond.omega <= 0.0) { return vec3f(0.0); }
+    return beyond.gain * incident(s, normalize(beyond.w), 0.5 * log2(beyond.omega));
+}
+
+// `gain` with cosines of at least GRAZING, as the bent frames of other surfaces have them.
+fn planar_gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
+    let least = vec3f(-2.0, -2.0, GRAZING);
+    return gain(lobe, max(wi, least), max(wo, least), h);
+}
+
+// The frame of the plane itself: shading_frame bends normals of rounded things at grazing angles, a plane has none.
+fn planar_frame(v: Varyings, facing: f32) -> Surface {
+    var s = shading_frame(v, facing, mirror.plane.xyz);
+    return s;
+}
+
+// Tells pixels apart that cleaning must not mix: of other reflectors and materials, and with other lobes interleaved (the
+// bits of `interleaved`). 1 to 1999.
+fn surface_number(interleaved: u32) -> f32 {
+    let l = lobes[0].lobe;
+    let mixed = dot(l.k, vec3f(3.7, 7.1, 1.3)) + dot(l.r0, vec3f(5.3, 2.9, 11.1)) + dot(vec2f(l.mx, l.my), vec2f(17.3, 31.7));
+    return 1.0 + floor(fract(mixed * 0.6180339 + mirror.number * 0.2718 + f32(interleaved) * 0.3719) * 1999.0);
+}
+
+struct PlanarLight {
+    @location(0) rough: vec4f, // lobes that are sampled in turns by neighbouring pixels; a: distance in the mirror direction
+    @location(1) sharp: vec4f, // all others; a: surface_number, 0 where no reflector is
+}
+
+@fragment fn planar_main(v: Varyings, @builtin(front_facing) front: bool) -> PlanarLight {
+    let upright = dot(normalize(v.n_world), mirror.plane.xyz);
+    if (abs(dot(mirror.plane.xyz, v.p_world) + mirror.plane.w) > mirror.tolerance || abs(upright) < 0.998) { discard; }
+    let view = normalize(frame.eye.xyz - v.p_world);
+    let s = planar_frame(v, select(-1.0, 1.0, upright > 0.0));
+    let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
+    let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
+    var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));
+    var interleaved = 0u;
+    for (var i = 0u; i < LOBES; i++) {
+        let found = integrate_planar(i, wo, s, place);
+        let light = clamp(found.rgb, vec3f(0.0), vec3f(HALF_MAX));
+        let rough = found.a > 0.0;
+        result.rough += select(vec4f(0.0), vec4f(light, 0.0), rough);
+        result.sharp += select(vec4f(light, 0.0), vec4f(0.0), rough);
+        interleaved |= select(0u, 1u << i, rough);
+    }
+    result.sharp.a = surface_number(interleaved);
+    return result;
+}

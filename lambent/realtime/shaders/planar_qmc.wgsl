@@ -1,0 +1,25 @@
+// The progressive mode on planes: importance samples as in qmc.wgsl, unfiltered, so the mean converges.
+
+#include "planar.wgsl"
+#include "sequence.wgsl"
+
+fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
+    let lobe = lobe_here(index, s).lobe;
+    let through = lobe.side == LAMBENT_TRANSMISSION;
+    let offset = pixel_hash(s.pixel, index);
+    var sum = vec3f(0.0);
+    var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
+    for (var k = 0u; k < SAMPLES; k++) {
+        let h = lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe);
+        let cos_d = dot(wo, h);
+        let wi = 2.0 * cos_d * h - wo;
+        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
+        let g = planar_gain(lobe, wi, wo, h);
+        let hit = find_hit(place, to_world(s, wi));
+        let inside = select(hit.inside, 0.0, through);
+        sum += g * inside * mirror_sample(hit.texel, 0.0);
+        let share = 1.0 - inside;
+        beyond = Beyond(beyond.gain + share * g, beyond.w + share * on_side(lobe, wi), beyond.omega + share * 1e-6);
+    }
+    return vec4f((sum + from_probe(s, beyond)) / f32(SAMPLES), 0.0);
+}

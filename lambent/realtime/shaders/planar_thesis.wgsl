@@ -1,0 +1,44 @@
+// The estimate on planes as published (thesis M, 4.24, 4.25, 4.5.3): several rings within the lobe, one filter size per
+// pixel: the ellipse through the lobe's two extreme directions, projected into the mirror picture, divided by n.
+
+#include "planar.wgsl"
+
+override FORMULA: u32 = 25u;
+
+fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
+    let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
+    return 2.0 * dot(wo, h) * h - wo;
+}
+
+fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
+    let here = lobe_here(index, s);
+    let lobe = here.lobe;
+    let border = lobes[index].border * here.growth;
+    let centre = project(place.q + place.t * to_world(s, vec3f(-wo.xy, wo.z))).xy;
+    let a = length(find_hit(place, to_world(s, reflected(wo, vec2f(border.x, 0.0)))).texel - centre);
+    let b = length(find_hit(place, to_world(s, reflected(wo, vec2f(0.0, border.y)))).texel - centre);
+    let level = 0.5 * log2(clamp(LAMBENT_PI * a * b / f32(SAMPLES), 1e-6, 1e12));
+    let omega = 4.0 * LAMBENT_PI * lobe.mx * lobe.my * wo.z / f32(SAMPLES);
+    var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
+    var sum = vec3f(0.0);
+    var weights = vec3f(0.0);
+    for (var k = 0u; k < SAMPLES; k++) {
+        let sample = samples[index * SAMPLES + k];
+        let slope = sample.xy * here.growth;
+        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
+        let cos_d = dot(wo, h);
+        let wi = 2.0 * cos_d * h - wo;
+        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
+        let p = sample.w / (h.z * h.z * h.z * cos_d);
+        let q = planar_gain(lobe, wi, wo, h) / wi.z;
+        let hit = find_hit(place, to_world(s, wi));
+        let inside = select(hit.inside, 0.0, lobe.side == LAMBENT_TRANSMISSION);
+        let weight = select(q * q, q, FORMULA == 24u) * (wi.z * wi.z * p);
+        sum += mirror_sample(hit.texel, level) * inside * weight;
+        let share = 1.0 - inside;
+        beyond = Beyond(beyond.gain + share * weight, beyond.w + share * on_side(lobe, wi), beyond.omega + share * omega);
+        weights += select(q, vec3f(1.0), FORMULA == 24u) * (wi.z * p);
+    }
+    sum += from_probe(s, beyond);
+    return vec4f(select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30)), 0.0);
+}

@@ -1,0 +1,196 @@
+"""Planar reflectors: the mirror picture is the scene from the mirrored camera, and what is made of it is right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import BakedScene, Probe
+from lambent.realtime.camera import clip_from_world, image_plane
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_data import FRAME_DTYPE
+from lambent.realtime.mirror import covered_share, mirror_views
+from lambent.realtime.mirror_integrators import interleaved_table, multi_ring_table
+from lambent.realtime.patterns import radius
+from lambent.realtime.unbaked import unbaked_scene
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.store.contract import CameraRecord, ReflectorPart, ReflectorRecord
+
+CAMERA = CameraRecord(name="c", position=(0.4, 1.3, 3.0), target=(0.1, 0.4, 0.0), fov_y_deg=50)
+FLOOR = ReflectorRecord(
+    plane=(0, 1, 0, 0),
+    outline=((-3, 0, -3), (-3, 0, 3), (3, 0, 3), (3, 0, -3)),
+    parts=(ReflectorPart(object="floor", faces=(0, 1), area_m2=36),),
+)
+WIDTH, HEIGHT = 96, 64
+
+
+def mirror(m: float, **more: Any) -> Material:
+    return Material(name="floor", lobes=(Lobe(mx=m, my=m, r0=1.0, alpha=0.5, **more),))
+
+
+def scene_of(material: Material, floor: bool = True) -> BakedScene:
+    """A wall, a box and a ball, each with light of its own, on a floor; a sky of one colour and a dark probe."""
+    meshes = {
+        "wall": patch((-3, 0, -2), (6, 0, 0), (0, 3, 0)),
+        "box": placed(box((0.6, 0.8, 0.6)), (-0.7, 0.4, 0.2)),
+        "ball": placed(sphere(0.3, 24, 12), (0.8, 0.5, 0.6)),
+        **({"floor": patch((-3, 0, 3), (6, 0, 0), (0, 0, -6))} if floor else {}),
+    }
+    scene = unbaked_scene(meshes, Material(name="paint", kd=0.5), np.full((6, 4, 4, 3), (0.2, 0.4, 0.8), np.float32))
+    glow = {"wall": (0.9, 0.7, 0.2), "box": (2.0, 0.3, 0.3), "ball": (0.2, 1.5, 0.4)}
+    objects = tuple(
+        o.model_copy(
+            update={"emission": glow.get(o.name, (0, 0, 0)), "material": "floor" if o.name == "floor" else "paint"}
+        )
+        for o in scene.record.objects
+    )
+    dark = Probe((0.0, 0.0, 0.0), np.zeros((6, 4, 4, 3), np.float32))
+    update = {
+        "objects": objects,
+        "materials": {"paint": scene.record.materials["paint"], "floor": material},
+        "reflectors": (FLOOR,) if floor else (),
+    }
+    record = scene.record.model_copy(update=update)
+    return replace(scene, record=record, probes=dict.fromkeys(meshes, dark))
+
+
+def state(**more: Any) -> FrameState:
+    return FrameState(CAMERA, WIDTH, HEIGHT, antialias=False, **more)
+
+
+def frame_of(camera: CameraRecord) -> np.void:
+    data = np.zeros((), FRAME_DTYPE)
+    data["clip_from_world"] = clip_from_world(camera, WIDTH, HEIGHT, 0.01).T
+    data["eye"][:3] = camera.position
+    for name, axis in zip(("across", "up", "forward"), image_plane(camera, WIDTH, HEIGHT), strict=True):
+        data[name][:3] = axis
+    return data
+
+
+@pytest.fixture(scope="module")
+def seen_below(device: Any) -> np.ndarray:
+    """The scene without its floor from the mirrored camera, turned to lie on the frame; and what the frame sees."""
+    (x, y, z), (u, v, w) = CAMERA.position, CAMERA.target
+    below = CAMERA.model_copy(update={"position": (x, -y, z), "target": (u, -v, w), "up": (0, -1, 0)})
+    return Renderer(device, scene_of(mirror(0.001), floor=False)).image(replace(state(), camera=below))[:, ::-1]
+
+
+@pytest.mark.parametrize("way", ["interleaved", "fixed", "thesis"])
+def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(device: Any, seen_below: np.ndarray, way: str) -> None:
+    renderer = Renderer(device, scene_of(mirror(0.001)))
+    integrator = "lobe-4.25" if way == "thesis" else "rings"
+    image = renderer.image(state(n=3, integrator=integrator, planar=way))
+    floor = renderer.image(state(planar="off"))[..., 2] == 0  # the dark probe
+    assert 0.2 < floor.mean() < 0.9
+    difference = np.abs(image - seen_below).max(axis=-1)[floor]
+    assert np.median(difference) < 0.01
+    assert (difference < 0.1).mean() > 0.93  # edges are filtered
+    wrong_hand = np.abs(image - seen_below[:, ::-1]).max(axis=-1)[floor]
+    assert (wrong_hand < 0.1).mean() < 0.8
+
+
+def test_what_stands_on_the_floor_meets_its_reflection(device: Any) -> None:
+    """Where the box stands, both sides of the contact are red: no light leaks in between."""
+    renderer = Renderer(device, scene_of(mirror(0.001)))
+    camera = CameraRecord(name="near", position=(-0.7, 0.25, 1.6), target=(-0.7, 0.0, 0.5), fov_y_deg=20)
+    image = renderer.image(replace(state(n=3), camera=camera))
+    middle = image[:, WIDTH // 2]
+    assert (middle[:, 0] > 1.5).sum() >= 0.9 * HEIGHT
+    assert (middle[8:, 0] > 1.5).mean() > 0.9
+
+
+@pytest.mark.parametrize("m", [0.03, 0.1])
+def test_few_samples_come_near_the_converged_picture(device: Any, m: float) -> None:
+    renderer = Renderer(device, scene_of(mirror(m)))
+    converged = renderer.converged(state(show="specular"), 256)
+    error = {}
+    for integrator, way in (("rings", "interleaved"), ("rings", "fixed"), ("lobe-4.25", "thesis")):
+        image = renderer.image(state(n=7, integrator=integrator, planar=way, show="specular"))
+        error[way] = float(np.sqrt(np.mean((image - converged) ** 2)))
+    assert error["interleaved"] < error["thesis"]
+    assert error["fixed"] < error["thesis"]
+    assert error["interleaved"] < 0.1 * converged.mean() + 0.05
+
+
+def test_uniform_light_stays_uniform(device: Any) -> None:
+    """White furnace: under one radiance everywhere, a floor with albedo 1 shows it, whatever the way."""
+    scene = scene_of(mirror(0.05))
+    record = scene.record.model_copy(update={"objects": scene.record.objects[-1:]})
+    sky = np.ones((6, 4, 4, 3), np.float32)
+    scene = replace(scene, record=record, environment=sky, probes={"floor": Probe((0, 0, 0), sky)})
+    renderer = Renderer(device, scene)
+    for integrator, way in (("rings", "interleaved"), ("rings", "fixed"), ("lobe-4.25", "thesis")):
+        image = renderer.image(state(n=7, integrator=integrator, planar=way))
+        np.testing.assert_allclose(image[HEIGHT // 2 :], 1.0, rtol=0.03)
+
+
+def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
+    renderer = Renderer(device, scene_of(mirror(0.05)))
+    for target, mirrors in (((0.1, 0.4, 0.0), 1), ((0.4, 2.9, 3.05), 0)):
+        renderer.draw(replace(state(), camera=CAMERA.model_copy(update={"target": target})))
+        assert renderer.statistics["mirrors"] == mirrors
+    renderer.draw(replace(state(), camera=CAMERA.model_copy(update={"position": (0.4, -1.3, 3.0)})))
+    assert renderer.statistics["mirrors"] == 0  # seen from behind
+    renderer.draw(state(planar="off"))
+    assert renderer.statistics["mirrors"] == 0
+    with pytest.raises(UserError, match="interleaved"):
+        renderer.draw(state(planar="interleved"))
+
+
+def test_mirror_view_projects_and_clips() -> None:
+    (view,) = mirror_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4)
+    clip = view.frame["clip_from_world"].T.astype(float)
+    eye = view.frame["eye"][:3].astype(float)
+    np.testing.assert_allclose(eye, (0.4, -1.3, 3.0), atol=1e-6)
+    rng = np.random.default_rng(1)
+    for x, y in rng.uniform(-1, 1, (20, 2)):
+        ray = view.frame["forward"] + x * view.frame["across"] + y * view.frame["up"]
+        ray = ray[:3].astype(float)
+        if ray[1] <= 0:
+            continue
+        to_floor = 1.3 / ray[1]
+        depths = []
+        for t in (to_floor * 1.0005, 2 * to_floor, 50 * to_floor, 1e6):
+            p = clip @ [*(eye + t * ray), 1]
+            np.testing.assert_allclose(p[:2] / p[3], (x, y), atol=1e-4)
+            depths.append(p[2] / p[3])
+        assert all(near > far for near, far in pairwise(depths))
+        assert depths[-1] >= 0
+        assert depths[0] <= 1.001
+        below = clip @ [*(eye + 0.9 * to_floor * ray), 1]
+        assert below[2] > below[3]  # before the near plane
+
+
+def test_covered_share_of_a_square_that_fills_half_the_picture() -> None:
+    camera = CameraRecord(name="c", position=(0, 0, 1), target=(0, 0, 0), fov_y_deg=90)
+    aspect = WIDTH / HEIGHT
+    square = np.array([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], float)
+    assert covered_share(frame_of(camera), square) == pytest.approx(0.5, abs=1e-6)
+    inner = np.array([(-aspect / 2, -0.5, 0), (aspect / 2, -0.5, 0), (aspect / 2, 0.5, 0), (-aspect / 2, 0.5, 0)])
+    assert covered_share(frame_of(camera), inner) == pytest.approx(0.25, abs=1e-6)
+    assert covered_share(frame_of(camera), inner + np.array([0, 0, 2])) == 0
+
+
+def test_spirals_of_a_tile_share_the_lobe_evenly() -> None:
+    lobe = Lobe(mx=0.1, my=0.05)
+    rows = interleaved_table(lobe, 7)
+    assert rows.shape == (7 * 17, 4)
+    slopes = rows[7:, :2] / [0.1, 0.05]
+    mass = np.sort(1 - np.exp(-(slopes**2).sum(axis=1)))
+    np.testing.assert_allclose(mass, (np.arange(112) + 0.5) / 112, atol=1e-5)
+    assert np.abs(slopes.mean(axis=0)).max() < 0.05
+
+
+def test_multi_rings_of_ten_are_three_of_three() -> None:
+    rows = multi_ring_table(Lobe(mx=0.1, my=0.1), 10)
+    r = np.hypot(rows[:, 0], rows[:, 1]) / 0.1
+    assert sorted({round(float(x), 3) for x in r}) == pytest.approx([0, *sorted(set(r.round(3)))[1:]])
+    assert [int((np.abs(r - x) < 1e-3).sum()) for x in np.unique(r.round(3))] == [1, 3, 3, 3]
+    assert r.max() < radius(0.99)
