@@ -11,6 +11,8 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.photon_density import texel_areas
 from lambent.bake.texels import texels_of
+from lambent.core.errors import UserError
+from lambent.core.progress import Cancelled
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, Scene
 from lambent.store.store import Store
@@ -96,3 +98,31 @@ def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) 
 
 def test_no_light_is_a_black_map(tmp_path: Path) -> None:
     assert not photon_baked(plane(), tmp_path / "s").read("light_map/irradiance").any()
+
+
+def test_interrupted_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
+    small = replace(SMALL, photons_per_texel=32)
+    whole = bake(furnace(), tmp_path / "whole", quality=small, light_map="photons", only=("light_map",))
+
+    def stop(done: float, total: float, what: str) -> None:
+        if "photons" in what and done >= 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bake(furnace(), tmp_path / "s", quality=small, light_map="photons", progress=stop)
+    assert Store.open(tmp_path / "s").artefact("light_map/photons").state.startswith("partial")
+    resumed = bake(furnace(), tmp_path / "s", quality=small, only=("light_map",))
+    assert resumed.documents["light_map"] == "photons", "as the store has it"
+    for name in ("light_map/photons", "light_map/irradiance"):
+        assert resumed.read(name).tobytes() == whole.read(name).tobytes()
+
+
+def test_other_integrator_makes_the_map_anew(tmp_path: Path) -> None:
+    small = replace(TINY, photons_per_texel=8, light_map_samples=(4, 4))
+    first = bake(plane(), tmp_path / "s", quality=small, only=("light_map",))
+    second = bake(plane(), tmp_path / "s", quality=small, light_map="photons", only=("light_map",))
+    found = [store.artefact("light_map/irradiance") for store in (first, second)]
+    assert found[0].key != found[1].key
+    assert [artefact.meta["integrator"] for artefact in found] == ["paths", "photons"]
+    with pytest.raises(UserError, match="photons"):
+        bake(plane(), tmp_path / "s", quality=small, light_map="photon")
