@@ -168,8 +168,9 @@ def environment_dict(environment: Environment) -> dict[str, Any]:
     import mitsuba as mi
 
     if isinstance(environment, ConstantEnvironment):
-        return {"type": "constant", "radiance": _rgb(environment.radiance)}
-    if isinstance(environment, SunSky):
+        # A picture: Mitsuba's own constant evaluates to one value for any number of directions.
+        picture, scale, rotation_deg = np.full((8, 16, 3), environment.radiance, np.float32), 1.0, 0.0
+    elif isinstance(environment, SunSky):
         from lambent.bake.sky import sky_picture
 
         picture, scale, rotation_deg = sky_picture(environment), 1.0, 0.0
