@@ -6,6 +6,8 @@ the header (openexr.com, "OpenEXR file layout") and the chunk table first.
 
 from __future__ import annotations
 
+import errno
+import os
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -62,11 +64,17 @@ def decode(data: bytes, file: Path, max_pixels: int) -> Image:
 
 
 def encode(image: Image, path: Path) -> None:
-    """Write linear RGB (H, W, 3) as 32-bit float, ZIP compressed (without loss)."""
+    """Write linear RGB (H, W, 3) as 32-bit float, ZIP compressed (without loss); OSError where that cannot be."""
     import OpenEXR
 
     header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
+    try:
+        OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
+    except RuntimeError as error:  # the library's only kind: its text ends with what the system says
+        full = os.strerror(errno.ENOSPC) in str(error)
+        raise OSError(
+            errno.ENOSPC if full else errno.EIO, str(error).rsplit('". ', 1)[-1].rstrip("."), str(path)
+        ) from error
 
 
 def _header(data: bytes) -> _Header:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import re
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,8 +68,26 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
                 yield write
             finally:
                 writer.close()
+            if not _is_whole(beside):  # ffmpeg's fault at the end, on a full disk above all, comes without an error
+                raise OSError(errno.ENOSPC, "the end of the film could not be written: is the disk full?")
         except (OSError, RuntimeError) as error:
             raise UserError(f"film could not be written ({error})", file=path) from error
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether the boxes of an MP4 file (ISO 14496-12) fill it to its end, and an index is among them."""
+    kinds, at, end = set(), 0, path.stat().st_size
+    with path.open("rb") as file:
+        while at + 8 <= end:
+            file.seek(at)
+            size, kind = struct.unpack(">I4s", file.read(8))
+            if size == 1:
+                size = struct.unpack(">Q", file.read(8).ljust(8, b"\0"))[0]
+            if size < 8:
+                return False
+            kinds.add(kind)
+            at += size
+    return at == end and b"moov" in kinds
 
 
 def even_size(width: int, height: int) -> tuple[int, int]:
@@ -107,7 +127,7 @@ def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
         file = sequence_file(path, number)
         try:
             (write_image if radiance_wanted(path) else write_shown)(file, picture)
-        except (OSError, RuntimeError) as error:  # OpenEXR raises the latter
+        except OSError as error:
             raise UserError(f"could not be written ({error})", file=file) from error
 
     yield write

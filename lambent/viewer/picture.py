@@ -120,7 +120,7 @@ class Picture:
                     display, frame.scale, ILLUMINANCE_UNIT if frame.show == LIGHT_MAP else LUMINANCE_UNIT
                 )
             write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
-        except (OSError, RuntimeError) as error:  # OpenEXR raises the latter
+        except OSError as error:
             state.say(f"picture not saved: {error}")
         else:
             state.say(f"saved {name}.png and {name}.exr")

@@ -37,3 +37,19 @@ def test_interruption_leaves_nothing(tmp_path: Path) -> None:
 def test_even_size() -> None:
     assert even_size(641, 480) == (640, 480)
     assert even_size(1, 1) == (2, 2)
+
+
+def test_a_film_without_its_end_is_none(tmp_path):
+    """ffmpeg says nothing where the disk fills up at the end."""
+    from lambent.core.film import _is_whole
+
+    with film_writer(tmp_path / "a.mp4", 32, 32) as write:
+        for value in range(4):
+            write(np.full((32, 32, 3), 60 * value, np.uint8))
+    data = (tmp_path / "a.mp4").read_bytes()
+    assert _is_whole(tmp_path / "a.mp4")
+    for cut in (0, 7, 40, len(data) // 2, len(data) - 1):
+        (tmp_path / "cut.mp4").write_bytes(data[:cut])
+        assert not _is_whole(tmp_path / "cut.mp4"), cut
+    (tmp_path / "cut.mp4").write_bytes(data.replace(b"moov", b"free"))
+    assert not _is_whole(tmp_path / "cut.mp4")
