@@ -38,7 +38,7 @@ def multi_ring_table(lobe: Lobe, n: int) -> Floats:
 def fixed_table(lobe: Lobe, n: int) -> Floats:
     """The rings of curved objects with the filter that is best on planes; a line for long lobes."""
     rows = patterns.rings_table(lobe, n)
-    rows[:, 2] += 0.5 * np.log2(FIXED_BIAS / 0.5)
+    rows[:, 2] += 0.5 * np.log2(FIXED_BIAS / patterns.ring_bias(n))
     return rows
 
 

@@ -3,7 +3,8 @@
 A table has one row (x, y, z, w) per sample:
     x, y   slopes of the half vector, h = normalize(x, y, 1)
     z      half the log2 of the filter constant c: the sample looks up the solid angle c (wo.h) h_z^3 sr
-    w      exp(-r^2), the density of slopes relative to its peak (Beckmann), or its equal for GGX
+    w      the sample's weight, of mean 1; for the thesis's estimates exp(-r^2), the density of slopes relative to its
+           peak (Beckmann), or its equal for GGX
 with r the slope in units of (mx, my). The rows depend on the lobe alone, so the shader does no exp, ratio or border.
 
 Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-based importance sampling".
@@ -11,6 +12,7 @@ Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,9 @@ RINGS: dict[int, tuple[int, ...]] = {
 }
 N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # of the roughnesses, at n = 7: where rings turn into a line, and how softly
+CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, against 1 on the mean; below 7 samples the latter
+STRETCH = {3: 0.91, 5: 0.92}  # of the rings' radii; .97 otherwise
+LINE_TEMPER = 1.16  # tau sqrt(n), see `line_pattern`
 BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
@@ -49,35 +54,69 @@ def ring_counts(n: int) -> tuple[int, ...]:
     return (1, *outer) if n > 1 else (1,)
 
 
-def ring_pattern(n: int, ggx: bool = False) -> tuple[Floats, Floats]:
-    """Equal-mass staggered rings: slopes (n, 2) in units of (mx, my), and filter factors S (n).
+@dataclass(frozen=True)
+class Pattern:
+    """Where n samples of a lobe lie.
 
-    Ring j stands where half of its mass lies inside; every sample carries the mass 1/n. S = b / relative density:
-    b = 1 would cover the lobe, but a trilinear look-up blurs by itself: under measured light b = .5 is nearest at
-    every roughness, and wider filters only trade beads of small lamps for a general blur. At n = 40, b = 1.
+    slopes (n, 2) in units of (mx, my); factor (n) S of the filters, see `table`; weight (n), of mean 1.
     """
-    slopes, before = [], 0
-    for j, count in enumerate(ring_counts(n)):
-        r = 0.0 if count == 1 and before == 0 else float(radius((before + count / 2) / n, ggx))
+
+    slopes: Floats
+    factor: Floats
+    weight: Floats
+
+
+def ring_pattern(n: int, ggx: bool = False) -> Pattern:
+    """A centre and staggered rings, each ring where half of its mass lies inside.
+
+    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe, and filters of .6 of
+    what would cover it, because a trilinear look-up blurs by itself.
+    """
+    counts = ring_counts(n)
+    centred = counts[0] == 1 and n > 1
+    centre = 0.0 if not centred else CENTRE_WEIGHT_FEW if n < 7 else CENTRE_WEIGHT
+    weight = np.full(n, (n - centre) / (n - centred))
+    slopes, before = [], 0.0
+    for j, count in enumerate(counts):
+        if j == 0 and count == 1:
+            r, mass = 0.0, centre or 1.0
+            weight[0] = mass
+        else:
+            mass = count * weight[-1]
+            r = STRETCH.get(n, 0.97) * float(radius(min((before + mass / 2) / n, 0.9999), ggx))
         phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
         slopes.append(r * np.stack([np.cos(phi), np.sin(phi)], axis=-1))
-        before += count
+        before += mass
     points = np.concatenate(slopes)
-    bias = 0.5 if n < 40 else 1.0
-    return points, bias / relative_density(points, ggx)
+    return Pattern(points, ring_bias(n) * weight / relative_density(points, ggx), weight)
 
 
-def line_pattern(n: int, ggx: bool = False) -> tuple[Floats, Floats]:
-    """Equal-mass samples on the x axis, for lobes much longer than wide: slopes (n, 2) and filter factors S (n).
+def ring_bias(n: int) -> float:
+    """The filters of n samples on rings against filters that cover the lobe; n = 40 is close to the truth already."""
+    return {3: 0.46, 5: 0.55}.get(n, 0.6 if n < 40 else 1.0)
 
-    x is the quantile of the lobe's marginal (a normal of variance 1/2 for Beckmann). The filter is the thesis's lobe
-    ellipse, A = pi tan(a_U) tan(a_V) = 4 pi mx my (-ln 0.01) at small roughness, narrowed by one level (a quarter).
+
+def line_pattern(n: int, ggx: bool = False) -> Pattern:
+    """Samples on the x axis, for lobes much longer than wide.
+
+    The marginal of a Beckmann lobe is p = exp(-x^2). Samples that follow p itself leave its tails to one or two of
+    them; these follow p^tau and are weighted by p^(1 - tau), close to the trapezium rule, which is exact to many digits
+    on a Gaussian. tau, the filters and how they grow outwards are by experiment. A GGX lobe, whose marginal is
+    (1 + x^2)^(-3/2), keeps samples of equal mass and the thesis's filter, narrowed by one level.
     """
     from scipy.special import erfinv
 
     t = (2 * np.arange(n) + 1) / n - 1
-    x = t / np.sqrt(1 - t * t) if ggx else erfinv(t)
-    return np.stack([x, np.zeros(n)], axis=-1), np.full(n, -np.log(BORDER_MASS) / 4)
+    if ggx:
+        x = t / np.sqrt(1 - t * t)
+        weight, factor = np.ones(n), np.full(n, -np.log(BORDER_MASS) / 4)
+    else:
+        tau = min(1.0, LINE_TEMPER / np.sqrt(n))
+        x = erfinv(t) / np.sqrt(tau)
+        weight = np.exp(-(1 - tau) * x * x)
+        weight /= weight.mean()
+        factor = min(0.45 + 0.027 * n, 1.0) * np.exp(0.25 * x * x)
+    return Pattern(np.stack([x, np.zeros(n)], axis=-1), factor, weight)
 
 
 def radius(mass: Any, ggx: bool = False) -> Any:
@@ -120,23 +159,26 @@ def blended(rings: Floats, line: Floats, lobe: Lobe) -> Floats:
     return np.asarray(mixed if lobe.mx >= lobe.my else mixed[:, ::-1])
 
 
-def table(slopes: Floats, filter_factor: Floats, lobe: Lobe) -> Floats:
-    """Rows (x, y, z, w) of samples at slopes (n, 2) in units of (mx, my), each of solid angle S/(n pdf)."""
+def table(slopes: Floats, filter_factor: Floats, lobe: Lobe, fourth: Floats | None = None) -> Floats:
+    """Rows (x, y, z, w) of samples at slopes (n, 2) in units of (mx, my), each of solid angle S/(n pdf).
+
+    `fourth` is w where it is not 1.
+    """
     n = len(slopes)
     constant = filter_factor * 4 * np.pi * lobe.mx * lobe.my / n
-    density = relative_density(slopes, lobe.distribution == "ggx")
-    rows = np.column_stack([slopes * [lobe.mx, lobe.my], 0.5 * np.log2(constant), density])
-    return rows.astype(np.float32)
+    w = np.ones(n) if fourth is None else fourth
+    return np.column_stack([slopes * [lobe.mx, lobe.my], 0.5 * np.log2(constant), w]).astype(np.float32)
 
 
 def rings_table(lobe: Lobe, n: int) -> Floats:
     """Samples of the `rings` integrator: rings, or a line for lobes much longer than wide."""
     ggx = lobe.distribution == "ggx"
-    (rings, s_rings), (line, s_line) = ring_pattern(n, ggx), line_pattern(n, ggx)
+    rings, line = ring_pattern(n, ggx), line_pattern(n, ggx)
     share = line_share(lobe, n)
-    order = along_axis(rings, lobe)[1] if share > 0 else np.arange(n)
-    factor = np.exp((1 - share) * np.log(s_rings[order]) + share * np.log(s_line))
-    return table(blended(rings, line, lobe), factor, lobe)
+    order = along_axis(rings.slopes, lobe)[1] if share > 0 else np.arange(n)
+    factor = np.exp((1 - share) * np.log(rings.factor[order]) + share * np.log(line.factor))
+    weight = (1 - share) * rings.weight[order] + share * line.weight
+    return table(blended(rings.slopes, line.slopes, lobe), factor, lobe, weight)
 
 
 def fis_table(lobe: Lobe, n: int) -> Floats:
@@ -168,7 +210,7 @@ def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
         np.tan(share * np.arctan(length)), length, out=np.zeros_like(length), where=length > 0
     )  # slope = tan(theta_h)
     slopes = limit * scale[:, None] / [lobe.mx, lobe.my]
-    return table(slopes, np.ones(n), lobe)
+    return table(slopes, np.ones(n), lobe, relative_density(slopes, lobe.distribution == "ggx"))
 
 
 def _circle(count: int) -> Floats:

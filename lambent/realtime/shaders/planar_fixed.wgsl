@@ -1,4 +1,4 @@
-// Equal-weight quadrature on planes: as quadrature.wgsl, the light from the mirror picture, one filter size per sample.
+// Quadrature on planes: as quadrature.wgsl, the light from the mirror picture, one filter size per sample.
 
 #include "planar.wgsl"
 
@@ -17,7 +17,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let wi = 2.0 * cos_d * h - wo;
         if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
         let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(cos_d * h.z * h.z * h.z);
-        let g = planar_gain(lobe, wi, wo, h);
+        let g = q.w * planar_gain(lobe, wi, wo, h);
         let found = planar_incident(place, to_world(s, wi), half_log2_omega);
         let inside = select(found.a, 0.0, through);
         sum += g * inside * found.rgb;
