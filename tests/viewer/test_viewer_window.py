@@ -10,6 +10,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
 from lambent.realtime.device import choose_adapter
+from lambent.store.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
 from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
 
@@ -111,9 +112,32 @@ def test_resize_and_picture(session):
     assert png[400:].mean() > png[:100].mean(), "the floor is lit, the sky above the wall is dark: upside down?"
 
 
+def test_views_and_walks_are_saved_with_keys(session, store):
+    session.tool("key", "v")
+    session.wait_for(lambda state: any(m == "saved the view view 1" for m in state["messages"]))
+    session.tool("key", "1", "r")
+    session.hold("w", 0.8)
+    session.tool("key", "r")
+    session.wait_for(lambda state: any(m.startswith("recorded ") for m in state["messages"]))
+    session.click(*session.point("save path##path name"))
+    session.wait_for(lambda state: "saved the path walk 1" in state["messages"])
+    views = read_views(store)
+    assert [c.name for c in views.cameras] == ["view 1"] and views.cameras[0].position == FRONT.position
+    (walk,) = views.paths
+    assert walk.keys[-1].position[2] < FRONT.position[2] - 0.2 and walk.seconds < 5
+
+
 def test_close(window):
-    """Last, because it closes the window of the tests before."""
+    """Last, because it closes the window of the tests before; a material was changed."""
+    window.tool("key", "Escape")
+    window.click(135, 200)
+    window.wait_for(lambda state: state["selected"] == "ball")
+    for header in ("Scene", "View"):
+        window.click(*window.point(header, 0.3))
+    window.drag(window.point("mx", 0.5), window.point("mx", 0.8))
+    window.wait_for(lambda state: state["edited"])
     assert window.close() == 0
+    assert "note: brass changed and not saved" in window.log()
 
 
 def lobe_of(state):
