@@ -72,7 +72,9 @@ def _register(variant: str) -> None:
             self.framed = "normal" in self.textures or (self.anisotropic and "direction" in self.textures)
             names = _component_names(self.material)
             self.kinds = [getattr(mi.BSDFFlags, kind) for kind, *_ in names]
-            self.m_components = [_flags(mi, name) for name in names]
+            # A black component is none: emitters are not sampled for a material without any.
+            shown = [self.material.kd, self.material.kt_d, *(lobe.k for lobe in self.material.lobes)]
+            self.m_components = [_flags(mi, name if any(k) else []) for name, k in zip(names, shown, strict=True)]
             self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
             if "opacity" in self.textures:
                 self.m_flags |= int(mi.BSDFFlags.Null)

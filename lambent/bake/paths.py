@@ -130,7 +130,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  
 
         bsdf = si.bsdf(ray)
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, value = sample_emitter(scene, si, sampler.next_2d(lit), lit, holes)
+        ds, value = sample_emitter(scene, si, sampler.next_2d(active), lit, holes)
         lit &= ds.pdf > 0
         wo = si.to_local(ds.d)
         f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
