@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 REST_S = 0.25
 BUDGET_S = 1 / 15  # a frame in motion should take no longer
-SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.12)
+SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
+FIXED_SHARE = 1.5  # a frame in motion may take so many times what it takes without pixels
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Pacer:
         self._accumulated = 0
         self._last: Plan | None = None
         self._budget_s = BUDGET_S
+        self._times: dict[float, float] = {}  # seconds of frames in motion, by their scale
 
     @property
     def shown(self) -> object:
@@ -72,10 +74,23 @@ class Pacer:
         """Learn what a frame in motion took, and choose the size of the next."""
         if plan.accumulate is not None:
             return
-        full_s = seconds / plan.scale**2  # two thirds of the cost is texture filtering, so pixels are what counts
-        fits = next((s for s in SCALES if full_s * s * s <= self._budget_s), SCALES[-1])
-        fits_well = next((s for s in SCALES if full_s * s * s <= 0.7 * self._budget_s), SCALES[-1])
+        before = self._times.get(plan.scale, seconds)
+        self._times[plan.scale] = (before + seconds) / 2
+        fixed_s = min(self._fixed_s(), seconds)
+        # Fewer pixels do not buy what costs the same with any number of them.
+        budget_s = max(self._budget_s, FIXED_SHARE * fixed_s)
+        pixels_s = (seconds - fixed_s) / plan.scale**2
+        fits = next((s for s in SCALES if fixed_s + pixels_s * s * s <= budget_s), SCALES[-1])
+        fits_well = next((s for s in SCALES if fixed_s + pixels_s * s * s <= 0.7 * budget_s), SCALES[-1])
         if fits < self.moving_scale:
             self.moving_scale = fits
         elif fits_well > self.moving_scale:
             self.moving_scale = fits_well
+
+    def _fixed_s(self) -> float:
+        """What a frame of no pixels would take, by the least and the most pixels drawn so far."""
+        small, large = min(self._times), max(self._times)
+        if small == large:
+            return 0.0
+        per_pixel = (self._times[large] - self._times[small]) / (large**2 - small**2)
+        return max(0.0, self._times[small] - max(per_pixel, 0.0) * small**2)

@@ -78,3 +78,16 @@ def test_a_shorter_frame_time_takes_fewer_pixels():
     p.aim(0.1)
     p.cost(Plan(0.35, None), 0.09 * 0.35**2)
     assert p.moving_scale > 0.7
+
+
+def test_pixels_are_not_given_away_for_what_they_do_not_cost():
+    """A frame takes 150 ms whatever its size, and 50 ms per full picture: 66 ms cannot be met, and is not sought."""
+    p = pacer()
+    for _ in range(30):
+        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+    assert p.moving_scale >= 0.5
+    seen = set()
+    for _ in range(10):
+        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+        seen.add(p.moving_scale)
+    assert len(seen) == 1, "it does not swing"

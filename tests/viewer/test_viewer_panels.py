@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
+from lambent.core.false_colour import Range
 from lambent.materials.document import load_material
 from lambent.store.views import read_views
 from lambent.viewer.comparison import Comparison, Figures
 from lambent.viewer.filming import FilmOptions
+from lambent.viewer.markers import Ball, Line
 from lambent.viewer.metering import read
 from lambent.viewer.state import Statistics, ViewerState
 from lambent.viewer.views import SavedViews
@@ -265,3 +268,20 @@ def test_comparison_film_and_marks(whole):
     whole.click("save picture")
     assert state.screenshot_wanted
     assert {label for label, rect in whole.rects.items() if rect[2] > whole.io.display_size.x} == set()
+
+
+def test_what_stands_over_the_picture_is_drawn(whole):
+    """Lines, balls, scales, the readout: every call is one that this version of Dear ImGui takes."""
+    state = whole.state
+    bare = imgui.get_draw_data().total_vtx_count
+    state.marks.lines = (Line("mirror", ((0.1, 0.1), (0.5, 0.2), (0.4, 0.9))),)
+    state.marks.balls = (Ball("lamp", 0.5, 0.5, 0.1, 2.0),)
+    state.meter.cursor, state.meter.under_cursor = (0.99, 0.99), (1.0, 2.0, 3.0)
+    state.record()
+    for scale in (Range(1, 1000), Range(0, 500, log=False), Range(33, 34)):
+        state.view_transform, state.scale = "false-colour", scale
+        whole.frame()
+    state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, 64)
+    for state.comparison.kind in ("difference", "FLIP"):
+        whole.frame()
+    assert imgui.get_draw_data().total_vtx_count > bare + 300
