@@ -57,7 +57,7 @@ HOSTILE = {
                      r"line 1 <float> radius: not a number; found big"),
     "not finite": ('<shape type="sphere"><float name="radius" value="nan"/></shape>', r"not a finite number"),
     "a transform that is not finite": (
-        '<shape type="cube"><transform name="to_world"><scale value="1e200"/><scale x="1e200"/></transform></shape>',
+        '<shape type="cube"><transform name="to_world"><scale value="1e8"/><scale x="1e8"/></transform></shape>',
         r"transform is not finite"),
     "a matrix cut short": (
         '<shape type="sphere"><transform name="to_world"><matrix value="1 0 0"/></transform></shape>', r"wrong count"),
@@ -236,7 +236,7 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
                 read_ply(path)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=5), st.integers(0, 2))
 def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]], kind: int) -> None:
     files = {

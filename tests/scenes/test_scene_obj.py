@@ -237,7 +237,7 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     assert whole.words == cut.words and whole.lines[:3].tolist() == [11, 13, 15]
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
 def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
     data = bytearray((QUAD + "mtllib thing.mtl\no a\nusemtl w\ns 1\nf 1/1 2/2 3/3\nf 1//1 -2//1 4//1 2//1\n").encode())

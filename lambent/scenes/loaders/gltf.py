@@ -33,6 +33,7 @@ from lambent.scenes.scene import (
 )
 
 TRIANGLES_MAX = 20_000_000
+FAR = 1e9  # metres
 LUMENS_PER_WATT = 683.0  # glTF lights are photometric; 683 lm/W is what exporters from radiometric units assume
 
 
@@ -133,8 +134,8 @@ def _walk(reading: _Reading) -> None:
         seen.add(index)
         node = gltf.pick(document.nodes, index, "nodes")
         world = parent @ _local(node)
-        if not np.isfinite(world).all():
-            raise UserError("transform is not finite", file=gltf.path, field=f"nodes.{index}")
+        if not (np.abs(world) < FAR).all():
+            raise UserError("transform is not finite, or leads absurdly far", file=gltf.path, field=f"nodes.{index}")
         _visit(reading, node, index, world)
         stack += [(child, world) for child in reversed(node.children)]
 

@@ -145,7 +145,7 @@ def _numbers(words: list[str], path: Path, line: int, said: list[str]) -> tuple[
         values = tuple(float(w.partition("#")[0] or "nan") for w in rest[:3] if not w.startswith("#"))
     except ValueError as error:
         raise UserError("not a number", file=path, field=field, got=" ".join(rest)) from error
-    if not values or not all(math.isfinite(v) for v in values):
+    if not values or not all(abs(v) < 1e30 for v in values):
         raise UserError("not a finite number", file=path, field=field, got=" ".join(rest) or "nothing")
     return values
 
@@ -168,7 +168,7 @@ def _map(text: str, path: Path, line: int) -> tuple[str, UvTransform]:
     if not words:
         raise UserError("names no picture", file=path, field=f"line {line}")
     name = text[text.index(words[0]) :] if text.count(words[0]) == 1 else " ".join(words)
-    if not np.isfinite([*scale, *offset]).all():
+    if not (np.abs([*scale, *offset]) < 1e30).all():
         raise UserError("not a finite number", file=path, field=f"line {line}", got=text)
     return name, ((scale[0], 0.0, offset[0]), (0.0, scale[1], offset[1]))
 

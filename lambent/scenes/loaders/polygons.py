@@ -56,8 +56,8 @@ def _newell(points: Floats) -> Floats:
 
 def _convex(points: Floats) -> NDArray[np.bool_]:
     """Which polygons (F, n, 3) turn one way at every corner; one that is not finite counts as convex."""
-    edges = np.roll(points, -1, axis=1) - points
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
+        edges = np.roll(points, -1, axis=1) - points
         turns = np.sum(np.cross(edges, np.roll(edges, -1, axis=1)) * _newell(points)[:, None], axis=-1)
         hollow: NDArray[np.bool_] = (turns < -1e-9 * np.abs(turns).max(axis=1, keepdims=True)).any(axis=1)
     return ~hollow
@@ -92,7 +92,7 @@ def smooth_normals(positions: Floats, triangles: Ints, shared: Ints) -> Floats:
     """
     corner = positions[triangles]
     total = np.zeros((int(shared.max()) + 1 if shared.size else 0, 3))
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         normal = normalize(np.nan_to_num(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])))
         for i in range(3):
             e1, e2 = (normalize(corner[:, (i + k) % 3] - corner[:, i]) for k in (1, 2))

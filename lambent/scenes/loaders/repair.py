@@ -14,6 +14,7 @@ from lambent.scenes.geometry.grid import FLAT
 from lambent.scenes.scene import Mesh
 
 Faces = NDArray[np.integer]
+ABSURD = 1e15
 
 
 def mesh_of(
@@ -41,6 +42,8 @@ def mesh_of(
         Where a face names a vertex that is not there.
     """
     said: list[str] = []
+    positions, normals, uv, tangents = (None if a is None else _tame(a) for a in (positions, normals, uv, tangents))
+    assert positions is not None
     count = len(positions)
     if faces.size and int(faces.max()) >= count:
         got, expected = int(faces.max()), f"below {count}"
@@ -70,6 +73,12 @@ def mesh_of(
         index.reshape(-1, 3).astype(np.uint32),
     )
     return mesh, [f"{name}: {what}" for what in said]
+
+
+def _tame(values: Floats) -> Floats:
+    """`values` with NaN for what is too far to be meant: its square would overflow in single precision."""
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(values) < ABSURD, values, np.nan)
 
 
 def _usable(positions: Floats, faces: Faces, said: list[str]) -> Faces:

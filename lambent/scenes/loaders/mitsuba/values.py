@@ -22,6 +22,7 @@ OBJECTS = {
 }  # fmt: skip
 PLUGINS_MAX = 400_000
 NESTING_MAX = 32
+ABSURD, FAR = 1e30, 1e9
 # Filters, caches, samplers: how Mitsuba works, not what the scene is.
 MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
@@ -151,8 +152,8 @@ class Plugin:
             self.say("its movement is not read: it stands as at the beginning")
             element = next((e for e in element.children if e.tag == "transform"), element)
         matrix = transform_of(element)
-        if not np.isfinite(matrix).all():
-            raise element.error("transform is not finite")
+        if not (np.abs(matrix) < FAR).all():
+            raise element.error("transform is not finite, or leads absurdly far")
         return matrix
 
     def transform_element(self, name: str = "to_world") -> Element | None:
@@ -183,7 +184,7 @@ def floats_of(element: Element, count: int | None = None, attribute: str = "valu
         values = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
         raise element.error("not a number", got=text) from error
-    if not all(math.isfinite(v) for v in values):
+    if not all(abs(v) < ABSURD for v in values):
         raise element.error("not a finite number", got=text)
     if count is not None and len(values) != count:
         raise element.error("wrong count of numbers", got=text or "nothing", expected=count)
