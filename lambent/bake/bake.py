@@ -30,7 +30,7 @@ from lambent.core.files import sha256_of
 from lambent.core.progress import Progress, silent
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
-from lambent.scenes.textures import bounded
+from lambent.scenes.textures import prepared
 from lambent.store.contract import (
     TIMINGS,
     CameraRecord,
@@ -141,7 +141,7 @@ class _Bake:
     ) -> None:
         if not scene.objects:
             raise UserError("scene has no objects", field=scene.name)
-        scene = replace(scene, textures=bounded(scene.textures))
+        scene = replace(scene, textures=prepared(scene.textures))
         self.scene, self.quality, self.progress, self.seed = scene, quality, progress, seed
         existing = Store.open(path) if (Path(path) / "manifest.json").exists() else None
         changes = changed_inputs(existing, scene) if existing else []

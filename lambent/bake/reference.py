@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -14,6 +16,7 @@ from lambent.bake.work import seed_of
 from lambent.core.frames import normalize
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Camera, Scene
+from lambent.scenes.textures import prepared
 
 Array = NDArray[np.floating]
 PATHS_AT_ONCE = 1 << 20
@@ -45,7 +48,7 @@ def render_reference(
     image, variance : (height, width, 3) float32
         Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
     """
-    builder = SceneBuilder(scene)
+    builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
     balance_emitters(builder)
     whole = builder.build()
     per_pass = max(1, min(spp, PATHS_AT_ONCE // (width * height)))

@@ -62,8 +62,45 @@ def _halved_along(texels: Floats, axis: int) -> Floats:
     return np.asarray(np.moveaxis(mean, 0, axis))
 
 
-def bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
-    """Textures, checked, of at most SIDE_MAX texels per side; by material, as they came."""
+def filled(texels: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Texels (H, W, C) with means of the nearest known ones (H, W) in place of the others.
+
+    A picture of leaves on white has white in every average over an edge, which would show where the mask does not cut.
+    """
+    weight = known[..., None].astype(np.float32)
+    levels = [(texels.astype(np.float32) * weight, weight)]
+    while max(weight.shape[:2]) > 1:
+        levels.append((halved(levels[-1][0]), halved(levels[-1][1])))
+        weight = levels[-1][1]
+    result = levels[-1][0] / np.maximum(levels[-1][1], 1e-12)
+    for total, weight in reversed(levels[:-1]):
+        rows, columns = (np.arange(n) * m // n for n, m in zip(weight.shape, result.shape[:2], strict=False))
+        result = np.where(weight > 0, total / np.maximum(weight, 1e-12), result[rows[:, None], columns])
+    return np.where(known[..., None], texels, result.astype(texels.dtype))
+
+
+def prepared(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
+    """Textures as they are baked: checked, of at most SIDE_MAX texels per side, colours beyond a mask's edge filled."""
+    return {name: _filled(of_material) for name, of_material in _bounded(textures).items()}
+
+
+def _filled(textures: MaterialTextures) -> MaterialTextures:
+    mask = textures.opacity
+    if mask is None:
+        return textures
+    known = mask.texels[..., 0] >= textures.cutoff
+    if not known.any():
+        return textures
+    colours = {
+        part: replace(texture, texels=filled(texture.texels, known))
+        for part, texture in parts(textures).items()
+        if part in ("diffuse", "specular")
+        and (texture.uv_transform, texture.texels.shape[:2]) == (mask.uv_transform, known.shape)
+    }
+    return replace(textures, **colours)
+
+
+def _bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
     smaller: dict[int, Texture] = {}  # one picture on many materials stays one
     found = {}
     for material, of_material in textures.items():

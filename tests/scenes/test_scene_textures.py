@@ -1,0 +1,62 @@
+"""Pictures as arrays: reduced, filled, told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.scenes import textures
+from lambent.scenes.scene import MaterialTextures, Texture
+
+
+def picture(values: np.ndarray) -> Texture:
+    return Texture(np.asarray(values, np.float16))
+
+
+def test_colours_beyond_a_masks_edge_come_from_within() -> None:
+    """Green leaves on white: no average of the filled picture is whiter than a leaf."""
+    rng = np.random.default_rng(0)
+    leaf = rng.random((37, 50)) < 0.2
+    colour = np.where(leaf[..., None], (0.2, 0.8, 0.1), (1.0, 1.0, 20.0))
+    given = {"leaf": MaterialTextures(diffuse=picture(colour), opacity=picture(leaf[..., None]))}
+    filled = textures.prepared(given)["leaf"].diffuse.texels
+    np.testing.assert_allclose(filled, np.broadcast_to((0.2, 0.8, 0.1), filled.shape), rtol=2e-3)
+    assert np.array_equal(filled[leaf], picture(colour).texels[leaf])
+
+
+def test_hidden_texels_take_the_nearest_colour() -> None:
+    colour = np.zeros((8, 64, 1), np.float32)
+    colour[:, :32], colour[:, 32:] = 1, 2
+    known = np.zeros((8, 64), bool)
+    known[:, [0, 63]] = True
+    filled = textures.filled(colour, known)[..., 0]
+    assert (filled[:, :16] == 1).all()
+    assert (filled[:, 48:] == 2).all()
+
+
+def test_large_pictures_are_reduced_and_shared_ones_stay_shared(monkeypatch) -> None:
+    monkeypatch.setattr(textures, "SIDE_MAX", 16)
+    large = picture(np.random.default_rng(0).random((50, 20, 3)))
+    given = {"a": MaterialTextures(diffuse=large), "b": MaterialTextures(specular=large)}
+    prepared = textures.prepared(given)
+    small = prepared["a"].diffuse.texels
+    assert small.shape == (12, 5, 3)
+    assert small is prepared["b"].specular.texels
+    np.testing.assert_allclose(small.mean(axis=(0, 1)), large.texels.mean(axis=(0, 1), dtype=float), rtol=2e-3)
+
+
+def test_wrong_channels_and_holes_in_the_numbers_are_refused() -> None:
+    with pytest.raises(UserError, match="roughness texture of m"):
+        textures.prepared({"m": MaterialTextures(roughness=picture(np.ones((2, 2, 3))))})
+    with pytest.raises(UserError, match="not finite"):
+        textures.prepared({"m": MaterialTextures(diffuse=picture(np.full((2, 2, 3), np.nan)))})
+
+
+def test_a_picture_is_told_by_texels_and_place() -> None:
+    one = picture(np.ones((2, 2, 3)))
+    assert textures.digest(one) == textures.digest(picture(np.ones((2, 2, 3))))
+    assert textures.digest(one) != textures.digest(picture(np.full((2, 2, 3), 0.5)))
+    assert textures.digest(one) != textures.digest(replace(one, uv_transform=((2.0, 0, 0), (0, 1.0, 0))))
