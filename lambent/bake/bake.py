@@ -49,8 +49,11 @@ from lambent.store.textures import texture_records, write_textures
 Array = NDArray[np.floating]
 KINDS = ("geometry", "light_map", "environment", "probe")
 NEEDS = {"geometry": (), "light_map": ("geometry",), "environment": (), "probe": ("geometry", "light_map")}
-PATHS, PHOTONS = INTEGRATORS = ("paths", "photons")
-INTEGRATOR = "light_map"  # document: which of INTEGRATORS made the light map
+PATHS, PHOTONS = "paths", "photons"
+CACHED, TRACED = "cached", "traced"
+WAYS_OF = {"light_map": (PATHS, PHOTONS), "probes": (CACHED, TRACED)}
+WAYS = "ways"  # document: which of WAYS_OF made what is in the store
+PARTS = "parts"  # document: objects in several parts, with the key of what that was found from
 log = logging.getLogger(__name__)
 
 
@@ -64,6 +67,7 @@ def bake(
     progress: Progress = silent,
     seed: int = 0,
     light_map: str | None = None,
+    probes: str | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -78,6 +82,8 @@ def bake(
         The same seed gives the same arrays.
     light_map : {'paths', 'photons'}, optional
         What integrates the light map: path tracing and final gathering, or photons. By default as the store has it.
+    probes : {'cached', 'traced'}, optional
+        Whether probes show surfaces as the light map has them, or are path traced whole. By default as in the store.
 
     Returns
     -------
@@ -85,7 +91,7 @@ def bake(
         Changed inputs are told by the logger and kept in the document "changes".
     """
     kinds = _with_needs(KINDS if only is None else only)
-    job = _Bake(scene, store_path, quality_named(quality), resume, progress, seed, light_map)
+    job = _Bake(scene, store_path, quality_named(quality), resume, progress, seed, (light_map, probes))
     steps: dict[str, Callable[[], None]] = {
         "geometry": job.geometry,
         "environment": job.environment,
@@ -106,13 +112,16 @@ def _with_needs(only: Collection[str]) -> set[str]:
     return {need for kind in only for need in (kind, *NEEDS[kind])}
 
 
-def _integrator(wanted: str | None, store: Store | None) -> str:
-    """What makes the light map: as asked for, else as in the store."""
-    found = wanted or (store.documents.get(INTEGRATOR, PATHS) if store else PATHS)
-    if found not in INTEGRATORS:
-        hint = did_you_mean(str(found), INTEGRATORS)
-        raise UserError("unknown light map integrator", got=found, expected=", ".join(INTEGRATORS), hint=hint)
-    return str(found)
+def _ways(wanted: tuple[str | None, str | None], store: Store | None) -> tuple[str, str]:
+    """What makes the light map, and what the probes: as asked for, else as in the store."""
+    before = store.documents.get(WAYS, {}) if store else {}
+    found = [one or before.get(name, known[0]) for one, (name, known) in zip(wanted, WAYS_OF.items(), strict=True)]
+    for way, (name, known) in zip(found, WAYS_OF.items(), strict=True):
+        if way not in known:
+            raise UserError(
+                f"unknown way to bake {name}", got=way, expected=", ".join(known), hint=did_you_mean(way, known)
+            )
+    return found[0], found[1]
 
 
 def inputs_of(scene: Scene) -> dict[str, str]:
@@ -137,7 +146,7 @@ class _Bake:
         resume: bool,
         progress: Progress,
         seed: int,
-        integrator: str | None,
+        ways: tuple[str | None, str | None],
     ) -> None:
         if not scene.objects:
             raise UserError("scene has no objects", field=scene.name)
@@ -147,9 +156,10 @@ class _Bake:
         changes = changed_inputs(existing, scene) if existing else []
         if changes:
             log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
-        self.integrator = _integrator(integrator, existing)
+        self.integrator, self.probe_way = _ways(ways, existing)
         self.store = Store.create(path, inputs_of(scene))
-        self.store.set_document(INTEGRATOR, self.integrator)
+        self.store.set_document(WAYS, {"light_map": self.integrator, "probes": self.probe_way})
+        scene = self.scene = self._in_parts(scene)
         self._sides: dict[float, Any] = {}
         self.store.set_document("changes", changes)
         if not resume:
@@ -179,6 +189,25 @@ class _Bake:
 
     def _current(self, name: str, key: str) -> bool:
         return name in self.store and self.store.artefact(name).key == key
+
+    def _in_parts(self, scene: Scene) -> Scene:
+        """The scene with objects cut up that one probe cannot stand for; asked again only where geometry changed."""
+        centres = sorted(scene.probe_centres.items())
+        shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
+        clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
+        worn = [o.material for o in scene.objects]
+        key = keys.key_of("geometry", "parts", *keys.geometry_parts(scene), centres, shiny, clear, worn)
+        found = self.store.documents.get(PARTS)
+        if not isinstance(found, dict) or found.get("key") != key:
+            from lambent.bake.probe_parts import cuts_of
+
+            found = {"key": key, "cuts": cuts_of(scene, self.progress)}
+            self.store.set_document(PARTS, found)
+        if not found["cuts"]:
+            return scene
+        from lambent.bake.probe_parts import split
+
+        return split(scene, found["cuts"])
 
     def geometry(self) -> None:
         """Split meshes with second coordinates, the pictures on them, and the scene record."""
@@ -342,10 +371,11 @@ class _Bake:
             front, back = self.store.read("light_map/irradiance"), None
             if "light_map/irradiance_back" in self.store:
                 back = self.store.read("light_map/irradiance_back")
-            probes = ProbeSet(self.atlas, front, back)
+            probes = ProbeSet(self.atlas, front if self.probe_way == CACHED else None, back)
             for i, name in enumerate(missing):
                 self.progress(i, len(missing), f"probe of {name}")
                 result, meta = probes.bake(name, self.quality, seed_of(self.seed, "probe", name))
+                _tell_if_too_few(name, meta)
                 for part in ("radiance", "distance", "planes"):
                     key = self._planes_key(name, keys_of[name]) if part == "planes" else keys_of[name]
                     self.store.put(probe_name(name, part), "probe", result[part], key=key, meta=self._meta(**meta))
@@ -354,7 +384,10 @@ class _Bake:
     def _probe_key(self, name: str) -> str:
         q = self.quality
         centre = self.scene.probe_centres.get(name)
-        return keys.key_of("probe", self.irradiance_key, name, centre, q.probe_texels, q.probe_samples, self.seed)
+        parts = [self.irradiance_key, name, centre, q.probe_texels, q.probe_samples, self.seed]
+        if self.probe_way != CACHED:
+            parts += [self.probe_way, q.max_depth]
+        return keys.key_of("probe", *parts)
 
     def _planes_key(self, name: str, probe_key: str) -> str:
         given = self.scene.probe_planes.get(name)
@@ -362,6 +395,16 @@ class _Bake:
 
     def _meta(self, **more: Any) -> dict[str, Any]:
         return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
+
+
+def _tell_if_too_few(name: str, meta: dict[str, Any]) -> None:
+    from lambent.bake.probe_parts import HIDDEN
+
+    if meta["hidden_share"] > HIDDEN:
+        log.warning(
+            "%s: its probe has not seen %.0f %% of what it mirrors; a tenth is looked up %.0f degrees or more off",
+            name, 100 * meta["hidden_share"], meta["parallax_deg"],
+        )  # fmt: skip
 
 
 def scene_record_of(scene: Scene) -> SceneRecord:

@@ -1,7 +1,8 @@
 """Probes: what an object would mirror, as cube maps of radiance and distance from one point.
 
-The scene is traced without the object, with the light map as radiance cache: a diffuse surface shows its baked light,
-a glossy one is traced on through its lobes, so that mirrors in mirrors are right.
+Rays from the centre pass the object; what they meet is lit by and mirrors the whole scene. With the light map as
+radiance cache a diffuse surface shows its baked light, a glossy one is traced on through its lobes, so that mirrors in
+mirrors are right; without, everything is path traced, with more noise.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ Indices = NDArray[np.integer]
 PATHS_AT_ONCE = 1 << 20
 NOISE, EXTRA = 0.1, 8  # texels above this relative standard error get this many times more paths
 MIRROR_DEPTH = 6  # glossy surfaces in a row
+CLOSE = 1e-4  # metres, and share of the distance, by which a ray begins before a surface
 
 
 class LightMapCache:
@@ -78,41 +80,54 @@ class Probe:
     normals: NDArray[np.float32]
 
 
-def bake_probe(scene: Any, cache: LightMapCache, centre: Array, n: int, samples: int, seed: int) -> Probe:
-    """Trace a probe. `scene` is without the object and, as its builder was told, without diffuse terms.
+@dataclass(frozen=True)
+class Surroundings:
+    """What a probe is traced in.
+
+    `whole` is the scene, `first` that without the probe's object: it is left out for what the probe sees itself, and
+    is there for what that mirrors and is lit by. With a `cache` the scenes are without diffuse terms, as their builder
+    was told; without, paths are traced whole. `depth` is how many surfaces a path meets.
+    """
+
+    first: Any
+    whole: Any
+    cache: LightMapCache | None = None
+    depth: int = MIRROR_DEPTH
+
+
+def bake_probe(scene: Surroundings, centre: Array, n: int, samples: int, seed: int) -> Probe:
+    """Trace a probe.
 
     Every texel gets `samples` paths; those that are still noisy, mostly glossy surfaces seen in the probe, get
     EXTRA times as many on top.
     """
     rng = np.random.default_rng(seed)
     texels = np.arange(6 * n * n)
-    total, squares = _sums(scene, cache, centre, n, texels, samples, rng)
+    total, squares = _sums(scene, centre, n, texels, samples, rng)
     count = np.full(len(texels), float(samples))
     mean = luminance(total / samples)
     deviation = np.sqrt(np.maximum(luminance(squares / samples) - mean**2, 0) / samples)
     noisy = np.flatnonzero(deviation > NOISE * np.maximum(mean, np.median(mean)))
-    more = _sums(scene, cache, centre, n, noisy, EXTRA * samples, rng)
+    more = _sums(scene, centre, n, noisy, EXTRA * samples, rng)
     total[noisy] += more[0]
     count[noisy] += EXTRA * samples
     radiance = np.minimum(total / count[:, None], HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
-    return Probe(radiance, *_geometry(scene, centre, n))
+    return Probe(radiance, *_geometry(scene.first, centre, n))
 
 
 def _sums(
-    scene: Any, cache: LightMapCache, centre: Array, n: int, texels: Indices, samples: int, rng: np.random.Generator
+    scene: Surroundings, centre: Array, n: int, texels: Indices, samples: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Sums (k, 3) of radiance and of its squares over `samples` paths through each of the texels."""
     total, squares = np.zeros((2, len(texels), 3))
     at_once = max(1, PATHS_AT_ONCE // samples)
     for start in range(0, len(texels), at_once):
         mine = slice(start, start + at_once)
-        total[mine], squares[mine] = _pass(scene, cache, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
+        total[mine], squares[mine] = _pass(scene, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
     return total, squares
 
 
-def _pass(
-    scene: Any, cache: LightMapCache, centre: Array, n: int, texels: Indices, samples: int, seed: int
-) -> tuple[Array, Array]:
+def _pass(scene: Surroundings, centre: Array, n: int, texels: Indices, samples: int, seed: int) -> tuple[Array, Array]:
     sampler = mi.load_dict({"type": "independent"})
     width = len(texels) * samples
     sampler.seed(seed, width)
@@ -122,10 +137,23 @@ def _pass(
     s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
     origin = mi.Point3f(*map(float, centre))
     ray = mi.Ray3f(origin + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
-    value = paths.radiance(scene, sampler, paths.camera_start(ray), MIRROR_DEPTH, cache)
+    start = paths.camera_start(_up_to_first(scene.first, ray))
+    value = paths.radiance(scene.whole, sampler, start, scene.depth, scene.cache)
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     dr.eval(value)
     return _block_sums(value, samples), _block_sums(value * value, samples)
+
+
+def _up_to_first(scene: Any, ray: Any) -> Any:
+    """Rays that begin right before what the given ones meet first in `scene`, whatever else stands in their way."""
+    distance = _distance(scene, ray)[0]
+    return mi.Ray3f(ray(dr.maximum(distance * (1 - CLOSE) - CLOSE, 0.0)), ray.d)
+
+
+def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:
+    """Metres to the first surface behind all holes, FAR where there is none, and what is met there."""
+    si = paths.intersect(scene, ray, mi.Bool(True), paths.has_holes(scene))
+    return dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - ray.o), FAR), FAR), si
 
 
 def _block_sums(value: Any, samples: int) -> Array:
@@ -146,8 +174,7 @@ def _geometry(scene: Any, centre: Array, n: int) -> tuple[NDArray[np.float32], N
     w = normalize(face_directions(n)).reshape(-1, 3).T.astype(np.float32)
     direction = mi.Vector3f(np.ascontiguousarray(w))
     origin = mi.Point3f(*map(float, centre))
-    si = paths.intersect(scene, mi.Ray3f(origin, direction), mi.Bool(True), paths.has_holes(scene))
-    distance = dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - origin), FAR), FAR)
+    distance, si = _distance(scene, mi.Ray3f(origin, direction))
     normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
     normal = dr.select(si.is_valid(), normal, -direction)
     return np.array(distance).reshape(6, n, n), np.array(mi.Vector3f(normal)).T.reshape(6, n, n, 3).astype(np.float32)

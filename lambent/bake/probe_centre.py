@@ -33,13 +33,17 @@ def probe_centre(builder: SceneBuilder, name: str, without: Any) -> Array:
     scene = builder.scene
     if name in scene.probe_centres:
         return np.asarray(scene.probe_centres[name], float)
-    mesh = scene.object(name).mesh
+    return centre_of(scene.object(name).mesh, np.mean(scene.bounds, axis=0), SolidTest(builder, without), without)
+
+
+def centre_of(mesh: Mesh, middle: Array, solids: SolidTest, without: Any) -> Array:
+    """The centre for a mesh of a scene with this middle, or for a part of one; `solids` are those of `without`."""
     low, high = (np.asarray(corner, float) for corner in mesh.bounds)
     centre = (low + high) / 2
     axis = flat_axis(mesh)
     if axis is not None:
-        return _above(mesh, centre, axis, np.mean(scene.bounds, axis=0), without)
-    return _moved_out(centre, SolidTest(builder, without), without)
+        return _above(mesh, centre, axis, middle, without)
+    return _moved_out(centre, solids, without)
 
 
 def flat_axis(mesh: Mesh) -> Array | None:

@@ -10,37 +10,48 @@ from numpy.typing import NDArray
 
 from lambent.bake.atlas import Atlas
 from lambent.bake.emitters import balance_emitters
+from lambent.bake.measured_materials import lookups_of
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.planes import bounding_planes
-from lambent.bake.probe import LightMapCache, bake_probe
+from lambent.bake.probe import MIRROR_DEPTH, LightMapCache, Surroundings, bake_probe
 from lambent.bake.probe_centre import encloses, probe_centre
+from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from
 from lambent.bake.quality import Quality
 
 Array = NDArray[np.floating]
 
 
 class ProbeSet:
-    """Bakes the probes of an atlas' scene from its light map (H, W, 3)."""
+    """Bakes the probes of an atlas' scene from its light map (H, W, 3), or, where that is None, path traced whole.
 
-    def __init__(self, atlas: Atlas, irradiance: Array, irradiance_back: Array | None) -> None:
-        self._builder = SceneBuilder(atlas.scene, atlas.uv2, diffuse=False)
+    With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way.
+    """
+
+    def __init__(self, atlas: Atlas, irradiance: Array | None, irradiance_back: Array | None) -> None:
+        traced = irradiance is None
+        self._builder = SceneBuilder(atlas.scene, atlas.uv2, diffuse=traced, measured=lookups_of(atlas.scene))
         balance_emitters(self._builder)
-        self._cache = LightMapCache(self._builder, irradiance, irradiance_back)
+        self._cache = None if traced else LightMapCache(self._builder, irradiance, irradiance_back)
 
     @cached_property
     def _whole(self) -> Any:
         return self._builder.build()
 
     def bake(self, name: str, quality: Quality, seed: int) -> tuple[dict[str, Array], dict[str, Any]]:
-        """Arrays radiance, distance and planes of one object's probe, and what to note: centre and what was left out.
+        """Arrays radiance, distance and planes of one object's probe, and what to note.
+
+        Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
+        `hidden_share` and `parallax_deg` of `probe_parts`.
 
         Planes that the scene gives are taken as they are; others are found from what the probe sees.
         """
-        without = self._builder.build(leave_out={name})
+        without = self._builder.build(leave_out=family(self._builder.scene.parts, name))
         centre = probe_centre(self._builder, name, without)
         left_out = not encloses(self._builder, name, centre, self._whole)
         seen = without if left_out else self._whole
-        probe = bake_probe(seen, self._cache, centre, quality.probe_texels, quality.probe_samples, seed)
+        depth = quality.max_depth if self._cache is None else MIRROR_DEPTH
+        around = Surroundings(seen, self._whole, self._cache, depth)
+        probe = bake_probe(around, centre, quality.probe_texels, quality.probe_samples, seed)
         given = self._builder.scene.probe_planes.get(name)
         if given is None:
             planes = bounding_planes(probe.distance, probe.normals)
@@ -48,4 +59,8 @@ class ProbeSet:
         else:
             planes = np.asarray(given, np.float32)
         arrays = {"radiance": probe.radiance, "distance": probe.distance, "planes": planes}
-        return arrays, {"centre": [float(x) for x in centre], "object_left_out": left_out}
+        of_surface = seen_from(self._builder.scene.object(name).mesh, seen)
+        meta = {"centre": [float(x) for x in centre], "object_left_out": left_out, "traced": self._cache is None}
+        meta["hidden_share"] = round(hidden_share(of_surface, centre, seen), 3)
+        meta["parallax_deg"] = round(parallax_deg(of_surface, centre, planes), 2)
+        return arrays, meta

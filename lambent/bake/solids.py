@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.core.sequences import cosine_hemisphere, hammersley
-from lambent.scenes.scene import Mesh
+from lambent.scenes.scene import Mesh, Scene, SceneObject
 
 Array = NDArray[np.floating]
 RAYS = 16
@@ -30,13 +30,32 @@ def is_closed(mesh: Mesh) -> bool:
     return len(np.unique(code)) == len(code) and bool(np.array_equal(np.sort(code), np.sort(back)))
 
 
+def _closed(scene: Scene) -> set[str]:
+    """Names of closed objects; parts are closed where their whole is."""
+    wholes: dict[str, list[SceneObject]] = {}
+    for o in scene.objects:
+        wholes.setdefault(scene.parts.get(o.name, o.name), []).append(o)
+    return {o.name for parts in wholes.values() if is_closed(_joined(parts)) for o in parts}
+
+
+def _joined(parts: list[SceneObject]) -> Mesh:
+    meshes = [o.mesh for o in parts]
+    if len(meshes) == 1:
+        return meshes[0]
+    first = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])[:-1]
+    faces = np.concatenate([mesh.faces + f for mesh, f in zip(meshes, first, strict=True)]).astype(np.uint32)
+    arrays = (np.concatenate([getattr(m, n) for m in meshes]) for n in ("positions", "normals", "tangents", "uv"))
+    return Mesh(*arrays, faces)
+
+
 class SolidTest:
     """Tells points within closed, opaque objects, by the inner sides their rays meet."""
 
     def __init__(self, builder: SceneBuilder, scene: Any) -> None:
         materials, textures = builder.scene.materials, builder.scene.textures
         open_ = {n for n, m in materials.items() if m.transmits} | {n for n, t in textures.items() if t.opacity}
-        solid = [is_closed(o.mesh) and o.material not in open_ for o in builder.scene.objects]
+        closed = _closed(builder.scene)
+        solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
 

@@ -29,6 +29,11 @@ class Integrator(StrEnum):
     photons = "photons"
 
 
+class Probes(StrEnum):
+    cached = "cached"
+    traced = "traced"
+
+
 class Kind(StrEnum):
     geometry = "geometry"
     light_map = "light_map"
@@ -46,6 +51,10 @@ def command(
     light_map: Annotated[
         Integrator | None, typer.Option(help="What integrates the light map. [default: as in the store, else paths]")
     ] = None,
+    probes: Annotated[
+        Probes | None,
+        typer.Option(help="Probes from the light map, or path traced. [default: as in the store, else cached]"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
@@ -59,7 +68,7 @@ def command(
     with progress_bar() as progress:
         store = bake(
             what, output, quality=quality.value, only=only, resume=resume, seed=seed, progress=progress,
-            light_map=light_map and light_map.value,
+            light_map=light_map and light_map.value, probes=probes and probes.value,
         )  # fmt: skip
     store.set_document(SOURCE, _place(scene, output))
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}

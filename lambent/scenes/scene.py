@@ -185,6 +185,7 @@ class Scene:
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
+    parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
 
     @property

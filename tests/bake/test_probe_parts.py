@@ -1,0 +1,96 @@
+"""Objects in several parts, with a probe each, and probes that are path traced whole."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.engine import engine
+from lambent.bake.solids import is_closed
+from lambent.core.cubemap import texel_solid_angles
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.store.contract import scene_record
+from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, furnace, room_with_step, turned_inwards
+
+
+def two_rooms() -> Scene:
+    """A red and a blue room, a thin wall between them at x = 1, and a long mirror that reaches through it."""
+    bar = sphere(1.0, 24, 24)
+    bar = replace(bar, positions=(bar.positions * np.float32([2.5, 0.15, 0.15])).astype(np.float32))
+    objects = (
+        SceneObject("left", patch((-3, -2, -2), (0, 0, 4), (0, 4, 0)), "grey", emission=(1, 0, 0)),
+        SceneObject("right", patch((3, -2, 2), (0, 0, -4), (0, 4, 0)), "grey", emission=(0, 0, 1)),
+        SceneObject("shell", turned_inwards(box((6.2, 4, 4))), "grey"),
+        SceneObject("wall", placed(box((0.1, 4, 4)), (1.0, 0, 0)), "grey"),
+        SceneObject("bar", bar, "mirror"),
+        SceneObject("ball", placed(sphere(0.3, 24, 24), (-1.5, 1.2, 0)), "mirror"),
+    )
+    return Scene("two rooms", objects, {"grey": GREY, "black": BLACK, "mirror": MIRROR})
+
+
+def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
+    store = bake(two_rooms(), tmp_path / "s", quality=TINY)
+    objects = {o.name: o for o in scene_record(store).objects}
+    parts = sorted(name for name in objects if name.startswith("bar"))
+    assert "ball" in objects and len(parts) > 1 and "bar" not in objects
+    assert sum(objects[name].face_count for name in parts) == len(two_rooms().object("bar").mesh.faces)
+    colours = {}
+    for name in parts:
+        radiance = store.read(f"probe/{name}/radiance").astype(float)
+        colours[name] = (radiance * texel_solid_angles(TINY.probe_texels)[..., None]).sum(axis=(0, 1, 2))
+    red, blue = (max(colours.values(), key=lambda c: c[k] / c.sum()) for k in (0, 2))
+    assert red[0] > 5 * red[2] and blue[2] > 2 * blue[0], "each sees its own room"
+    ball = store.artefact("probe/ball/radiance").meta
+    assert ball["hidden_share"] < 0.1
+    again = bake(two_rooms(), tmp_path / "s", quality=TINY)
+    assert {a.name: a.key for a in again.artefacts()} == {a.name: a.key for a in store.artefacts()}
+
+
+def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A mirror of few faces cannot be cut."""
+    scene = two_rooms()
+    coarse = SceneObject("bar", box((5.0, 0.3, 0.3)), "mirror")
+    scene = replace(scene, objects=(*(o for o in scene.objects if o.name != "bar"), coarse))
+    with caplog.at_level(logging.WARNING):
+        store = bake(scene, tmp_path / "s", quality=TINY)
+    assert "bar" in [o.name for o in scene_record(store).objects]
+    assert "bar: its probe has not seen" in caplog.text and "ball" not in caplog.text
+
+
+def test_parts_of_a_solid_are_solid() -> None:
+    engine()
+    from lambent.bake.probe_parts import split
+    from lambent.bake.solids import SolidTest
+
+    scene = two_rooms()
+    faces = len(scene.object("bar").mesh.faces)
+    cut = split(scene, {"bar": "0" * (faces // 2) + "1" * (faces - faces // 2)})
+    assert not is_closed(cut.object("bar.part1").mesh)
+    from lambent.bake.mitsuba_scene import SceneBuilder
+
+    builder = SceneBuilder(cut)
+    within = SolidTest(builder, builder.build()).embedded(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
+    assert within.all()
+
+
+def test_traced_probe_of_the_furnace_has_radiance_one(tmp_path: Path) -> None:
+    ball = SceneObject("ball", sphere(0.03, 16, 8), "mirror")  # takes next to nothing away
+    scene = replace(furnace(), objects=(*furnace().objects, ball), materials={"grey": GREY, "mirror": MIRROR})
+    store = bake(scene, tmp_path / "s", quality=replace(TINY, probe_samples=128), probes="traced")
+    radiance = store.read("probe/ball/radiance").astype(float)
+    assert radiance.mean() == pytest.approx(1.0, rel=0.01)
+    assert store.artefact("probe/ball/radiance").meta["traced"]
+
+
+def test_traced_and_cached_probes_agree(tmp_path: Path) -> None:
+    quality = replace(TINY, probe_samples=256, light_map_texels=96)
+    cached = bake(room_with_step(), tmp_path / "s", quality=quality)
+    one = cached.read("probe/ball/radiance").astype(float)
+    other = bake(room_with_step(), tmp_path / "s", quality=quality, probes="traced").read("probe/ball/radiance")
+    assert other.astype(float).mean() == pytest.approx(one.mean(), rel=0.02)
