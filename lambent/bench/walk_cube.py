@@ -57,15 +57,15 @@ def run(quick: bool, inputs: list[Path], progress: Progress = silent) -> dict[st
     size = SIZES[quick]
     rows = _measurements(device, *size)
     main = next(m for m in rows if (m.integrator, m.coverage, m.n) == ("rings", "full", 7))
-    scaled = [_measured(main.renderer, "rings", "full", 7, *_scaled(size, factor)) for factor in (0.5, 2.0)]
-    _measure([*rows, *scaled], progress)
+    scaled = [_measured(main.renderer, "rings", "full", 7, *scaled_size(size, factor)) for factor in (0.5, 2.0)]
+    measure([*rows, *scaled], progress)
     floors = {m.coverage: m for m in rows if m.integrator == "diffuse"}
     return {
         "bench": NAME,
         "machine": machine(device),
         "inputs": inputs_of(inputs),
-        "rows": [_row(m, floors[m.coverage]) for m in rows],
-        "summary": _summary(rows, scaled),
+        "rows": [row_of(m, floors[m.coverage]) for m in rows],
+        "summary": summary_of(rows, scaled),
     }
 
 
@@ -96,11 +96,11 @@ def _measured(renderer: Renderer, integrator: str, coverage: str, n: int | None,
     return Measured(integrator, coverage, n, renderer, state, [], [])
 
 
-def _scaled(size: tuple[int, int], factor: float) -> tuple[int, int]:
+def scaled_size(size: tuple[int, int], factor: float) -> tuple[int, int]:
     return round(size[0] * factor**0.5), round(size[1] * factor**0.5)
 
 
-def _measure(rows: list[Measured], progress: Progress) -> None:
+def measure(rows: list[Measured], progress: Progress) -> None:
     """Draw all rows once to warm up, then ROUNDS times in turns, every second round backwards."""
     for index in range(ROUNDS + 1):
         for done, row in enumerate(rows if index % 2 else rows[::-1]):
@@ -114,7 +114,7 @@ def _measure(rows: list[Measured], progress: Progress) -> None:
             progress(index * len(rows) + done + 1, (ROUNDS + 1) * len(rows), f"{row.integrator} n {row.n}")
 
 
-def _row(row: Measured, floor: Measured) -> dict[str, Any]:
+def row_of(row: Measured, floor: Measured) -> dict[str, Any]:
     width, height = row.state.width, row.state.height
     gpu_ms, wall_ms = median(row.gpu_ms), median(row.wall_ms)
     samples = (row.n or 0) * width * height * (1.0 if row.coverage == "full" else 0.5)
@@ -136,7 +136,7 @@ def _row(row: Measured, floor: Measured) -> dict[str, Any]:
     }
 
 
-def _summary(rows: list[Measured], scaled: list[Measured]) -> dict[str, Any]:
+def summary_of(rows: list[Measured], scaled: list[Measured]) -> dict[str, Any]:
     """Milliseconds per integrator and n at full coverage, and the exponent of time against pixels."""
     small, large = scaled
     growth = np.log(median(large.wall_ms) / median(small.wall_ms)) / np.log(4)

@@ -1,0 +1,189 @@
+"""The scene of the planar benches, in memory: a floor and a wall, with a cube, a cylinder, a ball, a lamp and a pole.
+
+What stands on the floor is patterned and sends the same radiance everywhere, so that its reflection can be traced
+exactly: `exact_reflection` casts rays at the triangles that the renderer draws and reads the same light map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.camera import image_plane
+from lambent.realtime.unbaked import unbaked_scene
+from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
+from lambent.scenes.scene import Mesh, Scene, SceneObject
+from lambent.store.contract import CameraRecord, ReflectorPart, ReflectorRecord, Triple
+
+Floats = NDArray[np.floating]
+FLOOR, PAINT, REACH = "floor", "paint", 4.0
+SKY: Triple = (0.25, 0.3, 0.4)
+LAMP: Triple = (12.0, 10.0, 8.0)
+CAMERA = CameraRecord(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
+SECOND = CameraRecord(name="second", position=(-1.6, 0.9, 3.4), target=(0.2, 0.3, -0.4), fov_y_deg=46.0)
+COLOURS: Mapping[str, Triple] = {
+    "wall": (0.75, 0.7, 0.6), "cube": (0.8, 0.25, 0.15), "cylinder": (0.2, 0.5, 0.75), "ball": (0.3, 0.7, 0.3),
+    "pole": (0.1, 0.1, 0.12), "lamp": (0.0, 0.0, 0.0),
+}  # fmt: skip
+TILE_TEXELS = 256  # of the light map, for each object
+ROWS_AT_ONCE = 1 << 23  # rays
+
+
+def meshes() -> dict[str, Mesh]:
+    """All shapes; the floor is the plane y = 0."""
+    return {
+        "wall": patch((-REACH, 0, -2), (2 * REACH, 0, 0), (0, 3.2, 0)),
+        "cube": placed(box((0.7, 0.7, 0.7)), (-0.9, 0.35, 0.1), turn("y", 25)),
+        "cylinder": placed(cylinder(0.3, 1.1, 64), (0.15, 0.0, -0.7)),
+        "ball": placed(sphere(0.36, 64, 32), (0.95, 0.36, 0.35)),
+        "pole": placed(cylinder(0.025, 2.2, 24), (0.45, 0.0, 0.75)),
+        "lamp": placed(sphere(0.12, 32, 16), (-0.25, 1.35, 0.2)),
+        FLOOR: patch((-REACH, 0, REACH), (2 * REACH, 0, 0), (0, 0, -2 * REACH)),
+    }
+
+
+def floor_material(lobe: Lobe) -> Material:
+    return Material(name=FLOOR, lobes=(lobe,))
+
+
+def planar_scene(lobe: Lobe) -> BakedScene:
+    """The scene with a floor of one lobe."""
+    shapes = meshes()
+    sky = np.broadcast_to(np.float32(SKY), (6, 4, 4, 3)).copy()
+    scene = unbaked_scene(shapes, Material(name=PAINT, kd=(1, 1, 1)), sky, name="planar bench")
+    objects = tuple(
+        o.model_copy(
+            update={
+                "material": FLOOR if o.name == FLOOR else PAINT,
+                "emission": LAMP if o.name == "lamp" else (0.0, 0.0, 0.0),
+            }
+        )
+        for o in scene.record.objects
+    )
+    outline = ((-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH))
+    part = ReflectorPart(object=FLOOR, faces=(0, 1), area_m2=4 * REACH * REACH)
+    reflector = ReflectorRecord(plane=(0, 1, 0, 0), outline=outline, parts=(part,))
+    materials = {PAINT: scene.record.materials[PAINT], FLOOR: floor_material(lobe)}
+    record = scene.record.model_copy(update={"objects": objects, "materials": materials, "reflectors": (reflector,)})
+    uv2 = np.concatenate(list(light_map_places(shapes).values()))
+    return replace(scene, record=record, uv2=uv2, irradiance=light_map())
+
+
+def light_map() -> Floats:
+    """Irradiance (TILE, TILE objects, 3): a tile of checks on a slope of brightness for each object."""
+    at = (np.arange(TILE_TEXELS) + 0.5) / TILE_TEXELS
+    u, v = np.meshgrid(at, at)
+    checks = np.where((np.floor(u * 10) + np.floor(v * 10)) % 2 == 0, 1.0, 0.45) * (0.6 + 0.6 * u)
+    tiles = [np.pi * checks[..., None] * np.array(COLOURS.get(name, (0, 0, 0))) for name in meshes()]
+    return np.concatenate(tiles, axis=1).astype(np.float32)
+
+
+def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
+    """Coordinates uv2 (V, 2) of each shape: its texture coordinates, spread over its tile."""
+    places = {}
+    for i, (name, mesh) in enumerate(shapes.items()):
+        uv = mesh.uv.astype(float)
+        low, span = uv.min(axis=0), np.maximum(np.ptp(uv, axis=0), 1e-6)
+        inner = 0.02 + 0.96 * (uv - low) / span
+        places[name] = np.column_stack([(i + inner[:, 0]) / len(shapes), inner[:, 1]]).astype(np.float32)
+    return places
+
+
+def exact_reflection(
+    lobe: Lobe, camera: CameraRecord, width: int, height: int, spp: int, progress: Progress = silent
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Radiance (height, width, 3) of the floor by ray casting, and where the floor is (height, width) bool.
+
+    `spp` samples of the lobe at every pixel's centre, as the renderer's `qmc` takes them, each traced to the triangle
+    that it hits.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    from lambent.bake.engine import engine
+
+    engine()
+    whole, cache, emission = _traced_scene()
+    across, up, forward = image_plane(camera, width, height)
+    x, y = (np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2
+    rays = (forward + x[None, :, None] * across + y[:, None, None] * up).reshape(-1, 3)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    eye = np.asarray(camera.position, float)
+    place = eye - rays * (eye[1] / np.minimum(rays[:, 1], -1e-9))[:, None]
+    on_floor = (rays[:, 1] < 0) & (np.abs(place[:, [0, 2]]).max(axis=1) < REACH)
+    origin = mi.Point3f(*map(float, eye)) + dr.zeros(mi.Point3f, len(rays))
+    seen = whole.ray_intersect(mi.Ray3f(origin, mi.Vector3f(rays.T.astype(np.float32))))
+    hidden = np.array(seen.is_valid()) & (np.array(seen.t) < np.linalg.norm(place - eye, axis=1) - 1e-3)
+    floor = np.flatnonzero(on_floor & ~hidden)
+    light = np.zeros((len(rays), 3))
+    at_once = max(1, ROWS_AT_ONCE // spp)
+    for start in range(0, len(floor), at_once):
+        mine = floor[start : start + at_once]
+        light[mine] = _reflected(whole, cache, emission, lobe, place[mine], -rays[mine], mine, spp)
+        progress(start + len(mine), len(floor), "pixels traced")
+    shown = np.zeros(len(rays), bool)
+    shown[floor] = True
+    return light.reshape(height, width, 3).astype(np.float32), shown.reshape(height, width)
+
+
+def _traced_scene() -> tuple[object, object, object]:
+    """mi.Scene of what stands on the floor, its light map, and emission by object number."""
+    import mitsuba as mi
+
+    from lambent.bake.mitsuba_scene import SceneBuilder
+    from lambent.bake.probe import LightMapCache
+
+    shapes = meshes()
+    objects = tuple(SceneObject(name, mesh, PAINT) for name, mesh in shapes.items())
+    scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
+    builder = SceneBuilder(scene, light_map_places(shapes))
+    emission = np.array([LAMP if name == "lamp" else (0, 0, 0) for name in shapes], np.float32)
+    table = (builder.object_numbers(), mi.Color3f(emission.T.copy()))
+    return builder.build(leave_out={FLOOR}), LightMapCache(builder, light_map(), None), table
+
+
+def _reflected(
+    whole: object, cache: object, emission: object, lobe: Lobe, p: Floats, wo: Floats, pixel: Floats, spp: int
+) -> Floats:
+    """Reflected radiance (k, 3) at points (k, 3) towards wo (k, 3)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    count = len(p) * spp
+    index = dr.arange(mi.UInt32, count)
+    at, k = index // spp, index % spp
+
+    def per_point(values: Floats) -> object:
+        return dr.gather(mi.Vector3f, mi.Vector3f(values.T.astype(np.float32)), at)
+
+    # an additive sequence (Roberts 2018), moved by pixel
+    start = np.random.default_rng(7).integers(1 << 32, size=(len(p), 2), dtype=np.uint64).astype(np.uint32)
+    words = [dr.gather(mi.UInt32, mi.UInt32(np.ascontiguousarray(start[:, i])), at) for i in range(2)]
+    u, v = (
+        (mi.Float((w + k * mi.UInt32(step)) >> 8) + 0.5) / 16777216.0
+        for w, step in zip(words, (3242174889, 2447445413), strict=True)
+    )
+    r = dr.sqrt(-dr.log(1 - u)) if lobe.distribution == "beckmann" else dr.sqrt(u / (1 - u))
+    phi = 2 * dr.pi * v
+    # the floor's frame: t = +x, n = +y, b = n x t = -z
+    slope_t, slope_b = r * lobe.mx * dr.cos(phi), r * lobe.my * dr.sin(phi)
+    h = dr.normalize(mi.Vector3f(slope_t, 1.0, -slope_b))
+    view = per_point(wo)
+    cos_d = dr.dot(view, h)
+    wi = 2 * cos_d * h - view
+    valid = (cos_d > 1e-4) & (wi.y > 1e-4)
+    fresnel = mi.Color3f(*lobe.r0) + (1 - mi.Color3f(*lobe.r0)) * (1 - dr.clip(cos_d, 0, 1)) ** 5
+    g = mi.Color3f(*lobe.k) * fresnel * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
+    si = whole.ray_intersect(mi.Ray3f(mi.Point3f(per_point(p)), wi), mi.RayFlags.All, True, valid)  # type: ignore[attr-defined]
+    hit = valid & si.is_valid()
+    numbers, lamps = emission  # type: ignore[misc]
+    number = dr.gather(mi.UInt32, numbers, dr.reinterpret_array(mi.UInt32, si.shape), hit)
+    seen = cache(si, hit) + dr.gather(mi.Color3f, lamps, number, hit)  # type: ignore[operator]
+    light = dr.select(valid, g * dr.select(hit, seen, mi.Color3f(*SKY)), 0.0)
+    return np.stack([np.array(dr.block_sum(c, spp)) for c in (light.x, light.y, light.z)], axis=1) / spp
