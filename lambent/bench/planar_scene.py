@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.frames import normalize
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
@@ -32,7 +33,6 @@ COLOURS: Mapping[str, Triple] = {
     "pole": (0.1, 0.1, 0.12), "lamp": (0.0, 0.0, 0.0),
 }  # fmt: skip
 TILE_TEXELS = 256  # of the light map, for each object
-ROWS_AT_ONCE = 1 << 23  # rays
 
 
 def meshes() -> dict[str, Mesh]:
@@ -103,87 +103,25 @@ def exact_reflection(
     `spp` samples of the lobe at every pixel's centre, as the renderer's `qmc` takes them, each traced to the triangle
     that it hits.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     from lambent.bake.engine import engine
 
     engine()
-    whole, cache, emission = _traced_scene()
-    across, up, forward = image_plane(camera, width, height)
-    x, y = (np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2
-    rays = (forward + x[None, :, None] * across + y[:, None, None] * up).reshape(-1, 3)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    eye = np.asarray(camera.position, float)
-    place = eye - rays * (eye[1] / np.minimum(rays[:, 1], -1e-9))[:, None]
-    on_floor = (rays[:, 1] < 0) & (np.abs(place[:, [0, 2]]).max(axis=1) < REACH)
-    origin = mi.Point3f(*map(float, eye)) + dr.zeros(mi.Point3f, len(rays))
-    seen = whole.ray_intersect(mi.Ray3f(origin, mi.Vector3f(rays.T.astype(np.float32))))
-    hidden = np.array(seen.is_valid()) & (np.array(seen.t) < np.linalg.norm(place - eye, axis=1) - 1e-3)
-    floor = np.flatnonzero(on_floor & ~hidden)
-    light = np.zeros((len(rays), 3))
-    at_once = max(1, ROWS_AT_ONCE // spp)
-    for start in range(0, len(floor), at_once):
-        mine = floor[start : start + at_once]
-        light[mine] = _reflected(whole, cache, emission, lobe, place[mine], -rays[mine], mine, spp)
-        progress(start + len(mine), len(floor), "pixels traced")
-    shown = np.zeros(len(rays), bool)
-    shown[floor] = True
-    return light.reshape(height, width, 3).astype(np.float32), shown.reshape(height, width)
-
-
-def _traced_scene() -> tuple[object, object, object]:
-    """mi.Scene of what stands on the floor, its light map, and emission by object number."""
-    import mitsuba as mi
-
-    from lambent.bake.mitsuba_scene import SceneBuilder
-    from lambent.bake.probe import LightMapCache
+    from lambent.bake.planar_reflection import ReflectionTracer
 
     shapes = meshes()
-    objects = tuple(SceneObject(name, mesh, PAINT) for name, mesh in shapes.items())
+    lamps = {"lamp": LAMP}
+    objects = tuple(SceneObject(n, mesh, PAINT, lamps.get(n, (0.0, 0.0, 0.0))) for n, mesh in shapes.items())
     scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
-    builder = SceneBuilder(scene, light_map_places(shapes))
-    emission = np.array([LAMP if name == "lamp" else (0, 0, 0) for name in shapes], np.float32)
-    table = (builder.object_numbers(), mi.Color3f(emission.T.copy()))
-    return builder.build(leave_out={FLOOR}), LightMapCache(builder, light_map(), None), table
+    tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(), FLOOR, SKY)
 
-
-def _reflected(
-    whole: object, cache: object, emission: object, lobe: Lobe, p: Floats, wo: Floats, pixel: Floats, spp: int
-) -> Floats:
-    """Reflected radiance (k, 3) at points (k, 3) towards wo (k, 3)."""
-    import drjit as dr
-    import mitsuba as mi
-
-    count = len(p) * spp
-    index = dr.arange(mi.UInt32, count)
-    at, k = index // spp, index % spp
-
-    def per_point(values: Floats) -> object:
-        return dr.gather(mi.Vector3f, mi.Vector3f(values.T.astype(np.float32)), at)
-
-    # an additive sequence (Roberts 2018), moved by pixel
-    start = np.random.default_rng(7).integers(1 << 32, size=(len(p), 2), dtype=np.uint64).astype(np.uint32)
-    words = [dr.gather(mi.UInt32, mi.UInt32(np.ascontiguousarray(start[:, i])), at) for i in range(2)]
-    u, v = (
-        (mi.Float((w + k * mi.UInt32(step)) >> 8) + 0.5) / 16777216.0
-        for w, step in zip(words, (3242174889, 2447445413), strict=True)
-    )
-    r = dr.sqrt(-dr.log(1 - u)) if lobe.distribution == "beckmann" else dr.sqrt(u / (1 - u))
-    phi = 2 * dr.pi * v
-    # the floor's frame: t = +x, n = +y, b = n x t = -z
-    slope_t, slope_b = r * lobe.mx * dr.cos(phi), r * lobe.my * dr.sin(phi)
-    h = dr.normalize(mi.Vector3f(slope_t, 1.0, -slope_b))
-    view = per_point(wo)
-    cos_d = dr.dot(view, h)
-    wi = 2 * cos_d * h - view
-    valid = (cos_d > 1e-4) & (wi.y > 1e-4)
-    fresnel = mi.Color3f(*lobe.r0) + (1 - mi.Color3f(*lobe.r0)) * (1 - dr.clip(cos_d, 0, 1)) ** 5
-    g = mi.Color3f(*lobe.k) * fresnel * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
-    si = whole.ray_intersect(mi.Ray3f(mi.Point3f(per_point(p)), wi), mi.RayFlags.All, True, valid)  # type: ignore[attr-defined]
-    hit = valid & si.is_valid()
-    numbers, lamps = emission  # type: ignore[misc]
-    number = dr.gather(mi.UInt32, numbers, dr.reinterpret_array(mi.UInt32, si.shape), hit)
-    seen = cache(si, hit) + dr.gather(mi.Color3f, lamps, number, hit)  # type: ignore[operator]
-    light = dr.select(valid, g * dr.select(hit, seen, mi.Color3f(*SKY)), 0.0)
-    return np.stack([np.array(dr.block_sum(c, spp)) for c in (light.x, light.y, light.z)], axis=1) / spp
+    across, up, forward = image_plane(camera, width, height)
+    x, y = (np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2
+    rays = normalize((forward + x[None, :, None] * across + y[:, None, None] * up).reshape(-1, 3))
+    eye = np.asarray(camera.position, float)
+    to_floor = -eye[1] / np.minimum(rays[:, 1], -1e-9)
+    place = eye + rays * to_floor[:, None]
+    shown = (rays[:, 1] < 0) & (np.abs(place[:, [0, 2]]).max(axis=1) < REACH)
+    shown &= tracer.distance(eye, rays) > to_floor - 1e-3
+    light = np.zeros((len(rays), 3), np.float32)
+    light[shown] = tracer.reflected(lobe, place[shown], -rays[shown], spp, progress)
+    return light.reshape(height, width, 3), shown.reshape(height, width)

@@ -1,0 +1,89 @@
+"""What a lobe on a horizontal plane reflects, by casting every ray at the triangles: the truth for planar reflectors.
+
+Surfaces send what the light map and their emission say, the same in all directions; beyond them is a sky of one colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.probe import LightMapCache
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Lobe
+from lambent.scenes.scene import Scene, Triple
+
+Array = NDArray[np.floating]
+RAYS_AT_ONCE = 1 << 23
+
+
+class ReflectionTracer:
+    """Casts rays at a scene with light map coordinates `uv2` and irradiance (H, W, 3), without the object `plane`.
+
+    The plane is y = 0, t = +x, n = +y, b = n x t = -z.
+    """
+
+    def __init__(self, scene: Scene, uv2: Mapping[str, Array], irradiance: Array, plane: str, sky: Triple) -> None:
+        builder = SceneBuilder(scene, uv2)
+        self._scene = builder.build(leave_out={plane})
+        self._cache = LightMapCache(builder, irradiance, None)
+        self._numbers = builder.object_numbers()
+        self._emission = mi.Color3f(np.array([o.emission for o in scene.objects], np.float32).T.copy())
+        self._sky = mi.Color3f(*sky)
+
+    def distance(self, origin: Array, directions: Array) -> Array:
+        """Distance (k,) from a point (3,) along unit directions (k, 3), infinite where nothing is hit."""
+        start = mi.Point3f(*map(float, origin)) + dr.zeros(mi.Point3f, len(directions))
+        rays = mi.Ray3f(start, mi.Vector3f(np.ascontiguousarray(directions.T, np.float32)))
+        seen = self._scene.ray_intersect(rays, mi.RayFlags.Minimal, True)
+        return np.array(dr.select(seen.is_valid(), seen.t, np.inf))
+
+    def reflected(self, lobe: Lobe, points: Array, wo: Array, spp: int, progress: Progress = silent) -> Array:
+        """Radiance (k, 3) that points (k, 3) of the plane reflect towards wo (k, 3), from `spp` rays each."""
+        light = np.zeros((len(points), 3))
+        at_once = max(1, RAYS_AT_ONCE // spp)
+        rng = np.random.default_rng(7)
+        for start in range(0, len(points), at_once):
+            mine = slice(start, start + at_once)
+            light[mine] = self._reflected(lobe, points[mine], wo[mine], spp, rng)
+            progress(min(start + at_once, len(points)), len(points), "points traced")
+        return light
+
+    def _reflected(self, lobe: Lobe, points: Array, wo: Array, spp: int, rng: np.random.Generator) -> Array:
+        index = dr.arange(mi.UInt32, len(points) * spp)
+        at = index // spp
+        view = dr.gather(mi.Vector3f, _vectors(wo), at)
+        h = _half_vectors(lobe, at, index % spp, rng.integers(1 << 32, size=(2, len(points)), dtype=np.uint64))
+        cos_d = dr.dot(view, h)
+        wi = 2 * cos_d * h - view
+        valid = (cos_d > 1e-4) & (wi.y > 1e-4)
+        r0 = mi.Color3f(*lobe.r0)
+        fresnel = r0 + (1 - r0) * (1 - dr.clip(cos_d, 0, 1)) ** 5
+        gain = mi.Color3f(*lobe.k) * fresnel * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
+        origin = mi.Point3f(dr.gather(mi.Vector3f, _vectors(points), at))
+        si = self._scene.ray_intersect(mi.Ray3f(origin, wi), mi.RayFlags.All, True, valid)
+        hit = valid & si.is_valid()
+        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), hit)
+        seen = self._cache(si, hit) + dr.gather(mi.Color3f, self._emission, number, hit)
+        light = dr.select(valid, gain * dr.select(hit, seen, self._sky), 0.0)
+        return np.stack([np.array(dr.block_sum(c, spp)) for c in (light.x, light.y, light.z)], axis=1) / spp
+
+
+def _vectors(values: Array) -> mi.Vector3f:
+    return mi.Vector3f(np.ascontiguousarray(values.T, np.float32))
+
+
+def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64]) -> mi.Vector3f:
+    """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) from `starts` (2, points) on."""
+    u, v = (
+        (mi.Float((dr.gather(mi.UInt32, mi.UInt32(word.astype(np.uint32)), at) + k * step) >> 8) + 0.5) / 16777216.0
+        for word, step in zip(starts, (3242174889, 2447445413), strict=True)
+    )
+    r = dr.sqrt(u / (1 - u)) if lobe.distribution == "ggx" else dr.sqrt(-dr.log(1 - u))
+    phi = 2 * dr.pi * v
+    return dr.normalize(mi.Vector3f(r * lobe.mx * dr.cos(phi), 1.0, -r * lobe.my * dr.sin(phi)))
