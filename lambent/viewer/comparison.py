@@ -101,7 +101,7 @@ class Errors:
         self._difference = difference(a, b)
         pair = [shown(np.asarray(x, np.float32), view, exposure_ev) for x in (b, a)]
         before = comparison.figures
-        comparison.figures = Figures(psnr(*pair), float(self._difference.mean()), samples)
+        comparison.figures = Figures(psnr(pair[0], pair[1]), float(self._difference.mean()), samples)
         if before is not None and self._flip is not None:
             comparison.figures = _with_flip(comparison.figures, before.flip_mean, before.flip_of, before.flip_step)
         if self._work is None:

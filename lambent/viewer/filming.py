@@ -13,6 +13,7 @@ from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radia
 from lambent.realtime.frame import QMC_N, FrameState, Renderer
 from lambent.store.camera_paths import camera_at
 from lambent.store.contract import PathRecord
+from lambent.viewer.picture import scaled
 
 SIZES = {"1280 x 720": (1280, 720), "1920 x 1080": (1920, 1080), "3840 x 2160": (3840, 2160), "640 x 360": (640, 360)}
 FPS = (24, 25, 30, 60)
@@ -120,7 +121,7 @@ class Filming:
         """None between parts of the work, then the picture."""
         linear = radiance_wanted(self.file)
         if not self._quality:
-            yield self._renderer.image(view) if linear else self._renderer.display_image(view)
+            yield self._renderer.image(view) if linear else scaled(self._renderer.display_image(view), view)
             return
         parts = -(-self._quality // QMC_N)
         for index in range(parts - 1):
@@ -128,4 +129,4 @@ class Filming:
             self._renderer.finish()
             yield None
         last = replace(view, integrator="qmc", n=QMC_N, accumulate=parts - 1)
-        yield self._renderer.image(last) if linear else self._renderer.display_image(last)
+        yield self._renderer.image(last) if linear else scaled(self._renderer.display_image(last), view)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode
 from lambent.core.false_colour import ILLUMINANCE_UNIT, LUMINANCE_UNIT, Range, with_scale
@@ -73,17 +74,19 @@ class Picture:
         integrator: str | None = None,
         refine: bool | None = None,
         share: float = 1.0,
+        antialias: bool = True,
     ) -> None:
         """Draw the next frame where one is due.
 
         `materials`, `integrator` and `refine` stand in for the state's; `share` of the frame time is for this picture.
+        Without `antialias` every frame looks through the middle of each pixel.
         """
         width, height = (min(round(size * pixel_ratio), LARGEST_PX) for size in (rect.width, rect.height))
         wanted = frame_state(state, width, height)
         if materials is not None:
             wanted = replace(wanted, materials=dict(materials))
         if integrator is not None:
-            wanted = replace(wanted, integrator=integrator)
+            wanted = replace(wanted, integrator=integrator, antialias=antialias)
         now_s, self._refine = state.clock(), state.refine if refine is None else refine
         self._pacer.aim(share * state.target_ms / 1e3)
         plan = self._pacer.plan(wanted, now_s, refine=self._refine, adaptive=state.adaptive_resolution)
@@ -115,10 +118,7 @@ class Picture:
         try:
             write_image(state.folder / f"{name}.exr", self._renderer.image(frame))
             display = self._renderer.display_image(frame)
-            if frame.view_transform == FALSE_COLOUR:
-                display = with_scale(
-                    display, frame.scale, ILLUMINANCE_UNIT if frame.show == LIGHT_MAP else LUMINANCE_UNIT
-                )
+            display = scaled(display, frame)
             write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
         except OSError as error:
             state.say(f"picture not saved: {error}")
@@ -163,6 +163,13 @@ class Picture:
             accumulate_to=REST_FRAMES * self._rest_n,
             scale=scale,
         )
+
+
+def scaled(display: NDArray[np.uint8], frame: FrameState) -> NDArray[np.uint8]:
+    """A picture of the frame as it is kept: false colours with the scale that says what they mean."""
+    if frame.view_transform != FALSE_COLOUR:
+        return display
+    return with_scale(display, frame.scale, ILLUMINANCE_UNIT if frame.show == LIGHT_MAP else LUMINANCE_UNIT)
 
 
 def frame_state(state: ViewerState, width: int, height: int) -> FrameState:

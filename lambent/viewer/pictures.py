@@ -91,7 +91,11 @@ class Pictures:
             self._b = Picture(Renderer(self.device, self._renderer.scene, beside=self._renderer))
         a, b = self._a, self._b
         refine = comparison.integrator == REFERENCE
-        b.update(state, rect, pixel_ratio, integrator=comparison.integrator, refine=refine, share=SHARED)
+        # A looks through the middle of each pixel: so does B where the difference is to be that of the integrators.
+        edges = comparison.mode == "side by side"
+        b.update(
+            state, rect, pixel_ratio, integrator=comparison.integrator, refine=refine, share=SHARED, antialias=edges
+        )
         a.update(state, rect, pixel_ratio, refine=False, share=SHARED)  # last: its figures are the window's
         comparison.a_label = state.integrator
         comparison.b_label = f"{comparison.integrator}, {b.samples} samples" if b.samples else comparison.integrator
@@ -106,7 +110,7 @@ class Pictures:
             comparison.figures = None if not at_rest else comparison.figures
             self._errors.forget()
         else:
-            what = (a.version, comparison.integrator)
+            what = (a.version, comparison.integrator, comparison.mode)
             if self._errors.due(what, max(1, b.accumulated)):
                 view = "filmic" if state.view_transform == FALSE_COLOUR else state.view_transform
                 pictures = (read_picture(self.device, a.radiance), read_picture(self.device, b.radiance))

@@ -17,7 +17,9 @@ def draw(state: ViewerState, picture: Rect, textures: Mapping[str, imgui.ImTextu
     behind = imgui.get_background_draw_list()
     behind.push_clip_rect((picture.x, picture.y), (picture.x + picture.width, picture.y + picture.height), True)
     for line in state.marks.lines:
-        points = [imgui.ImVec2(picture.x + x * picture.width, picture.y + y * picture.height) for x, y in line.points]
+        points: list[imgui.ImVec2Like] = [
+            imgui.ImVec2(picture.x + x * picture.width, picture.y + y * picture.height) for x, y in line.points
+        ]
         behind.add_polyline(points, col=imgui.get_color_u32(LINE), thickness=2.0, flags=imgui.ImDrawFlags_.closed)
     for ball in state.marks.balls:
         texture = textures.get(f"probe {ball.name}")

@@ -71,9 +71,9 @@ def _scale_bar(state: ViewerState, picture: Rect) -> None:
     height = (y1 - y0) / STEPS
     for step in range(STEPS):
         at = (1 - (step + 0.5) / STEPS) * (len(stops) - 1)
-        colour = [float(np.interp(at, np.arange(len(stops)), channel)) for channel in stops.T]
+        red, green, blue = (float(np.interp(at, np.arange(len(stops)), channel)) for channel in stops.T)
         begin, end = (x0, y0 + step * height), (x0 + BAR_PX, y0 + (step + 1) * height + 1)
-        behind.add_rect_filled(begin, end, imgui.get_color_u32((*colour, 1)))
+        behind.add_rect_filled(begin, end, imgui.get_color_u32((red, green, blue, 1)))
     last = float("inf")
     for share, text in marks:
         y = y1 - share * (y1 - y0)
