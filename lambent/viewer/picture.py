@@ -108,8 +108,11 @@ class Picture:
         """Seconds until a frame is due although nothing changes; None: never."""
         return self._pacer.wait_s(state.clock(), refine=self._refine)
 
-    def save(self, state: ViewerState) -> None:
-        """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance."""
+    def save(self, state: ViewerState) -> str | None:
+        """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance.
+
+        Returns the name without its suffix, None where it could not be written.
+        """
         name = free_name(state.folder, state.scene.name)
         frame = self._pacer.shown
         assert isinstance(frame, FrameState), "saved before the first frame"
@@ -122,8 +125,9 @@ class Picture:
             write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
         except OSError as error:
             state.say(f"picture not saved: {error}")
-        else:
-            state.say(f"saved {name}.png and {name}.exr")
+            return None
+        state.say(f"saved {name}.png and {name}.exr")
+        return name
 
     def _planned(self, frame: FrameState, plan: Plan) -> FrameState:
         if plan.accumulate is not None:

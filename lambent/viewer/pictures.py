@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
+from lambent.core.images import write_shown
 from lambent.realtime.frame import Renderer
 from lambent.realtime.passes.tonemap import FALSE_COLOUR
 from lambent.viewer.comparison import REFERENCE, Errors
@@ -54,6 +55,8 @@ class Pictures:
             self._compare(state, rect, pixel_ratio)
         else:
             self._errors.forget()
+            if comparison is not None:
+                comparison.figures = None
             self._a.update(state, rect, pixel_ratio, refine=False if state.filming is not None else None)
         self._comparing = compared
         self._mark(state, rect)
@@ -73,8 +76,16 @@ class Pictures:
         return min((wait for wait in waits if wait is not None), default=None)
 
     def save(self, state: ViewerState) -> None:
-        """Write the picture A."""
-        self._a.save(state)
+        """Write the picture A, and the error map where one is shown."""
+        name = self._a.save(state)
+        if name is None or self._errors.picture is None:
+            return
+        try:
+            write_shown(state.folder / f"{name}-error.png", np.ascontiguousarray(self._errors.picture[..., :3]))
+        except OSError as error:
+            state.say(f"error map not saved: {error}")
+        else:
+            state.say(f"saved {name}-error.png")
 
     def close(self, state: ViewerState) -> None:
         """End what goes on in the background."""

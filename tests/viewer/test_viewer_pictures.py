@@ -111,6 +111,9 @@ def test_an_integrator_agrees_with_itself(renderer, state):
     drawn(pictures, state, 4)
     assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
     assert (pictures.images["error map"][..., :3] == 0).all()
+    pictures.save(state)
+    names = sorted(p.name for p in state.folder.iterdir())
+    assert names == ["small-room-001-error.png", "small-room-001.exr", "small-room-001.png"]
 
 
 def film(pictures, state, name):
