@@ -70,7 +70,9 @@ def run(
     scene = read_baked(store)
     state = ViewerState.of(scene.record, CHOICES, MODES[mode], folder=folder or Path.cwd(), missing=scene.missing)
     state.views = SavedViews(scene.record, store.folder, state.say)
-    state.views.load()
+    fault = state.views.load()
+    if fault is not None:
+        state.missing = (*state.missing, fault)  # stays in sight: a message is gone before the window is there
     state.comparison, state.film, state.notes = Comparison(), FilmOptions(), light_map_notes(store)
     geometry = Geometry(scene.positions, scene.faces, scene.record.objects)
     pictures = Pictures(Renderer(open_device(device_needs(scene)), scene))

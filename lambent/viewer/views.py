@@ -31,14 +31,16 @@ class SavedViews:
     say: Callable[[str], None] = lambda text: None
     _views: Views = field(default_factory=Views)
 
-    def load(self) -> None:
-        """Read the file, or say why it cannot be used."""
+    def load(self) -> str | None:
+        """Read the file, or say, and return, why it cannot be used."""
         if self.folder is None:
-            return
+            return None
         try:
             self._take(read_views(self.folder))
         except UserError as error:
             self.say(str(error))
+            return str(error)
+        return None
 
     @property
     def cameras(self) -> tuple[CameraRecord, ...]:
