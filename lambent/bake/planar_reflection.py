@@ -79,7 +79,7 @@ def _vectors(values: Array) -> mi.Vector3f:
 
 
 def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64]) -> mi.Vector3f:
-    """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) from `starts` (2, points) on."""
+    """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) that begins at `starts`."""
     u, v = (
         (mi.Float((dr.gather(mi.UInt32, mi.UInt32(word.astype(np.uint32)), at) + k * step) >> 8) + 0.5) / 16777216.0
         for word, step in zip(starts, (3242174889, 2447445413), strict=True)

@@ -29,6 +29,7 @@ MOST_LEVELS = 7
 MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar.wgsl
     [
         ("eye", "f4", 4), ("row_x", "f4", 4), ("row_y", "f4", 4), ("row_w", "f4", 4), ("plane", "f4", 4),
+        ("across", "f4", 4), ("up", "f4", 4), ("forward", "f4", 4),
         ("size", "f4", 2), ("offset", "f4", 2), ("tolerance", "f4"), ("focal_px", "f4"), ("levels", "f4"),
         ("number", "f4"),
     ]
@@ -144,6 +145,8 @@ def _view(
     uniform["eye"][:3] = eye
     for row, name in ((0, "row_x"), (1, "row_y"), (3, "row_w")):
         uniform[name][:3] = clip[row, :3]
+    for name in ("across", "up", "forward"):
+        uniform[name][:3] = seen[name][:3]
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
     uniform["tolerance"] = reflector.deviation_m + 2 * CLEARANCE_M
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)

@@ -9,6 +9,9 @@ struct Mirror { // MIRROR_DTYPE in mirror.py
     row_y: vec4f,
     row_w: vec4f,
     plane: vec4f, // of the reflector, n towards the viewer
+    across: vec4f, // the ray of clip position (x, y) is forward + x across + y up
+    up: vec4f,
+    forward: vec4f,
     size: vec2f,
     offset: vec2f,  // of the frame in the mirror picture
     tolerance: f32, // m: how far the reflector's pixels may lie from its plane

@@ -1,6 +1,8 @@
-// The progressive mode on planes: importance samples as in qmc.wgsl, unfiltered, so the mean converges.
+// The progressive mode on planes: importance samples as in qmc.wgsl, unfiltered, each marched to its hit, so that the mean
+// converges to what the mirror picture knows: only surfaces hidden from the mirrored eye are missing.
 
 #include "planar.wgsl"
+#include "planar_march.wgsl"
 #include "sequence.wgsl"
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
@@ -15,7 +17,8 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let wi = 2.0 * cos_d * h - wo;
         if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
         let g = planar_gain(lobe, wi, wo, h);
-        let hit = find_hit(place, to_world(s, wi));
+        let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
+        let hit = march(place, to_world(s, wi), jitter);
         let inside = select(hit.inside, 0.0, through);
         sum += g * inside * mirror_sample(hit.texel, 0.0);
         let share = 1.0 - inside;

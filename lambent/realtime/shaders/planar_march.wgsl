@@ -1,0 +1,42 @@
+// The first surface along a ray that the mirror picture shows, searched for step by step across the picture.
+
+const MARCH_STEPS = 24u;
+
+// Distance at which a ray leaves the mirror picture.
+fn exit_distance(q: vec3f, w: vec3f) -> f32 {
+    let at = vec3f(dot(mirror.row_x.xyz, q), dot(mirror.row_y.xyz, q), dot(mirror.row_w.xyz, q));
+    let along = vec3f(dot(mirror.row_x.xyz, w), dot(mirror.row_y.xyz, w), dot(mirror.row_w.xyz, w));
+    let sides = vec4f(at.z - at.x, at.z + at.x, at.z - at.y, at.z + at.y);
+    let closing = -vec4f(along.z - along.x, along.z + along.x, along.z - along.y, along.z + along.y);
+    let t = select(vec4f(FARTHEST), sides / max(closing, vec4f(1e-9)), closing > vec4f(1e-9));
+    return clamp(0.999 * min(min(t.x, t.y), min(t.z, t.w)), 1e-3, FARTHEST);
+}
+
+// Steps are even in the picture but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
+// hit where the ray meets the plane seen at its end within the step. No branch: see planar_incident.
+fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
+    let t_exit = exit_distance(place.q, w);
+    let z = dot(mirror.row_w.xyz, place.q);
+    let z_exit = max(z + t_exit * dot(mirror.row_w.xyz, w), 1e-6);
+    var found = -1.0;
+    var before = 0.0;
+    for (var i = 0u; i < MARCH_STEPS; i++) {
+        let step = min((f32(i) + 1.0 - 0.999 * jitter) / (f32(MARCH_STEPS) - 1.0), 1.0);
+        let share = step * sqrt(step);
+        let t = t_exit * share * z / mix(z_exit, z, share); // 1/depth is linear in the picture
+        let met = meet(plane_at(project(place.q + t * w).xy), place.q, w, -1.0);
+        let last = share >= 1.0;
+        let hit = found < 0.0 && met > 0.97 * before && (met < 1.03 * t || last);
+        found = select(found, met, hit);
+        before = t;
+    }
+    let guess = find_hit(place, w);
+    let t_found = select(guess.t, found, found > 0.0);
+    let plane = plane_at(project(place.q + t_found * w).xy);
+    let refined = meet(plane, place.q, w, t_found);
+    let t = select(t_found, refined, abs(refined - t_found) < 0.05 * t_found);
+    let q = place.q + t * w;
+    let projected = project(q);
+    let strays = outside_planes(place.x, w, t) * (1.0 - place.leaves);
+    return Hit(q, t, plane, projected.xy, inside_picture(projected) * (1.0 - strays));
+}
