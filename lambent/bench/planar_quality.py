@@ -28,6 +28,7 @@ from lambent.realtime.frame import FrameState, Renderer
 NAME = "planar-quality"
 Floats = NDArray[np.floating]
 WAYS = {
+    "marched": ("rings", "marched"),
     "interleaved": ("rings", "interleaved"),
     "fixed": ("rings", "fixed"),
     "thesis": ("lobe-4.25", "thesis"),

@@ -18,6 +18,7 @@ Floats = NDArray[np.floating]
 TILE = 16  # pixels that sample a lobe in turns
 FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.12  # of the filter, against one that covers the lobe: found by experiment
 MOST_RINGS = 3
+THREE_STEPS = {"MARCH_STEPS": 0}
 
 
 def multi_ring_table(lobe: Lobe, n: int) -> Floats:
@@ -60,12 +61,13 @@ def interleaved_table(lobe: Lobe, n: int) -> Floats:
 
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
-        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table),
-        "fixed": Integrator("planar_quadrature.wgsl", fixed_table),
+        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, THREE_STEPS),
+        "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 8}),
+        "fixed": Integrator("planar_quadrature.wgsl", fixed_table, THREE_STEPS),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
-    "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table)},
+    "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table, THREE_STEPS)},
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
 }
 AUTO, OFF = "auto", "off"

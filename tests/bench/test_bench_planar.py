@@ -39,9 +39,10 @@ def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(planar_quality, "NS", (7,))
     monkeypatch.setattr(planar_quality, "SIZES", {True: (160, 120)})
     report = planar_quality.run(True, [])
-    assert len(report["rows"]) == 2 * 3
+    assert len(report["rows"]) == 2 * 4
     psnr = {way: by_n["7"] for way, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["interleaved"] > psnr["thesis"] + 2
+    assert psnr["marched"] > psnr["interleaved"] + 1
     assert psnr["interleaved"] > psnr["fixed"] > psnr["thesis"]
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
     with pytest.raises(UserError):

@@ -118,13 +118,6 @@ fn level_of(hit: Hit, w: vec3f, half_log2_omega: f32) -> f32 {
         - 1.5 * log2(max(cosine, 1e-3));
 }
 
-// Light from direction w (world) in the mirror picture; a: how far it can be trusted. No branch: software Vulkan (Mesa
-// 22.3) crashes on textures that are sampled within branches of a loop.
-fn planar_incident(place: Place, w: vec3f, half_log2_omega: f32) -> vec4f {
-    let hit = find_hit(place, w);
-    return vec4f(mirror_sample(hit.texel, level_of(hit, w, half_log2_omega)), hit.inside);
-}
-
 // Samples that the mirror picture does not hold, for one look-up in the probe in their mean direction.
 struct Beyond {
     gain: vec3f,

@@ -1,9 +1,12 @@
 // Quadrature on planes: as quadrature.wgsl, the light from the mirror picture, one filter size per sample.
 
 #include "planar.wgsl"
+#include "planar_march.wgsl"
 
 // Lobe `index` by the rows of the table from `first` on.
+// No branch about the look-up: software Vulkan (Mesa 22.3) crashes on textures that are sampled within branches of a loop.
 fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place) -> vec3f {
+    let first_jitter = fract(0.754878 * f32(s.pixel.x & 3u) + 0.569840 * f32(s.pixel.y & 3u));
     let here = lobe_here(index, s);
     let lobe = here.lobe;
     let through = lobe.side == LAMBENT_TRANSMISSION; // light from beyond the plane: the mirror picture does not know it
@@ -18,9 +21,10 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
         let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(cos_d * h.z * h.z * h.z);
         let g = q.w * planar_gain(lobe, wi, wo, h);
-        let found = planar_incident(place, to_world(s, wi), half_log2_omega);
-        let inside = select(found.a, 0.0, through);
-        sum += g * inside * found.rgb;
+        let w = to_world(s, wi);
+        let hit = march(place, w, fract(first_jitter + 0.618034 * f32(k)));
+        let inside = select(hit.inside, 0.0, through);
+        sum += g * inside * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega));
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * g, beyond.w + share * on_side(lobe, wi), beyond.omega + share * exp2(2.0 * half_log2_omega));
     }

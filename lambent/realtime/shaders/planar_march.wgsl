@@ -1,6 +1,6 @@
 // The first surface along a ray that the mirror picture shows, searched for step by step across the picture.
 
-const MARCH_STEPS = 24u;
+override MARCH_STEPS: u32 = 24u; // 0: the three steps of find_hit alone
 
 // Distance at which a ray leaves the mirror picture.
 fn exit_distance(q: vec3f, w: vec3f) -> f32 {
@@ -13,9 +13,13 @@ fn exit_distance(q: vec3f, w: vec3f) -> f32 {
 }
 
 // Steps are even in the picture but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
-// hit where the ray meets the plane seen at its end within the step. No branch: see planar_incident.
+// hit where the ray meets the plane seen at its end within the step. No branch: see planar_quadrature.
 fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
-    let t_exit = exit_distance(place.q, w);
+    if (MARCH_STEPS == 0u) { return find_hit(place, w); }
+    let guess = find_hit(place, w);
+    let again = meet(plane_at(guess.texel), place.q, w, guess.t);
+    let settled = abs(again - guess.t) < 0.03 * guess.t; // only what is nearer can be the hit
+    let t_exit = min(exit_distance(place.q, w), select(FARTHEST, guess.t, settled));
     let z = dot(mirror.row_w.xyz, place.q);
     let z_exit = max(z + t_exit * dot(mirror.row_w.xyz, w), 1e-6);
     var found = -1.0;
@@ -25,12 +29,11 @@ fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
         let share = step * sqrt(step);
         let t = t_exit * share * z / mix(z_exit, z, share); // 1/depth is linear in the picture
         let met = meet(plane_at(project(place.q + t * w).xy), place.q, w, -1.0);
-        let last = share >= 1.0;
+        let last = share >= 1.0 && !settled;
         let hit = found < 0.0 && met > 0.97 * before && (met < 1.03 * t || last);
         found = select(found, met, hit);
         before = t;
     }
-    let guess = find_hit(place, w);
     let t_found = select(guess.t, found, found > 0.0);
     let plane = plane_at(project(place.q + t_found * w).xy);
     let refined = meet(plane, place.q, w, t_found);
