@@ -12,6 +12,7 @@ from dataclasses import dataclass
 REST_S = 0.25
 BUDGET_S = 1 / 15  # a frame in motion should take no longer
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
+PROBE_FRAMES = 8
 FIXED_SHARE = 1.5  # a frame in motion may take so many times what it takes without pixels
 
 
@@ -34,6 +35,7 @@ class Pacer:
         self._accumulated = 0
         self._last: Plan | None = None
         self._budget_s = BUDGET_S
+        self._late = 0  # frames that took too long although no fewer pixels can be drawn
         self._times: dict[float, float] = {}  # seconds of frames in motion, by their scale
 
     @property
@@ -75,7 +77,8 @@ class Pacer:
         if plan.accumulate is not None:
             return
         before = self._times.get(plan.scale, seconds)
-        self._times[plan.scale] = (before + seconds) / 2
+        # A mean, but one that forgets a stall (a shader being compiled) at the next frame of this size.
+        self._times[plan.scale] = min((before + seconds) / 2, 1.2 * seconds)
         fixed_s = min(self._fixed_s(), seconds)
         # Fewer pixels do not buy what costs the same with any number of them.
         budget_s = max(self._budget_s, FIXED_SHARE * fixed_s)
@@ -86,6 +89,11 @@ class Pacer:
             self.moving_scale = fits
         elif fits_well > self.moving_scale:
             self.moving_scale = fits_well
+        elif seconds > budget_s:
+            self._late += 1
+            if self._late % PROBE_FRAMES == 0:  # what more pixels cost may have been learnt from a stall
+                self.moving_scale = SCALES[max(0, SCALES.index(self.moving_scale) - 1)]
+                self._times = {scale: time for scale, time in self._times.items() if scale < self.moving_scale}
 
     def _fixed_s(self) -> float:
         """What a frame of no pixels would take, by the least and the most pixels drawn so far."""

@@ -19,6 +19,7 @@ from lambent.materials.document import Material
 from lambent.realtime.device import adapter_info
 from lambent.realtime.frame import LIGHT_MAP, QMC_N, SHOW, FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.mirror_integrators import CHOICES as PLANAR_WAYS
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, FALSE_COLOUR, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
@@ -32,6 +33,7 @@ CHOICES = Choices(
     shows=tuple(SHOW),
     lookups=("auto", *LOOKUPS),
     sample_counts=tuple(n for n in RINGS if n <= 19),
+    planars=PLANAR_WAYS,
 )
 # At rest: frames of the progressive series, and samples per pixel and lobe in each. Software takes one sample at a
 # time, so that a frame is short and the window answers in between.
@@ -189,6 +191,7 @@ def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
         view_transform=state.view_transform,
         materials=dict(state.edits.edited),
         lookup=state.lookup,
+        planar=state.planar,
         show=state.show,
         scale=state.scale if false else Range(),
         near_m=state.near_m,

@@ -115,6 +115,7 @@ class Choices:
     shows: tuple[str, ...]
     lookups: tuple[str, ...]
     sample_counts: tuple[int, ...]
+    planars: tuple[str, ...] = ("auto",)  # ways of planar reflectors
 
 
 @dataclass
@@ -171,6 +172,7 @@ class ViewerState:
     integrator: str
     show: str
     lookup: str
+    planar: str = "auto"
     n: int | None = None  # samples per lobe; None: chosen per material from its roughness
     flying: bool = False
     selected: str | None = None  # object name

@@ -91,3 +91,15 @@ def test_pixels_are_not_given_away_for_what_they_do_not_cost():
         p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
         seen.add(p.moving_scale)
     assert len(seen) == 1, "it does not swing"
+
+
+def test_a_stall_at_the_start_is_forgotten():
+    """The first frame waits three seconds for its shaders; then a frame takes 150 ms of itself."""
+    p = pacer(slow_adapter=True)
+    p.cost(Plan(p.moving_scale, None), 3.0)
+    assert p.moving_scale == SCALES[-1]
+    seen = []
+    for _ in range(60):
+        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+        seen.append(p.moving_scale)
+    assert set(seen[-20:]) == {seen[-1]} and seen[-1] >= 0.35

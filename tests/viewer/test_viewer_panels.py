@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from lambent.core.false_colour import Range
 from lambent.materials.document import load_material
+from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.views import read_views
 from lambent.viewer.comparison import Comparison, Figures
 from lambent.viewer.filming import FilmOptions
@@ -285,3 +286,15 @@ def test_what_stands_over_the_picture_is_drawn(whole):
     for state.comparison.kind in ("difference", "FLIP"):
         whole.frame()
     assert imgui.get_draw_data().total_vtx_count > bare + 300
+
+
+def test_the_way_of_planar_reflectors_is_offered_where_there_are_some(monkeypatch, scene, choices, tmp_path):
+    part = ReflectorPart(object="table", faces=(0, 1), area_m2=4.0)
+    plane = ReflectorRecord(plane=(0, 1, 0, -1), outline=((-1, 1, -1), (1, 1, -1), (1, 1, 1)), parts=(part,))
+    state = ViewerState.of(
+        scene.model_copy(update={"reflectors": (plane,)}), replace(choices, planars=("auto", "off")), "walk"
+    )
+    driver = PanelDriver(monkeypatch, state, (1400, 2200))
+    pick(driver, "planes", 1)
+    driver.close()
+    assert state.planar == "off"

@@ -43,6 +43,9 @@ def draw(state: ViewerState) -> None:
     explain(
         "where a reflected ray is taken to end: at the bounding planes, at the probe's distances, or infinitely far"
     )
+    if state.scene.reflectors:
+        state.planar = choice("planes", state.planar, state.choices.planars)
+        explain("how planar reflectors are drawn: by a picture of their own, or (off) by their probes")
     imgui.separator_text("quality")
     _, state.refine = imgui.checkbox("refine while nothing moves", state.refine)
     _, state.adaptive_resolution = imgui.checkbox("fewer pixels in motion where needed", state.adaptive_resolution)
