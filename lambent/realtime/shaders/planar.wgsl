@@ -136,12 +136,6 @@ fn planar_gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return gain(lobe, max(wi, least), max(wo, least), h);
 }
 
-// The frame of the plane itself: shading_frame bends normals of rounded things at grazing angles, a plane has none.
-fn planar_frame(v: Varyings, facing: f32) -> Surface {
-    var s = shading_frame(v, facing, mirror.plane.xyz);
-    return s;
-}
-
 // Tells pixels apart that cleaning must not mix: of other reflectors and materials, and with other lobes interleaved (the
 // bits of `interleaved`). 1 to 1999.
 fn surface_number(interleaved: u32) -> f32 {
@@ -157,17 +151,19 @@ struct PlanarLight {
 
 @fragment fn planar_main(v: Varyings, @builtin(front_facing) front: bool) -> PlanarLight {
     let upright = dot(normalize(v.n_world), mirror.plane.xyz);
-    if (abs(dot(mirror.plane.xyz, v.p_world) + mirror.plane.w) > mirror.tolerance || abs(upright) < 0.998) { discard; }
     let view = normalize(frame.eye.xyz - v.p_world);
-    let s = planar_frame(v, select(-1.0, 1.0, upright > 0.0));
+    // seen from right above, so that no normal is bent as those of rounded things are at grazing angles
+    let s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirror.plane.xyz);
+    if (abs(dot(mirror.plane.xyz, v.p_world) + mirror.plane.w) > mirror.tolerance || abs(upright) < 0.998) { discard; }
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));
     var interleaved = 0u;
     for (var i = 0u; i < LOBES; i++) {
         let found = integrate_planar(i, wo, s, place);
-        let light = clamp(found.rgb, vec3f(0.0), vec3f(HALF_MAX));
-        let rough = found.a > 0.0;
+        let through = lobes[i].lobe.side == LAMBENT_TRANSMISSION; // light from behind the plane: left to the probe
+        let light = select(clamp(found.rgb, vec3f(0.0), vec3f(HALF_MAX)), vec3f(0.0), through);
+        let rough = found.a > 0.0 && !through;
         result.rough += select(vec4f(0.0), vec4f(light, 0.0), rough);
         result.sharp += select(vec4f(light, 0.0), vec4f(0.0), rough);
         interleaved |= select(0u, 1u << i, rough);

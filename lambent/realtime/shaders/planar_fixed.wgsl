@@ -9,7 +9,6 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
     let first_jitter = fract(0.754878 * f32(s.pixel.x & 3u) + 0.569840 * f32(s.pixel.y & 3u));
     let here = lobe_here(index, s);
     let lobe = here.lobe;
-    let through = lobe.side == LAMBENT_TRANSMISSION; // light from beyond the plane: the mirror picture does not know it
     var sum = vec3f(0.0);
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
     for (var k = 0u; k < SAMPLES; k++) {
@@ -23,10 +22,10 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let g = q.w * planar_gain(lobe, wi, wo, h);
         let w = to_world(s, wi);
         let hit = march(place, w, fract(first_jitter + 0.618034 * f32(k)));
-        let inside = select(hit.inside, 0.0, through);
+        let inside = hit.inside;
         sum += g * inside * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega));
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * g, beyond.w + share * on_side(lobe, wi), beyond.omega + share * exp2(2.0 * half_log2_omega));
+        beyond = Beyond(beyond.gain + share * g, beyond.w + share * wi, beyond.omega + share * exp2(2.0 * half_log2_omega));
     }
     return (sum + from_probe(s, beyond)) / f32(SAMPLES);
 }

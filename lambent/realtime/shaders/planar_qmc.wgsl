@@ -7,7 +7,6 @@
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     let lobe = lobe_here(index, s).lobe;
-    let through = lobe.side == LAMBENT_TRANSMISSION;
     let offset = pixel_hash(s.pixel, index);
     var sum = vec3f(0.0);
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
@@ -19,10 +18,10 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let g = planar_gain(lobe, wi, wo, h);
         let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
         let hit = march(place, to_world(s, wi), jitter);
-        let inside = select(hit.inside, 0.0, through);
+        let inside = hit.inside;
         sum += g * inside * mirror_sample(hit.texel, 0.0);
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * g, beyond.w + share * on_side(lobe, wi), beyond.omega + share * 1e-6);
+        beyond = Beyond(beyond.gain + share * g, beyond.w + share * wi, beyond.omega + share * 1e-6);
     }
     return vec4f((sum + from_probe(s, beyond)) / f32(SAMPLES), 0.0);
 }

@@ -1,5 +1,5 @@
-// Specular light of an object that has pixels on planar reflectors: theirs was found before, that of others is the
-// probe's. Interleaved light is cleaned here, along columns, as far as the lobe is wider than the pixels it is mixed
+// Specular light of an object that has pixels on planar reflectors: what these reflect was found before; other pixels, and
+// lobes of transmission, have the probe's light. Interleaved light is cleaned here, along columns, as far as the lobe is wider than the pixels it is mixed
 // from.
 
 #include "lobe_width.wgsl"
@@ -14,9 +14,11 @@ const TAPS = array<f32, 5>(0.5, 1.0, 1.0, 1.0, 0.5);
 fn specular_light(wo: vec3f, s: Surface) -> vec3f {
     let at = vec2i(s.pixel);
     let sharp = textureLoad(planar_sharp, at, 0);
-    if (sharp.a > 0.0) { return sharp.rgb + cleaned(wo, s, at, sharp.a); }
+    let mirrored = sharp.a > 0.0;
     var sum = vec3f(0.0);
+    if (mirrored) { sum = sharp.rgb + cleaned(wo, s, at, sharp.a); }
     for (var i = 0u; i < LOBES; i++) {
+        if (mirrored && lobes[i].lobe.side == LAMBENT_REFLECTION) { continue; }
         sum += integrate(i, wo, s);
     }
     return sum;

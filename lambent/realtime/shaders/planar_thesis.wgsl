@@ -32,11 +32,11 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let p = sample.w / (h.z * h.z * h.z * cos_d);
         let q = planar_gain(lobe, wi, wo, h) / wi.z;
         let hit = find_hit(place, to_world(s, wi));
-        let inside = select(hit.inside, 0.0, lobe.side == LAMBENT_TRANSMISSION);
+        let inside = hit.inside;
         let weight = select(q * q, q, FORMULA == 24u) * (wi.z * wi.z * p);
         sum += mirror_sample(hit.texel, level) * inside * weight;
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * weight, beyond.w + share * on_side(lobe, wi), beyond.omega + share * omega);
+        beyond = Beyond(beyond.gain + share * weight, beyond.w + share * wi, beyond.omega + share * omega);
         weights += select(q, vec3f(1.0), FORMULA == 24u) * (wi.z * p);
     }
     sum += from_probe(s, beyond);
