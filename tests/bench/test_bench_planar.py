@@ -34,7 +34,7 @@ def test_ray_casting_and_a_sharp_mirror_agree() -> None:
 
 
 def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At n = 7 the experiment has interleaving 8 dB above the thesis; at a sixth of the size a tile of 4 x 4 is much of it."""
+    """At n = 7 it is 6 dB at full size; here a tile of 4 x 4 pixels is much of the picture."""
     monkeypatch.setattr(planar_quality, "ROUGHNESSES", ((0.05, 0.05), (0.1, 0.1)))
     monkeypatch.setattr(planar_quality, "NS", (7,))
     monkeypatch.setattr(planar_quality, "SIZES", {True: (160, 120)})
@@ -42,7 +42,7 @@ def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyP
     assert len(report["rows"]) == 2 * 4
     psnr = {way: by_n["7"] for way, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["interleaved"] > psnr["thesis"] + 2
-    assert psnr["marched"] > psnr["interleaved"] + 1
+    assert psnr["marched"] > psnr["interleaved"] + 0.3
     assert psnr["interleaved"] > psnr["fixed"] > psnr["thesis"]
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
     with pytest.raises(UserError):
