@@ -39,7 +39,7 @@ def test_help_shows_an_example_and_json(lambent, command):
     outcome = lambent(command, "--help")
     assert (outcome.code, outcome.err) == (0, "")
     assert f"Example: lambent {command}" in outcome.out
-    assert "--json" in outcome.out or command in ("walk", "demo")
+    assert "--json" in outcome.out or command in ("walk", "edit", "demo")
 
 
 def test_no_command_shows_help(lambent):
@@ -201,7 +201,7 @@ def test_an_interrupted_fit_ends_its_bench(lambent, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lambent.materials.fitting.fit.fit_lobes", interrupt)
+    monkeypatch.setattr("lambent.materials.fitting.gradient.fit_lobes", interrupt)
     assert lambent("bench", "fit", "--quick").code == 130
 
 
