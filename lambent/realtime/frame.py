@@ -27,7 +27,7 @@ from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.integrators import INTEGRATORS, Integrator, integrator
 from lambent.realtime.mirror import MirrorView, mirror_views
-from lambent.realtime.mirror_integrators import AUTO, planar_integrator
+from lambent.realtime.mirror_integrators import AUTO, TILE, planar_integrator
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.planar import MOST_MIRRORS, PlanarPass
@@ -285,6 +285,7 @@ class Renderer:
         data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns
         data["eye"][:3], data["across"][:3], data["up"][:3] = camera.position, across, up
         data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
+        data["eye"][3] = np.floor((jitter[0] + 0.5) * TILE) % TILE
         data["show"] = SHOW[state.show]
         data["scale"] = (state.scale.low, state.scale.high, state.scale.log, LM_PER_W)
         data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)

@@ -195,3 +195,15 @@ def test_multi_rings_of_ten_are_three_of_three() -> None:
     assert sorted({round(float(x), 3) for x in r}) == pytest.approx([0, *sorted(set(r.round(3)))[1:]])
     assert [int((np.abs(r - x) < 1e-3).sum()) for x in np.unique(r.round(3))] == [1, 3, 3, 3]
     assert r.max() < radius(0.99)
+
+
+def test_a_still_takes_all_turns_of_interleaved_samples(device: Any) -> None:
+    """16 frames of n samples are, at every pixel, 16 n different ones: the tile's pattern is gone."""
+    renderer = Renderer(device, scene_of(mirror(0.25)))
+    wanted = state(n=3, show="specular")
+
+    def pattern(image: np.ndarray) -> float:
+        """What differs between neighbours beyond a slope, before what stands on the floor."""
+        return float(np.median(np.abs(np.diff(image[HEIGHT * 3 // 4 :], n=2, axis=1))))
+
+    assert pattern(renderer.still_radiance(wanted)) < 0.7 * pattern(renderer.image(wanted))

@@ -10,7 +10,8 @@ const LEAST_PX = 4.0; // mean width of a lobe
 fn bayer(pixel: vec2u) -> u32 {
     let p = pixel & vec2u(3u);
     let d = p.x ^ p.y;
-    return ((d & 1u) << 3u) | ((p.y & 1u) << 2u) | (d & 2u) | (p.y >> 1u);
+    let index = ((d & 1u) << 3u) | ((p.y & 1u) << 2u) | (d & 2u) | (p.y >> 1u);
+    return (index + u32(frame.eye.w)) & 15u;
 }
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
