@@ -81,11 +81,10 @@ class SamplerCheck:
     albedo_error: float  # standard error of albedo_sampled
 
 
-@dataclass(frozen=True)
-class CheckReport:
-    """Everything that was measured; `failures` and `warnings` say in words what is wrong with it."""
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What every check measures; `failures` and `warnings` say in words what is wrong."""
 
-    reciprocity_error: float  # largest |f(wi, wo) - f(wo, wi)| over the larger of the two
     furnace: Furnace
     sampler: tuple[SamplerCheck, ...]
     warnings: tuple[str, ...]
@@ -100,6 +99,13 @@ class CheckReport:
         data = asdict(self) | {"passed": self.passed}
         data["furnace"]["albedo"] = self.furnace.albedo.tolist()
         return data
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckReport(Report):
+    """Of a material or a model."""
+
+    reciprocity_error: float  # largest |f(wi, wo) - f(wo, wi)| over the larger of the two
 
 
 def check(subject: Material | Scatters, seed: int = 0, progress: Progress = silent) -> CheckReport:
@@ -123,7 +129,13 @@ def check(subject: Material | Scatters, seed: int = 0, progress: Progress = sile
         warnings.append(
             f"reflects {albedo:.3f} of the light at theta {theta:g}, phi {phi:g} degrees: more than arrives"
         )
-    return CheckReport(error, energy, tuple(sampler), tuple(warnings), tuple(failures))
+    return CheckReport(
+        reciprocity_error=error,
+        furnace=energy,
+        sampler=tuple(sampler),
+        warnings=tuple(warnings),
+        failures=tuple(failures),
+    )
 
 
 def _failures(error: float, energy: Furnace, sampler: list[SamplerCheck]) -> list[str]:

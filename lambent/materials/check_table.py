@@ -7,8 +7,7 @@ reported, and only what no device explains is a failure.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from lambent.materials.check import (
     SAMPLER_THETA_DEG,
     THETA_DEG,
     Furnace,
-    SamplerCheck,
+    Report,
     check_sampler,
     mean_albedo,
     sampler_failures,
@@ -52,9 +51,9 @@ class IntegralCheck:
         return abs(self.from_table - self.quadrature) / max(self.quadrature, 1e-12)
 
 
-@dataclass(frozen=True)
-class TableReport:
-    """Everything that was measured; `failures` and `warnings` say in words what is wrong with it.
+@dataclass(frozen=True, kw_only=True)
+class TableReport(Report):
+    """Of a measured table; its `furnace` is r + t over the incident directions, by the table's own methods.
 
     Attributes
     ----------
@@ -62,27 +61,11 @@ class TableReport:
         Integral of |f(wi, wo) - f(wo, wi)| cos cos over that of the mean of both, reflection only.
     resampling_share : float
         Deviation of what the path tracer looks up from the table itself, as a share of the light.
-    furnace : Furnace
-        r + t over the incident directions, by the table's own methods.
     """
 
     reciprocity_share: float
     resampling_share: float
-    furnace: Furnace
     integrals: tuple[IntegralCheck, ...]
-    sampler: tuple[SamplerCheck, ...]
-    warnings: tuple[str, ...]
-    failures: tuple[str, ...]
-
-    @property
-    def passed(self) -> bool:
-        return not self.failures
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as plain numbers, strings and lists."""
-        data = asdict(self) | {"passed": self.passed}
-        data["furnace"]["albedo"] = self.furnace.albedo.tolist()
-        return data
 
 
 def check_table(
@@ -106,7 +89,13 @@ def check_table(
     failures = _failures(reciprocity, energy, integrals) + sampler_failures(sampler)
     warnings = _warnings(resampling, energy)
     return TableReport(
-        reciprocity, resampling, energy, tuple(integrals), tuple(sampler), tuple(warnings), tuple(failures)
+        reciprocity_share=reciprocity,
+        resampling_share=resampling,
+        furnace=energy,
+        integrals=tuple(integrals),
+        sampler=tuple(sampler),
+        warnings=tuple(warnings),
+        failures=tuple(failures),
     )
 
 

@@ -18,14 +18,13 @@ from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, collect
-from lambent.materials.measured.table import IntegratedTable, fill_holes, isotropic_brdf, require_values
+from lambent.materials.measured.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500
 LIMIT_BYTES = 1 << 30
 _HEADER_BYTES = 12
 _USUAL = (90, 90, 180)
-_QUERIES_AT_ONCE = 1 << 17
 
 Indices = NDArray[np.int64]
 
@@ -62,7 +61,7 @@ def _bytes_of(shape: tuple[int, ...]) -> int:
     return _HEADER_BYTES + 3 * 8 * shape[0] * shape[1] * shape[2]
 
 
-class MerlTable(IntegratedTable):
+class MerlTable(ReflectionTable):
     """BRDF on (theta_h, theta_d, phi_d) bins; values stand at the bins' centres.
 
     Parameters
@@ -91,18 +90,8 @@ class MerlTable(IntegratedTable):
             f = np.moveaxis(self._raw, 0, -1) * SCALES
         return fill_holes(f, self._measured).reshape(-1, 3)
 
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., 3), trilinear between bin centres; 0 where wi or wo is below the surface."""
-        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
-        f = np.zeros((len(flat_i), 3))
-        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
-        for start in range(0, len(above), _QUERIES_AT_ONCE):
-            part = above[start : start + _QUERIES_AT_ONCE]
-            f[part] = self._eval_above(flat_i[part], flat_o[part])
-        return f.reshape(wi.shape)
-
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
+        """f (N, 3) in 1/sr; trilinear between bin centres."""
         theta_h, theta_d, phi_d = half_difference_angles(wi, wo)
         shape = self._measured.shape
         i, u = _between(np.sqrt(theta_h * 2 / np.pi), shape[0])

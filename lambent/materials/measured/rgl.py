@@ -18,12 +18,11 @@ from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import IntegratedTable, fill_holes, require_values, sensible
+from lambent.materials.measured.table import ReflectionTable, fill_holes, require_values, sensible
 from lambent.materials.measured.tensor_file import MAGIC, read_tensors
 
 NAME = "RGL tensor file"
 _DIMENSIONS = {"phi_i": 1, "theta_i": 1, "ndf": 2, "sigma": 2, "vndf": 4}
-_QUERIES_AT_ONCE = 1 << 17
 
 Tensors = dict[str, NDArray[np.generic]]
 
@@ -85,7 +84,7 @@ def _values_rgb(tensors: Tensors, path: Path) -> Floats:
     return np.asarray(channels_last @ rgb_of_spectra(wavelengths).T.astype(np.float32))
 
 
-class RglTable(IntegratedTable):
+class RglTable(ReflectionTable):
     """BRDF of an RGL file, evaluated as the renderers that read the format do, then divided by cos(theta_o).
 
     Parameters
@@ -125,18 +124,8 @@ class RglTable(IntegratedTable):
             notes=tuple(notes),
         )
 
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., 3) in 1/sr; negative values become 0; 0 where wi or wo is below the surface."""
-        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
-        f = np.zeros((len(flat_i), 3))
-        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
-        for start in range(0, len(above), _QUERIES_AT_ONCE):
-            part = above[start : start + _QUERIES_AT_ONCE]
-            f[part] = self._eval_above(flat_i[part], flat_o[part])
-        return f.reshape(wi.shape)
-
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
+        """f (N, 3) in 1/sr; negative values become 0."""
         cos_o = wo[:, 2:]
         wi, wo = self._reduced(wi, wo)
         theta_i, phi_i = _elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])

@@ -21,6 +21,7 @@ _PROPOSAL = Material(
     kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
 )
 _QUADRATURE_POINTS = 4096
+_QUERIES_AT_ONCE = 1 << 17
 
 
 class IntegratedTable(ABC):
@@ -69,6 +70,25 @@ def _quadrature() -> Floats:
     """Low-discrepancy points of the unit cube: the first coordinate chooses the component, so it is stratified."""
     k = np.arange(_QUADRATURE_POINTS)
     return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
+
+
+class ReflectionTable(IntegratedTable):
+    """Base of three-channel tables of reflection alone: look-ups in pieces, 0 where wi or wo is below the surface."""
+
+    @abstractmethod
+    def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
+        """f (N, 3) of directions (N, 3) above the surface."""
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3) in 1/sr; 0 where wi or wo is below the surface."""
+        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
+        f = np.zeros((len(flat_i), 3))
+        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
+        for start in range(0, len(above), _QUERIES_AT_ONCE):
+            part = above[start : start + _QUERIES_AT_ONCE]
+            f[part] = self._eval_above(flat_i[part], flat_o[part])
+        return f.reshape(wi.shape)
 
 
 def isotropic_brdf(path: Path, reader: str, sizes: dict[str, int], notes: tuple[str, ...]) -> TableInfo:
