@@ -1,4 +1,4 @@
-"""Results as JSON knows them."""
+"""Plain values: results as JSON knows them, words that are numbers."""
 
 from __future__ import annotations
 
@@ -19,3 +19,12 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return str(value) if isinstance(value, Path) else value
+
+
+def is_number(word: str) -> bool:
+    """Whether Python reads the word as a number, nan and inf included."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -18,6 +18,7 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.frames import Floats, direction
+from lambent.core.plain import is_number
 from lambent.materials.measured import gonio_text
 from lambent.materials.measured.gonio_rows import (
     LONGEST_NAME,
@@ -89,7 +90,7 @@ def recognise(head: bytes, size: int) -> bool:
     first = [_SEPARATORS.split(line.strip()) for line in body[: 1 << 12].decode("utf-8", "replace").split("\n")]
     first = [words for words in first if words != [""]][:2]
     same = len({len(words) for words in first}) == 1 and len(first[0]) >= _LEAST_NUMBERS
-    return same and all(_is_number(word) for words in first for word in words)
+    return same and all(is_number(word) for words in first for word in words)
 
 
 def read(path: Path) -> MeasuredTable:
@@ -260,11 +261,3 @@ def _values(values: Floats, layout: Layout) -> tuple[Floats, tuple[str, ...]]:
             usable = np.asarray((values >= 0).all(axis=1))
         return rgb_of_measured(values[:, order], usable, np.array(layout.wavelengths_nm)[order])
     return values, ()
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

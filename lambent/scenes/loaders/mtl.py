@@ -18,6 +18,7 @@ import numpy as np
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.frames import Floats
+from lambent.core.plain import is_number
 from lambent.materials.document import Material
 from lambent.scenes.loaders.metallic import metallic_roughness
 from lambent.scenes.loaders.pictures import Picture, Pictures
@@ -157,9 +158,9 @@ def _map(text: str, path: Path, line: int) -> tuple[str, UvTransform]:
     while words and words[0] in OPTIONS:
         option, most = words[0], OPTIONS[words[0]]
         taken = 1
-        while taken < len(words) - 1 and taken <= most and (most == 1 or _is_number(words[taken])):
+        while taken < len(words) - 1 and taken <= most and (most == 1 or is_number(words[taken])):
             taken += 1
-        values = [float(w) for w in words[1:taken] if _is_number(w)]
+        values = [float(w) for w in words[1:taken] if is_number(w)]
         if option == "-s":
             scale[: len(values[:2])] = values[:2]
         elif option == "-o":
@@ -171,14 +172,6 @@ def _map(text: str, path: Path, line: int) -> tuple[str, UvTransform]:
     if not (np.abs([*scale, *offset]) < 1e30).all():
         raise UserError("not a finite number", file=path, field=f"line {line}", got=text)
     return name, ((scale[0], 0.0, offset[0]), (0.0, scale[1], offset[1]))
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 class _Reading:

@@ -12,7 +12,7 @@ from lambent.core.files import read_bytes
 from lambent.core.frames import Floats
 from lambent.materials.document import Material
 from lambent.scenes.loaders.parts import Parts
-from lambent.scenes.loaders.polygons import Ints, smooth_normals, triangulate
+from lambent.scenes.loaders.polygons import Arrays, Ints, smooth_normals, triangulate
 from lambent.scenes.loaders.repair import mesh_of
 from lambent.scenes.scene import SceneObject
 
@@ -25,16 +25,6 @@ TYPES = {
     "double": "f8", "float64": "f8",
 }  # fmt: skip
 UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
-
-
-@dataclass(frozen=True)
-class Arrays:
-    """positions, normals (V, 3), uv (V, 2), triangles (T, 3); normals and uv may be absent."""
-
-    positions: Floats
-    normals: Floats | None
-    uv: Floats | None
-    triangles: Ints
 
 
 @dataclass

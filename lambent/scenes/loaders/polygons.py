@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.frames import Floats, basis, normalize
 
 Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """positions, normals (V, 3), uv (V, 2), triangles (T, 3); normals and uv may be absent."""
+
+    positions: Floats
+    normals: Floats | None
+    uv: Floats | None
+    triangles: Ints
 
 
 def triangulate(positions: Floats, corners: Ints, sizes: Ints) -> tuple[Ints, Ints]:

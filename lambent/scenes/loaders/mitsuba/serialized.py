@@ -7,31 +7,19 @@ from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
-from lambent.scenes.loaders.polygons import Ints
+from lambent.scenes.loaders.polygons import Arrays
 
 LIMIT_BYTES = 2 << 30
 MAGIC = 0x041C
 NORMALS, UV, COLOURS, SINGLE, DOUBLE = 0x0001, 0x0002, 0x0008, 0x1000, 0x2000
 VERTICES_MAX, TRIANGLES_MAX = 60_000_000, 20_000_000
 NAME_MAX = 1 << 16
-
-
-@dataclass(frozen=True)
-class Arrays:
-    """positions, normals (V, 3), uv (V, 2), triangles (T, 3); normals and uv may be absent."""
-
-    positions: Floats
-    normals: Floats | None
-    uv: Floats | None
-    triangles: Ints
 
 
 def read(path: Path, index: int) -> Arrays:
