@@ -13,19 +13,16 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let q = samples[first + k];
-        let slope = q.xy * here.growth;
-        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-        let cos_d = dot(wo, h);
-        let wi = 2.0 * cos_d * h - wo;
-        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
-        let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(cos_d * h.z * h.z * h.z);
-        let g = q.w * planar_gain(lobe, wi, wo, h);
-        let w = to_world(s, wi);
+        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
+        if (!at.seen) { continue; }
+        let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
+        let g = q.w * planar_gain(lobe, at.wi, wo, at.h);
+        let w = to_world(s, at.wi);
         let hit = march(place, w, fract(first_jitter + 0.618034 * f32(k)));
         let inside = hit.inside;
         sum += g * inside * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega));
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * g, beyond.w + share * wi, beyond.omega + share * exp2(2.0 * half_log2_omega));
+        beyond = Beyond(beyond.gain + share * g, beyond.w + share * at.wi, beyond.omega + share * exp2(2.0 * half_log2_omega));
     }
     return (sum + from_probe(s, beyond)) / f32(SAMPLES);
 }

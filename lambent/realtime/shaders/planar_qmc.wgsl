@@ -11,17 +11,15 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     var sum = vec3f(0.0);
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
     for (var k = 0u; k < SAMPLES; k++) {
-        let h = lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe);
-        let cos_d = dot(wo, h);
-        let wi = 2.0 * cos_d * h - wo;
-        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
-        let g = planar_gain(lobe, wi, wo, h);
+        let at = sample_about(wo, lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe));
+        if (!at.seen) { continue; }
+        let g = planar_gain(lobe, at.wi, wo, at.h);
         let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
-        let hit = march(place, to_world(s, wi), jitter);
+        let hit = march(place, to_world(s, at.wi), jitter);
         let inside = hit.inside;
         sum += g * inside * mirror_sample(hit.texel, 0.0);
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * g, beyond.w + share * wi, beyond.omega + share * 1e-6);
+        beyond = Beyond(beyond.gain + share * g, beyond.w + share * at.wi, beyond.omega + share * 1e-6);
     }
     return vec4f((sum + from_probe(s, beyond)) / f32(SAMPLES), 0.0);
 }

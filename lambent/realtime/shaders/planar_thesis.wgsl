@@ -24,20 +24,17 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     var weights = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
-        let slope = sample.xy * here.growth;
-        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-        let cos_d = dot(wo, h);
-        let wi = 2.0 * cos_d * h - wo;
-        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
-        let p = sample.w / (h.z * h.z * h.z * cos_d);
-        let q = planar_gain(lobe, wi, wo, h) / wi.z;
-        let hit = find_hit(place, to_world(s, wi));
+        let at = sample_about(wo, half_vector_of(sample.xy * here.growth));
+        if (!at.seen) { continue; }
+        let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
+        let q = planar_gain(lobe, at.wi, wo, at.h) / at.wi.z;
+        let hit = find_hit(place, to_world(s, at.wi));
         let inside = hit.inside;
-        let weight = select(q * q, q, FORMULA == 24u) * (wi.z * wi.z * p);
+        let weight = select(q * q, q, FORMULA == 24u) * (at.wi.z * at.wi.z * p);
         sum += mirror_sample(hit.texel, level) * inside * weight;
         let share = 1.0 - inside;
-        beyond = Beyond(beyond.gain + share * weight, beyond.w + share * wi, beyond.omega + share * omega);
-        weights += select(q, vec3f(1.0), FORMULA == 24u) * (wi.z * p);
+        beyond = Beyond(beyond.gain + share * weight, beyond.w + share * at.wi, beyond.omega + share * omega);
+        weights += select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);
     }
     sum += from_probe(s, beyond);
     return vec4f(select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30)), 0.0);

@@ -11,11 +11,9 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let u = sequence(offset, frame.first_sample + k);
-        let h = lambent_sample_half_vector(u, lobe);
-        let cos_d = dot(wo, h);
-        let wi = 2.0 * cos_d * h - wo;
-        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
-        sum += gain(lobe, wi, wo, h) * incident_at_level(s, on_side(lobe, wi), 0.0);
+        let at = sample_about(wo, lambent_sample_half_vector(u, lobe));
+        if (!at.seen) { continue; }
+        sum += gain(lobe, at.wi, wo, at.h) * incident_at_level(s, on_side(lobe, at.wi), 0.0);
     }
     return sum / f32(SAMPLES);
 }

@@ -141,6 +141,24 @@ fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     return textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
+// A sample of a lobe: wi is wo mirrored about the half vector h; not `seen` where the lobe does not go.
+struct Sample {
+    h: vec3f,
+    cos_d: f32,
+    wi: vec3f,
+    seen: bool,
+}
+
+fn sample_about(wo: vec3f, h: vec3f) -> Sample {
+    let cos_d = dot(wo, h);
+    let wi = 2.0 * cos_d * h - wo;
+    return Sample(h, cos_d, wi, cos_d > LAMBENT_COS_MIN && wi.z > LAMBENT_COS_MIN);
+}
+
+fn half_vector_of(slope: vec2f) -> vec3f {
+    return vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
+}
+
 // f cos_i / pdf for wi, wo on the upper side; the distribution D cancels and is never computed.
 fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));

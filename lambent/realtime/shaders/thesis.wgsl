@@ -7,8 +7,7 @@
 override FORMULA: u32 = 25u;
 
 fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
-    let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-    return 2.0 * dot(wo, h) * h - wo;
+    return sample_about(wo, half_vector_of(slope)).wi;
 }
 
 fn tangent_of_angle(a: vec3f, b: vec3f) -> f32 {
@@ -27,20 +26,18 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     var weights = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
-        let slope = sample.xy * here.growth; // no longer quite equal angles where the roughness varies
-        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-        let cos_d = dot(wo, h);
-        let wi = 2.0 * cos_d * h - wo;
-        if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { continue; }
-        let p = sample.w / (h.z * h.z * h.z * cos_d);
-        let q = gain(lobe, wi, wo, h) / wi.z;
-        let light = incident(s, on_side(lobe, wi), half_log2_omega);
+        // no longer quite equal angles where the roughness varies
+        let at = sample_about(wo, half_vector_of(sample.xy * here.growth));
+        if (!at.seen) { continue; }
+        let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
+        let q = gain(lobe, at.wi, wo, at.h) / at.wi.z;
+        let light = incident(s, on_side(lobe, at.wi), half_log2_omega);
         if (FORMULA == 24u) {
-            sum += light * wi.z * wi.z * p * q;
-            weights += vec3f(p * wi.z);
+            sum += light * at.wi.z * at.wi.z * p * q;
+            weights += vec3f(p * at.wi.z);
         } else {
-            sum += light * wi.z * wi.z * p * q * q;
-            weights += p * q * wi.z;
+            sum += light * at.wi.z * at.wi.z * p * q * q;
+            weights += p * q * at.wi.z;
         }
     }
     return select(vec3f(0.0), sum / max(weights, vec3f(1e-30)), weights > vec3f(1e-30));
