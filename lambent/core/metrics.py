@@ -101,16 +101,23 @@ def tile_means(error: Floats, tile: int = TILE) -> Floats:
 
 
 def display_pair(reference: Floats, test: Floats, mean: float = 0.3) -> tuple[Floats, Floats]:
-    """Two pictures of radiance as encoded ones: clip(e L)^(1/2.2), e such that the reference has mean `mean`.
+    """Two pictures of radiance as encoded ones: clip(e L)^(1/2.2), e such that the reference has mean `mean`."""
+    exposure_ev = display_exposure(reference, mean)
+    return displayed(reference, exposure_ev), displayed(test, exposure_ev)
 
-    One e for both, found by bisection because clipping makes the mean a monotone, not linear, function of e.
+
+def display_exposure(reference: Floats, mean: float = 0.3) -> float:
+    """log2 of the e under which `displayed` of a picture of radiance has mean `mean`.
+
+    Found by bisection because clipping makes the mean a monotone, not linear, function of e.
     """
     low, high = -40.0, 40.0  # stops
     for _ in range(60):
         middle = (low + high) / 2
-        low, high = (middle, high) if _shown(reference, middle).mean() < mean else (low, middle)
-    return _shown(reference, low), _shown(test, low)
+        low, high = (middle, high) if displayed(reference, middle).mean() < mean else (low, middle)
+    return low
 
 
-def _shown(radiance: Floats, exposure_ev: float) -> Floats:
+def displayed(radiance: Floats, exposure_ev: float) -> Floats:
+    """clip(2^exposure_ev L)^(1/2.2)."""
     return np.asarray(np.clip(np.asarray(radiance, np.float64) * 2.0**exposure_ev, 0, 1) ** (1 / 2.2))
