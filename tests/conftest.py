@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,3 +17,23 @@ def shared_data() -> Path:
     if not SHARED.is_dir():
         pytest.skip(f"real test data not found at {SHARED} (set LAMBENT_SHARED)")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def mi() -> Any:
+    """Mitsuba, its variant chosen, our BSDFs known to it; tests that need it skip where no variant works."""
+    from lambent.bake.engine import engine
+    from lambent.core.errors import UserError
+
+    try:
+        engine()
+    except UserError as error:
+        pytest.skip(str(error))
+    from lambent.bake.material_plugin import register_material_plugin
+    from lambent.bake.table_plugin import register_table_plugin
+
+    register_material_plugin()
+    register_table_plugin()
+    import mitsuba
+
+    return mitsuba

@@ -7,35 +7,16 @@ import re
 import numpy as np
 import pytest
 
-from lambent.bake.engine import engine
-from lambent.bake.material_plugin import register_material_plugin
-from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.export import mitsuba
 from lambent.materials.export.pairs import pairs_of
 from tests.materials.export.export_materials import ALL, BRUSHED, FOIL
+from tests.tools.in_mitsuba import f_cos
 
 
-@pytest.fixture(scope="module")
-def mi():
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
-    import mitsuba
-
-    return mitsuba
-
-
-def evaluated(mi, bsdf, samples):
+def evaluated(bsdf, samples):
     """f (N, 3) of a Mitsuba BSDF at tuples, without the cosine."""
-    import drjit as dr
-
-    si = dr.zeros(mi.SurfaceInteraction3f, len(samples))
-    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.wi = mi.Vector3f(samples.wo.T.astype(np.float32))
-    value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(samples.wi.T.astype(np.float32)))
-    return np.array(value).T / samples.wi[:, 2:]
+    return f_cos(bsdf, samples.wi, samples.wo) / samples.wi[:, 2:]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -45,7 +26,7 @@ def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
     cost = mitsuba.write(material, path)
     (ball,) = [shape for shape in mi.load_file(str(path)).shapes() if not shape.is_emitter()]
     pairs = pairs_of(material, 11, seed=5)
-    value = evaluated(mi, ball.bsdf(), pairs.samples)
+    value = evaluated(ball.bsdf(), pairs.samples)
     found, _ = mitsuba.likeness(material)
     claimed = np.broadcast_to(found.eval(pairs, mitsuba.TOOL), value.shape)
     np.testing.assert_allclose(value, claimed, rtol=2e-3, atol=1e-5)
@@ -54,13 +35,12 @@ def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
 
 
 def test_the_comment_holds_the_exact_material(mi, tmp_path):
-    register_material_plugin()
     path = tmp_path / "scene.xml"
     mitsuba.write(FOIL, path)
     exact = re.search(r'<bsdf type="lambent_material".*?</bsdf>', path.read_text(), re.DOTALL)
     bsdf = mi.load_string(exact[0].replace("<bsdf ", '<bsdf version="3.0.0" ', 1))
     samples = pairs_of(FOIL, 10, seed=5).samples
-    np.testing.assert_allclose(evaluated(mi, bsdf, samples), MaterialBSDF(FOIL).eval(samples.wi, samples.wo), rtol=1e-3)
+    np.testing.assert_allclose(evaluated(bsdf, samples), MaterialBSDF(FOIL).eval(samples.wi, samples.wo), rtol=1e-3)
 
 
 def test_the_scene_renders(mi, tmp_path):

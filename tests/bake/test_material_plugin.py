@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.engine import engine
-from lambent.bake.material_plugin import PLUGIN, material_dict, register_material_plugin
-from lambent.core.errors import UserError
+from lambent.bake.material_plugin import PLUGIN, material_dict
 from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
+from tests.tools.in_mitsuba import interaction
 
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
 MATERIALS = {
@@ -27,28 +26,6 @@ MATERIALS = {
 }
 
 
-@pytest.fixture(scope="module")
-def mi():
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
-    register_material_plugin()
-    import mitsuba
-
-    return mitsuba
-
-
-def interaction(mi, wo):
-    """Surface interactions in the canonical frame with the viewer at `wo` (N, 3)."""
-    import drjit as dr
-
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.wi = mi.Vector3f(wo.T)
-    return si
-
-
 def random_directions(n, seed, lowest_cosine=0.02):
     rng = np.random.default_rng(seed)
     cosine = rng.uniform(lowest_cosine, 1, n) * rng.choice([-1, 1], n)
@@ -61,7 +38,7 @@ def test_eval_and_pdf_equal_numpy(mi, name):
     plugin, model = mi.load_dict(material_dict(material)), MaterialBSDF(material)
     wo = random_directions(20_000, 1).astype(np.float32)
     wi = random_directions(20_000, 2).astype(np.float32)
-    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T))
     expected = model.eval(wi, wo) * np.abs(wi[:, 2:])
     assert expected.max() > 0.01
     np.testing.assert_allclose(np.array(value).T, expected, rtol=1e-4, atol=1e-12)
@@ -74,7 +51,7 @@ def test_sample_agrees_with_eval_pdf_and_numpy(mi, name):
     plugin = mi.load_dict(material_dict(material))
     wo = random_directions(20_000, 3).astype(np.float32)
     u = np.random.default_rng(4).random((20_000, 3)).astype(np.float32)
-    si = interaction(mi, wo)
+    si = interaction(wo)
     bs, weight = plugin.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
     value, density = plugin.eval_pdf(mi.BSDFContext(), si, bs.wo)
     density, weight, value = np.array(density), np.array(weight).T, np.array(value).T
@@ -95,13 +72,13 @@ def test_chi_square(mi, name, tmp_path, monkeypatch):
 
     def sample_func(u):
         n = u.shape[1]
-        bs, _ = plugin.sample(context, interaction(mi, np.tile(wo, (n, 1))), u[0], mi.Point2f(u[1], u[2]))
+        bs, _ = plugin.sample(context, interaction(np.tile(wo, (n, 1))), u[0], mi.Point2f(u[1], u[2]))
         return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
 
     def pdf_func(w):
         import drjit as dr
 
-        return plugin.pdf(context, interaction(mi, np.tile(wo, (dr.width(w), 1))), w)
+        return plugin.pdf(context, interaction(np.tile(wo, (dr.width(w), 1))), w)
 
     test = ChiSquareTest(
         SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, res=101, ires=8
@@ -214,7 +191,7 @@ def test_flags_components_and_switches(mi):
     for flag in (flags.DiffuseReflection, flags.DiffuseTransmission, flags.GlossyReflection, flags.GlossyTransmission):
         assert mi.has_flag(plugin.flags(), flag)
     wo, wi = random_directions(1000, 5), random_directions(1000, 6)
-    si, whole = interaction(mi, wo), mi.BSDFContext()
+    si, whole = interaction(wo), mi.BSDFContext()
 
     def value(bsdf, context=whole):
         return np.array(bsdf.eval(context, si, mi.Vector3f(wi.T)))
@@ -236,7 +213,7 @@ def test_sampled_type_names_the_component(mi):
     n = 1000
     wo = np.tile(direction(0.3, 0.2), (n, 1))
     u = (np.arange(n) + 0.5) / n
-    bs, _ = plugin.sample(mi.BSDFContext(), interaction(mi, wo), mi.Float(u), mi.Point2f(0.3, 0.7))
+    bs, _ = plugin.sample(mi.BSDFContext(), interaction(wo), mi.Float(u), mi.Point2f(0.3, 0.7))
     index, kind = np.array(bs.sampled_component), np.array(bs.sampled_type)
     assert set(index) == {0, 1, 2, 3} and (np.diff(index.astype(int)) >= 0).all()
     below = np.array(bs.wo).T[:, 2] < 0

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.bake import material_preview
-from lambent.bake.engine import engine
 from lambent.bake.material_preview import FOV_DEG, preview
-from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
@@ -21,11 +19,7 @@ BRUSHED = Material(name="brushed", kd=0.02, lobes=(Lobe(k=0.9, mx=0.07, my=0.3, 
 
 
 @pytest.fixture(autouse=True)
-def _small(monkeypatch):
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
+def _small(mi, monkeypatch):
     monkeypatch.setattr(material_preview, "GRIDS", {True: GridShape(16, 1, 64, 16), False: GridShape(12, 12, 64, 32)})
 
 

@@ -3,34 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from lambent.bake.engine import engine
-from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.materials.models import model_named
 from lambent.materials.models.cook_torrance import conductor
+from tests.tools.in_mitsuba import f_cos
 
 
-@pytest.fixture(scope="module")
-def mi():
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
-    import mitsuba
-
-    return mitsuba
-
-
-def f_of(mi, plugin, wi, wo):
+def f_of(plugin, wi, wo):
     """f (N, 3) without the cosine."""
-    import drjit as dr
-
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.wi = mi.Vector3f(np.ascontiguousarray(wo.T, np.float32))
-    value = mi.load_dict(plugin).eval(mi.BSDFContext(), si, mi.Vector3f(np.ascontiguousarray(wi.T, np.float32)))
-    return np.array(value).T / wi[:, 2:]
+    return f_cos(plugin, wi, wo) / wi[:, 2:]
 
 
 def directions(lowest_cosine, n=5000):
@@ -57,7 +39,7 @@ def test_cook_torrance_where_nothing_is_shadowed(mi):
     wi = model.sample(wo, rng.random((5000, 3)))
     near = wi[:, 2] > 0.8
     ours = model.eval(wi, wo)[near]
-    np.testing.assert_allclose(ours, f_of(mi, rough("beckmann", alpha=0.1), wi, wo)[near], rtol=3e-3, atol=1e-4)
+    np.testing.assert_allclose(ours, f_of(rough("beckmann", alpha=0.1), wi, wo)[near], rtol=3e-3, atol=1e-4)
 
 
 def test_ggx_at_normal_viewing(mi):
@@ -66,11 +48,11 @@ def test_ggx_at_normal_viewing(mi):
     wo = np.broadcast_to(direction(0.0, 0.0), wi.shape)
     plugin = {"type": "roughconductor", "distribution": "ggx", "alpha_u": 0.2, "alpha_v": 0.4, "material": "none"}
     ours = model_named("ggx")(f0=1, alpha_x=0.2, alpha_y=0.4).eval(wi, wo)
-    np.testing.assert_allclose(ours, f_of(mi, plugin, wi, wo), rtol=2e-3, atol=1e-5)
+    np.testing.assert_allclose(ours, f_of(plugin, wi, wo), rtol=2e-3, atol=1e-5)
 
 
 def test_lambert(mi):
     wi, wo = directions(0.05)
     ours = model_named("lambert")(kd=(0.2, 0.4, 0.6)).eval(wi, wo)
     plugin = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.4, 0.6]}}
-    np.testing.assert_allclose(ours, f_of(mi, plugin, wi, wo), rtol=1e-4)
+    np.testing.assert_allclose(ours, f_of(plugin, wi, wo), rtol=1e-4)

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from lambent.bake.engine import engine
 from lambent.bake.table_plugin import table_dict
-from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.chi_square import chi_square
@@ -21,8 +16,8 @@ from lambent.materials.measured.klems import KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable
 from lambent.materials.measured.patch_sheet import lookup_of
 from lambent.materials.measured.protocol import TableInfo
+from tests.tools.in_mitsuba import interaction
 
-SATIN = Path(os.environ.get("LAMBENT_DATA", Path(__file__).parents[3] / "shared" / "data")) / "measured" / "rgl"
 SMALL = GridShape(8, 8, 64, 32)
 
 
@@ -44,17 +39,6 @@ SHEET = Material(
         Lobe(side="transmission", mx=0.2, my=0.4, k=0.5, r0=0.1, alpha=0.2),
     ),
 )
-
-
-@pytest.fixture(scope="module")
-def mi():
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
-    import mitsuba
-
-    return mitsuba
 
 
 @pytest.fixture(scope="module")
@@ -81,15 +65,6 @@ def patches(mi):
     return table, mi.load_dict(table_dict(table))
 
 
-def interaction(mi, wo):
-    import drjit as dr
-
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.wi = mi.Vector3f(np.ascontiguousarray(wo.T, np.float32))
-    return si
-
-
 def random_directions(n, seed, lowest_cosine=0.05, both=True):
     rng = np.random.default_rng(seed)
     cosine = rng.uniform(lowest_cosine, 1, n) * (rng.choice([-1, 1], n) if both else 1)
@@ -99,7 +74,7 @@ def random_directions(n, seed, lowest_cosine=0.05, both=True):
 def test_eval_and_pdf_equal_numpy(mi, sheet):
     grid, plugin = sheet
     wi, wo = random_directions(10_000, 1), random_directions(10_000, 2)
-    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T))
     pair = components(wi), components(wo)
     expected = np.stack(half_vector_grid.evaluate(*pair, grid), axis=-1) * np.abs(wi[:, 2:])
     np.testing.assert_allclose(np.array(value).T, expected, rtol=2e-4, atol=1e-6)
@@ -110,7 +85,7 @@ def test_eval_and_pdf_equal_numpy(mi, sheet):
 def test_sample_agrees_with_eval_pdf_and_numpy(mi, sheet):
     grid, plugin = sheet
     wo, u = random_directions(10_000, 3), np.random.default_rng(4).random((10_000, 3)).astype(np.float32)
-    si, context = interaction(mi, wo), mi.BSDFContext()
+    si, context = interaction(wo), mi.BSDFContext()
     bs, weight = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
     value, density = (np.array(a).T for a in plugin.eval_pdf(context, si, bs.wo))
     kept = np.array(bs.pdf) > 0
@@ -124,7 +99,7 @@ def test_sample_agrees_with_eval_pdf_and_numpy(mi, sheet):
 def test_patch_matrices_are_looked_up_as_they_are(mi, patches):
     table, plugin = patches
     wi, wo = random_directions(20_000, 1, 0.01), random_directions(20_000, 2, 0.01)
-    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(mi, wo), mi.Vector3f(wi.T))
+    value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T))
     expected = table.eval(wi, wo) * np.abs(wi[:, 2:])
     differs = ~np.isclose(np.array(value).T, expected, rtol=1e-4, atol=0).all(axis=-1)
     assert differs.sum() < 10 and (expected > 0).any(axis=-1).mean() > 0.1  # float32 on the border of a patch
@@ -135,7 +110,7 @@ def test_patch_matrices_are_looked_up_as_they_are(mi, patches):
 def test_samples_of_patches_weigh_the_albedo(mi, patches):
     table, plugin = patches
     wo, u = random_directions(20_000, 3), np.random.default_rng(4).random((20_000, 3)).astype(np.float32)
-    bs, weight = plugin.sample(mi.BSDFContext(), interaction(mi, wo), mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
+    bs, weight = plugin.sample(mi.BSDFContext(), interaction(wo), mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
     lookup, kept = lookup_of(table), np.array(bs.pdf) > 0
     near, far = (lookup.albedo_of(components(wo), np.full(len(wo), across)) for across in (False, True))
     assert (kept | (near + far == 0)).mean() > 0.999 and kept.mean() > 0.5
@@ -152,12 +127,12 @@ def test_chi_square_of_patches(mi, patches, theta_deg):
     context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
 
     def draw(u):
-        si, u = interaction(mi, np.tile(wo, (len(u), 1))), u.astype(np.float32)
+        si, u = interaction(np.tile(wo, (len(u), 1))), u.astype(np.float32)
         bs, _ = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1:].T))
         return np.where(np.array(bs.pdf)[:, None] > 0, np.array(bs.wo).T, [1.0, 0.0, 0.0]).astype(float)
 
     def density(w):
-        si = interaction(mi, np.tile(wo, (len(w), 1)))
+        si = interaction(np.tile(wo, (len(w), 1)))
         return np.array(plugin.pdf(context, si, mi.Vector3f(np.ascontiguousarray(w.T, np.float32))), float)
 
     test = chi_square(draw, density, samples=500_000, cells=lookup_of(table).cell_borders(wo))
@@ -173,12 +148,12 @@ def test_chi_square(mi, sheet, theta_deg, tmp_path, monkeypatch):
     context, wo = mi.BSDFContext(), direction(np.radians(theta_deg), 0.4)
 
     def sample_func(u):
-        si = interaction(mi, np.tile(wo, (u.shape[1], 1)))
+        si = interaction(np.tile(wo, (u.shape[1], 1)))
         bs, _ = plugin.sample(context, si, u[0], mi.Point2f(u[1], u[2]))
         return bs.wo, mi.Float(mi.Bool(bs.pdf > 0))
 
     def pdf_func(w):
-        return plugin.pdf(context, interaction(mi, np.tile(wo, (dr.width(w), 1))), w)
+        return plugin.pdf(context, interaction(np.tile(wo, (dr.width(w), 1))), w)
 
     monkeypatch.chdir(tmp_path)  # a failing test writes its data to the working folder
     test = ChiSquareTest(SphericalDomain(), sample_func, pdf_func, sample_dim=3, sample_count=1_000_000, ires=32)
@@ -231,20 +206,19 @@ def test_components_are_the_two_sides(mi, sheet):
     for i in (0, 1):
         context = mi.BSDFContext()
         context.component = i
-        values.append(np.array(plugin.eval(context, interaction(mi, wo), mi.Vector3f(wi.T))).T.max(axis=1) > 0)
+        values.append(np.array(plugin.eval(context, interaction(wo), mi.Vector3f(wi.T))).T.max(axis=1) > 0)
     across = wi[:, 2] * wo[:, 2] < 0
     assert values[0][~across].all() and not values[0][across].any()
     assert values[1][across].any() and not values[1][~across].any()
 
 
-@pytest.mark.skipif(not SATIN.is_dir(), reason="no measured files beside the checkout")
-def test_an_rgl_file_is_mitsubas_own_measured(mi):
+def test_an_rgl_file_is_mitsubas_own_measured(mi, shared_data):
     """To the .5 % of the resampling. Mitsuba gives the file the viewer where we give it the light."""
-    file = SATIN / "satin_rosaline_rgb.bsdf"
+    file = shared_data / "measured" / "rgl" / "satin_rosaline_rgb.bsdf"
     ours = mi.load_dict(table_dict(load(file)))
     theirs = mi.load_dict({"type": "measured", "filename": str(file)})
     wi, wo = random_directions(50_000, 7, 0.1, both=False), random_directions(50_000, 8, 0.1, both=False)
     context = mi.BSDFContext()
-    got = np.array(ours.eval(context, interaction(mi, wo), mi.Vector3f(wi.T))).T / wi[:, 2:]
-    expected = np.array(theirs.eval(context, interaction(mi, wi), mi.Vector3f(wo.T))).T / wo[:, 2:]
+    got = np.array(ours.eval(context, interaction(wo), mi.Vector3f(wi.T))).T / wi[:, 2:]
+    expected = np.array(theirs.eval(context, interaction(wi), mi.Vector3f(wo.T))).T / wo[:, 2:]
     assert np.abs(got - expected).sum() < 0.01 * expected.sum()

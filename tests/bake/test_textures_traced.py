@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.engine import engine
-from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
@@ -20,15 +18,8 @@ LETTER = np.array(
     [[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16
 )  # an F, row 0 at the top
 ABOVE = Camera("above", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0), fov_y_deg=float(np.degrees(2 * np.arctan(0.25))))
+pytestmark = pytest.mark.usefixtures("mi")
 GLOSS = Lobe(mx=0.3, my=0.1, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.4)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def path_tracer():
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
 
 
 def wall(material: Material, textures: MaterialTextures, **more) -> Scene:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from lambent.core.errors import UserError
 from lambent.core.frames import direction
 from lambent.materials.models.published import MERL_CHANNELS, Published, read_fits
 
-FITS = Path(os.environ.get("LAMBENT_DATA", Path(__file__).parents[3] / "shared" / "data")) / "fits"
 WARD = "a-b = Aggregate(Lambertian(albedo = [.1, 0.2, 3e-1]), NganWard(albedo = [0.01, 0.02, 0.03], roughness = 0.1))"
 COOK = "c = Aggregate(Lambertian(albedo = [0, 0, 0]), NganCookTorrance(albedo = [1, 1, 1], eta = .04, roughness = .2))"
 LOW = "d = Aggregate(Lambertian(albedo = [0, 0, 0]), LowCookTorrance(albedo = [1, 1, 1], roughness = .2, eta = 1.5))"
@@ -83,13 +81,11 @@ def test_bytes_are_refused(tmp_path):
         read_fits(tmp_path / "x.fit")
 
 
-@pytest.mark.skipif(not FITS.is_dir(), reason="no published fits beside the checkout")
-def test_the_published_files_are_read_whole():
-    counts = {file.name: len(read_fits(file)) for file in FITS.glob("*.fit")}
-    lines = {
-        file.name: sum("Aggregate" in line for line in file.read_text().splitlines()) for file in FITS.glob("*.fit")
-    }
-    assert counts == lines and min(counts.values()) >= 86
+def test_the_published_files_are_read_whole(shared_data):
+    files = list((shared_data / "fits").glob("*.fit"))
+    counts = [len(read_fits(file)) for file in files]
+    lines = [sum("Aggregate" in line for line in file.read_text().splitlines()) for file in files]
+    assert counts == lines and min(counts) >= 86
 
 
 def test_models_name_their_fields():

@@ -142,15 +142,8 @@ def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
     np.testing.assert_allclose(got, expected, rtol=0.02)
 
 
-def test_drawn_pictures_equal_path_traced_ones(device, tmp_path) -> None:
+def test_drawn_pictures_equal_path_traced_ones(device, mi, tmp_path) -> None:
     """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
-    from lambent.bake.engine import engine
-    from lambent.core.errors import UserError
-
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
     from lambent.bake.environment import environment_cube
     from lambent.bake.reference import render_reference
     from lambent.core.images import write_image

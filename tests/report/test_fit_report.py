@@ -46,11 +46,7 @@ def no_engine(monkeypatch):
 
 
 @pytest.fixture
-def small_previews(monkeypatch):
-    try:
-        engine_module.engine()
-    except UserError as error:
-        pytest.skip(str(error))
+def small_previews(mi, monkeypatch):
     small = GridShape(12, 1, 32, 16)
     monkeypatch.setattr(material_preview, "GRIDS", {True: small, False: replace(small, viewer_phi=8)})
     monkeypatch.setattr(material_preview, "preview", functools.partial(material_preview.preview, size_px=48, spp=4))

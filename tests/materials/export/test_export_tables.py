@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.measured import load
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
+from tests.tools.in_mitsuba import f_cos, interaction
 
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4,) * 3, mx=0.2, my=0.2, r0=(0.3,) * 3),))
 BRUSHED = Material(name="brushed", kd=(0.05,) * 3, lobes=(Lobe(mx=0.25, my=0.12, r0=(0.9,) * 3, k=(0.8, 0.7, 0.6)),))
@@ -83,9 +85,8 @@ def test_merl_says_what_it_cannot_hold(tmp_path: Path, small_merl: None) -> None
 
 
 @pytest.mark.parametrize("material", [GLOSSY, BRUSHED], ids=["isotropic", "anisotropic"])
-def test_rgl_is_what_mitsuba_reads(tmp_path: Path, material: Material) -> None:
+def test_rgl_is_what_mitsuba_reads(tmp_path: Path, mi: Any, material: Material) -> None:
     """The written file in our reader and in Mitsuba's `measured` plugin: the same, and close to the material."""
-    pytest.importorskip("mitsuba")
     path = tmp_path / "a.bsdf"
     cost = rgl.write(material, path)
     assert cost.lost == () and cost.share["l1"] < 0.03 and cost.share["cuberoot"] < 0.06
@@ -93,25 +94,20 @@ def test_rgl_is_what_mitsuba_reads(tmp_path: Path, material: Material) -> None:
     assert table.info.isotropic == (material is GLOSSY) and table.info.format == "RGL tensor file"
     u = np.random.default_rng(1).random((4000, 4))
     wi, wo = (direction(np.arccos(1 - 0.85 * u[:, k]), 2 * np.pi * u[:, k + 1]) for k in (0, 2))
-    plugin = _plugin_eval(path, wi, wo)
+    plugin = f_cos({"type": "measured", "filename": str(path)}, wo, wi)
     mine = table.eval(wi, wo) * wo[:, 2:]
     off = np.abs(mine - plugin) / (np.abs(plugin) + 1e-3)
     assert np.quantile(off, 0.99) < 5e-3 and np.median(off) < 1e-4
 
 
-def test_mitsuba_samples_what_it_evaluates(tmp_path: Path) -> None:
+def test_mitsuba_samples_what_it_evaluates(tmp_path: Path, mi: Any) -> None:
     """Chi-square of the plugin's sampler against its own density, on a written file."""
-    mi = pytest.importorskip("mitsuba")
     path = tmp_path / "a.bsdf"
     rgl.write(GLOSSY, path)
-    _engine()
-    import drjit as dr
-
     bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
     n = 200_000
-    si = dr.zeros(mi.SurfaceInteraction3f, n)
     wi = direction(0.7, 0.3)
-    si.wi = mi.Vector3f(*map(float, wi))
+    si = interaction(np.tile(wi, (n, 1)))
     u = np.random.default_rng(0).random((n, 3)).astype(np.float32)
     bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(u[:, 0]), mi.Point2f(u[:, 1], u[:, 2]))
     albedo = np.array(weight, dtype=float).T.mean(axis=0)
@@ -119,23 +115,6 @@ def test_mitsuba_samples_what_it_evaluates(tmp_path: Path) -> None:
     pdf, p = np.array(bs.pdf, dtype=float), np.array(bsdf.eval(mi.BSDFContext(), si, bs.wo), dtype=float).T[:, 0]
     ratio = np.divide(p, pdf, out=np.zeros(n), where=pdf > 0)
     assert ratio[pdf > 0].std() < 0.5 * ratio[pdf > 0].mean()  # the density follows the light
-
-
-def _engine() -> None:
-    from lambent.bake.engine import engine
-
-    engine()
-
-
-def _plugin_eval(path: Path, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    _engine()
-    import drjit as dr
-    import mitsuba as mi
-
-    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-    si.wi = mi.Vector3f(wi.T.astype(np.float32))
-    return np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T.astype(np.float32))), dtype=float).T
 
 
 def test_rgl_keeps_a_narrow_lobe_and_says_transmission_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,34 +13,21 @@ from lambent.core.errors import UserError
 from lambent.materials.measured import load
 from lambent.materials.measured.marginal import Corners, Warp
 from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
+from tests.tools.in_mitsuba import f_cos
 
 REAL = ("paper_white_rgb", "satin_rosaline_rgb", "cc_ibiza_sunset_rgb")
-
-
-def _plugin(path: Path, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-    from lambent.bake.engine import engine
-
-    engine()
-    import drjit as dr
-    import mitsuba as mi
-
-    bsdf = mi.load_dict({"type": "measured", "filename": str(path)})
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-    si.wi = mi.Vector3f(wi.T.astype(np.float32))
-    value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T.astype(np.float32)))
-    return np.array(value, dtype=float).T
 
 
 def _assert_equal_to_plugin(path: Path, wi: np.ndarray, wo: np.ndarray) -> None:
     """f cos within single precision: the plugin works in float32, and its warp divides small differences."""
     mine = load(path).eval(wi, wo) * wo[:, 2:]
-    plugin = np.maximum(_plugin(path, wi, wo), 0)
+    plugin = np.maximum(f_cos({"type": "measured", "filename": str(path)}, wo, wi), 0)
     error = np.abs(mine - plugin) / (np.abs(plugin) + 1e-3)
     assert error.max() < 2e-3 and np.quantile(error, 0.99) < 1e-4 and error.mean() < 1e-5
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_real_files_equal_the_plugin(shared_data: Path, hemisphere, name: str) -> None:
+def test_real_files_equal_the_plugin(shared_data: Path, mi: object, hemisphere, name: str) -> None:
     wi, wo = hemisphere(20000, 1, 88), hemisphere(20000, 2, 88)
     near = wi[::2] * (-1, -1, 1) + np.random.default_rng(0).normal(0, 0.05, (10000, 3))
     wo[::2] = near / np.linalg.norm(near, axis=1, keepdims=True)
@@ -53,7 +40,7 @@ def test_real_files_equal_the_plugin(shared_data: Path, hemisphere, name: str) -
     [np.zeros(1), np.linspace(-np.pi, -np.pi / 2, 4), np.linspace(-np.pi, 0, 4), np.linspace(-np.pi, np.pi, 6)],
     ids=["isotropic", "quarter", "half", "whole"],
 )
-def test_made_up_files_equal_the_plugin(tmp_path: Path, hemisphere, phi_i: np.ndarray) -> None:
+def test_made_up_files_equal_the_plugin(tmp_path: Path, mi: object, hemisphere, phi_i: np.ndarray) -> None:
     path = tmp_path / "a.bsdf"
     path.write_bytes(tensor_bytes(rgl_fields(phi_i)))
     assert load(path).info.isotropic == (len(phi_i) == 1)
