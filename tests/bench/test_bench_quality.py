@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from lambent.bench import quality, walk_cube
+from lambent.bench.quality_inputs import read_inputs
 from lambent.bench.specular_scene import CAMERA, baked_scene, dusk, from_lat_long, night, studio
 from lambent.core.cubemap import face_directions
 from lambent.core.errors import UserError
 from lambent.core.frames import normalize
 from lambent.core.images import write_image
+from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import choose_adapter
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.scenes.geometry import sphere
@@ -53,6 +55,33 @@ def test_rings_stand_above_the_published_estimates(monkeypatch: pytest.MonkeyPat
     assert above["lobe-4.25"]["7"] > 4
     assert above["lobe-4.24"]["7"] > 4
     assert all(0 < row["flip_qmc"] < row["flip_qmc_worst_tile"] < 1 for row in report["rows"])
+
+
+def test_the_callers_materials_stand_beside_ours(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A document and a measured table are told from environments by their content, and only their lobes are shown."""
+    lobe = Lobe(mx=0.2, my=0.2, r0=0.7)
+    through = Lobe(mx=0.1, my=0.1, side="transmission")
+    Material(name="any", kd=(0.5, 0.5, 0.5), lobes=(lobe, through)).save(tmp_path / "mine.json")
+    Material(name="any", kd=(0.5, 0.5, 0.5)).save(tmp_path / "chalk.json")
+    environments, materials = read_inputs([tmp_path / "mine.json"])
+    assert (environments, [m.name for m in materials]) == ({}, ["mine"])
+    assert materials[0].lobes == (lobe,)
+    assert not any(materials[0].kd)
+    with pytest.raises(UserError, match="specularly"):
+        read_inputs([tmp_path / "chalk.json"])
+    monkeypatch.setattr(quality, "OWN_ENVIRONMENTS", {"dusk": dusk})
+    monkeypatch.setattr(quality, "MATERIALS", quality.MATERIALS[3:4])
+    monkeypatch.setattr(quality, "NS", (7,))
+    monkeypatch.setattr(quality, "REFERENCE_SPP", 256)
+    report = quality.run(True, [tmp_path / "mine.json"])
+    assert {row["material"] for row in report["rows"]} == {"matte .15", "mine"}
+
+
+def test_a_measured_table_is_fitted_first(shared_data: Path) -> None:
+    environments, materials = read_inputs([shared_data / "measured" / "rgl" / "satin_rosaline_rgb.bsdf"])
+    assert not environments
+    assert materials[0].name == "satin_rosaline_rgb"
+    assert 0.05 < materials[0].lobes[0].mx < 0.5
 
 
 def test_the_path_tracer_sees_the_same_picture() -> None:
