@@ -32,6 +32,7 @@ from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 from lambent.store.contract import (
+    SIDES,
     TIMINGS,
     CameraRecord,
     PathRecord,
@@ -40,6 +41,7 @@ from lambent.store.contract import (
     SceneRecord,
     is_two_sided,
     needs_probe,
+    noise_name,
     probe_name,
     write_scene_record,
 )
@@ -101,6 +103,8 @@ def bake(
     for kind, step in steps.items():
         if kind in kinds:
             step()
+    if "light_map" in kinds:
+        job.noise()
     return job.store
 
 
@@ -276,6 +280,32 @@ class _Bake:
                 name = f"light_map/{side}"
                 meta = self._meta(integrator=self.integrator, **meta)
                 self.store.put(name, "light_map", clean, key=self.irradiance_key, meta=meta)
+
+    def noise(self) -> None:
+        """How exact the light map is at every texel, from the samples that stay in the store."""
+        count = 2 if any(self._two_sided) else 1
+        names = [noise_name(side) for side in SIDES[:count]]
+        if all(self._current(name, self.irradiance_key) for name in names):
+            return
+        from lambent.bake.noise_map import noise_map, sampled_halves
+        from lambent.bake.photon_map import halves_of
+        from lambent.bake.texels import chart_labels, texels_of
+
+        self.progress(0, 1, "noise of the light map")
+        texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
+        labels = chart_labels(self.merged, texels)
+        if self.integrator == PHOTONS:
+            builder = self._builder(diffuse=True, photons=True)
+            scene = builder.build()
+            sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
+            found = halves_of(self.store.read("light_map/photons"), self.merged, sides)
+        else:
+            stage = "gathered" if self.quality.gather_samples else "traced"
+            raw = (f"light_map/{stage}", f"light_map/{stage}_back")[:count]
+            found = (sampled_halves(self.store.read(name)) for name in raw)
+        for name, (halves, known) in zip(names, found, strict=True):
+            noise = noise_map(halves, known, labels)
+            self.store.put(name, "light_map", noise, key=self.irradiance_key, meta=self._meta())
 
     def _builder(self, diffuse: bool, photons: bool = False) -> Any:
         from lambent.bake.emitters import balance_emitters

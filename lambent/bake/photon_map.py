@@ -6,7 +6,7 @@ goes on from the finished ones after any interruption. Their halves tell the noi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -51,16 +51,23 @@ def finished(
 ) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
     """Per side the light map (H, W, 3) and what to note: the noise before denoising."""
     texels = sides[0].texels
-    areas = texel_areas(dict(geometry), texels.width, texels.height)
     maps = []
-    for number, side in enumerate(sides):
-        kernel = Kernel(areas, texels, side.valid.mean(axis=1))
-        halves = np.stack([kernel.irradiance(batches[half::2, number].mean(axis=0)) for half in (0, 1)])
-        known = kernel.known
+    for halves, known in halves_of(batches, geometry, sides):
         noise = relative_noise(halves[:, known]) if known.any() else 0.0
         clean = cleaned(halves.mean(axis=0), known, texels, labels) if known.any() else _black(texels)
         maps.append((clean, {"noise": noise}))
     return maps
+
+
+def halves_of(
+    batches: Array, geometry: Mapping[str, Array], sides: list[Sides]
+) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+    """Per side irradiance (2, H, W, 3) of both halves of the batches, and where there is any (H, W)."""
+    texels = sides[0].texels
+    areas = texel_areas(dict(geometry), texels.width, texels.height)
+    for number, side in enumerate(sides):
+        kernel = Kernel(areas, texels, side.valid.mean(axis=1))
+        yield np.stack([kernel.irradiance(batches[half::2, number].mean(axis=0)) for half in (0, 1)]), kernel.known
 
 
 def _black(texels: Texels) -> NDArray[np.float16]:

@@ -6,6 +6,8 @@
     light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; texel (row, column) has its
                                            centre at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
+    light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
+                                           before they were denoised; may be absent
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] with OBJECT left out
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
@@ -29,6 +31,7 @@ FAR = 1.0e4  # metres: distance of what is not hit
 HALF_MAX = 65504.0  # the largest half float: brighter light is cut there
 SCENE = "scene"
 TIMINGS = "timings"
+SIDES = ("irradiance", "irradiance_back")  # of the light map
 Triple = tuple[float, float, float]
 
 
@@ -109,6 +112,11 @@ class SceneRecord(_Record):
 def probe_name(object_name: str, part: str) -> str:
     """Name of a probe's array; `part` is radiance, distance or planes."""
     return f"probe/{object_name}/{part}"
+
+
+def noise_name(side: str) -> str:
+    """Name of the array that says how exact a side of the light map is."""
+    return f"light_map/{side.replace('irradiance', 'noise')}"
 
 
 def texture_name(material_name: str, part: str) -> str:
