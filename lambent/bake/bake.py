@@ -165,6 +165,7 @@ class _Bake:
         self.store.set_document(WAYS, {"light_map": self.integrator, "probes": self.probe_way})
         scene = self.scene = self._in_parts(scene)
         self._sides: dict[float, Any] = {}
+        self._views: dict[float, Any] = {}
         self.store.set_document("changes", changes)
         if not resume:
             self.store.forget_all()
@@ -344,9 +345,10 @@ class _Bake:
         name = f"light_map/{stage}" if side == "irradiance" else f"light_map/{stage}_back"
         shape, chunks = (2, texels.height, texels.width, 4), (2, TILE, TILE, 4)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
+        scene = builder.build()
+        lit = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder, scene)
+        sides, labels = self._in_view(lit, labels, scene)
         if writer.missing:
-            scene = builder.build()
-            sides = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder, scene)
             covered = np.zeros(texels.width * texels.height, bool)
             covered[texels.index[sides.valid.any(axis=1)]] = True
             covered = covered.reshape(texels.height, texels.width)
@@ -377,6 +379,19 @@ class _Bake:
         valid[ours] = ~SolidTest(builder, scene).embedded(points[ours], flat[ours])
         self._sides[sign] = Sides(texels, sign, valid.reshape(texels.face.shape))
         return self._sides[sign]
+
+    def _in_view(self, sides: Any, labels: NDArray[np.integer], scene: Any) -> tuple[Any, NDArray[np.integer]]:
+        """The sides without points that viewers do not see, where a texel has others, and labels that say so."""
+        from lambent.bake.viewers import seen, viewing_places, without_hidden
+
+        if sides.sign not in self._views:
+            self.progress(0, 1, "what viewers see")
+            texels = sides.texels
+            points, flat = texels.positions.reshape(-1, 3), sides.sign * texels.flat.reshape(-1, 3)
+            in_view = seen(scene, viewing_places(self.atlas.scene, scene), points, flat).reshape(sides.valid.shape)
+            valid, labels = without_hidden(texels, sides.valid, in_view, labels)
+            self._views[sides.sign] = replace(sides, valid=valid), labels
+        return self._views[sides.sign]
 
     def _two_sided_faces(self) -> NDArray[np.bool_]:
         return np.repeat(self._two_sided, [len(o.mesh.faces) for o in self.scene.objects])

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
+
+from lambent.core.colour import luminance
 
 Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 RINGS = 16  # texels grown into gutters; what is farther from any chart is never looked up
+CONTRAST = 8.0  # times as bright: the filter takes light of such neighbours across a gutter
+NEAR = 6  # texels that it reaches
+LAYERS = 4
 RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
 
 
@@ -99,3 +106,70 @@ def denoise(irradiance: Array) -> Array:
         if error is not None:
             raise RuntimeError(f"denoising failed: {error}")
     return np.maximum(clean[RIM:-RIM, RIM:-RIM], 0.0)
+
+
+def denoise_charts(irradiance: Array, known: Mask, labels: NDArray[np.integer], *, smooth: int = 0) -> Array:
+    """A noisy light map, filled and denoised, without light of one chart in another: (H, W, 3).
+
+    The filter knows nothing of charts, and light that is CONTRAST times as bright a few texels on reaches across the
+    gutter. Such neighbours are denoised in different layers, each filled as if the others were not there.
+    """
+    layer = layers_of(irradiance, known, labels)
+    clean = np.zeros_like(irradiance)
+    for number in range(max(1, int(layer.max()) + 1)):
+        mine = layer == number
+        part = denoise(fill(irradiance, known & mine, np.where(mine, labels, -1), smooth=smooth))
+        clean = np.where(mine[..., None] | ((layer < 0) & (number == 0))[..., None], part, clean)
+    return clean
+
+
+def layers_of(irradiance: Array, known: Mask, labels: NDArray[np.integer]) -> NDArray[np.integer]:
+    """Layer (H, W) of each texel, -1 in gutters: charts near each other whose light differs much lie in different ones.
+
+    Compared are means over the texels of two charts that lie within NEAR texels of each other.
+    """
+    light = np.where(known, luminance(irradiance), 0.0)
+    pairs, totals = [], []
+    for step in range(1, NEAR + 1):
+        for rows, columns in ((0, step), (step, 0), (step, step), (step, -step)):
+            here, there = _shifted(labels, rows, columns)
+            chosen = (here != there) & (here >= 0) & (there >= 0)
+            chosen &= np.logical_and(*_shifted(known, rows, columns))
+            lights = [a[chosen] for a in _shifted(light, rows, columns)]
+            couple = np.stack([here[chosen], there[chosen]], axis=-1)
+            turned = couple[:, 0] > couple[:, 1]
+            couple[turned] = couple[turned, ::-1]
+            both = np.stack(lights, axis=-1)
+            both[turned] = both[turned, ::-1]
+            pairs.append(couple)
+            totals.append(both)
+    couples, number = np.unique(np.concatenate(pairs), axis=0, return_inverse=True)
+    both = [np.bincount(number.reshape(-1), total, len(couples)) for total in np.concatenate(totals).T]
+    apart = couples[np.maximum(*both) > CONTRAST * np.minimum(*both)]
+    return _coloured(labels, apart)
+
+
+def _shifted(array: NDArray[Any], rows: int, columns: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Two views of equal shape: what stands at a texel, and (rows, columns) on from it."""
+    height, width = array.shape
+    here = array[: height - rows, max(0, -columns) : width - max(0, columns)]
+    return here, array[rows:, max(0, columns) : width + min(0, columns)]
+
+
+def _coloured(labels: NDArray[np.integer], apart: NDArray[np.integer]) -> NDArray[np.integer]:
+    """Layers such that no two charts of `apart` (n, 2) share one, as far as LAYERS reach."""
+    others: dict[int, list[int]] = {}
+    for a, b in apart.tolist():
+        others.setdefault(a, []).append(b)
+        others.setdefault(b, []).append(a)
+    layer: dict[int, int] = {}
+    for chart in sorted(others, key=lambda c: (-len(others[c]), c)):
+        taken = {layer.get(other) for other in others[chart]}
+        layer[chart] = next((k for k in range(LAYERS) if k not in taken), LAYERS - 1)
+    result = np.where(labels >= 0, 0, -1)
+    if layer:
+        names = np.array(sorted(layer))
+        place = np.searchsorted(names, labels).clip(0, len(names) - 1)
+        numbers = np.array([layer[int(c)] for c in names])[place]
+        result = np.where(names[place] == labels, numbers, result)
+    return result

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake import paths
-from lambent.bake.denoise import denoise, fill
+from lambent.bake.denoise import denoise_charts, fill
 from lambent.bake.quality import Quality
 from lambent.bake.seams import blend_seams
 from lambent.bake.texels import POINTS, Texels
@@ -167,6 +167,6 @@ def cleaned(
     irradiance: Array, known: NDArray[np.bool_], texels: Texels, labels: NDArray[np.integer]
 ) -> NDArray[np.float16]:
     """A noisy light map (H, W, 3), denoised, filled where nothing is known, its seams blended."""
-    filled = fill(irradiance, known, labels, smooth=SMOOTH)
-    clean = fill(blend_seams(denoise(filled), known, texels, labels), known, labels)
+    clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
+    clean = fill(blend_seams(clean, known, texels, labels), known, labels)
     return np.minimum(clean, HALF_MAX).astype(np.float16)

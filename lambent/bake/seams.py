@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.texels import Texels
+from lambent.bake.texels import BEYOND, Texels
 from lambent.core.frames import normalize
 
 Array = NDArray[np.floating]
@@ -21,7 +21,10 @@ NEIGHBOURS = 24
 
 
 def blend_seams(irradiance: Array, known: NDArray[np.bool_], texels: Texels, labels: NDArray[np.integer]) -> Array:
-    """(H, W, 3) irradiance with seams blended. `known` (H, W) are the texels that were sampled."""
+    """(H, W, 3) irradiance with seams blended; hidden parts of charts (`texels.BEYOND`) only among themselves.
+
+    `known` (H, W) are the texels that were sampled.
+    """
     from scipy.ndimage import distance_transform_edt
     from scipy.spatial import cKDTree
 
@@ -29,7 +32,8 @@ def blend_seams(irradiance: Array, known: NDArray[np.bool_], texels: Texels, lab
     index, position = texels.index[lit], texels.positions[lit].mean(axis=1).astype(float)
     normal = normalize(texels.normals[lit].mean(axis=1).astype(float))
     share = np.clip(1 - distance_transform_edt(~_borders(labels)).reshape(-1)[index] / BORDER, 0, 1)
-    near = np.flatnonzero(share > 0)
+    # a triangle without area, in the scene or in the map, has no metres per texel, and its neighbours no distance
+    near = np.flatnonzero((share > 0) & (texels.spacing[lit] > 0))
     if len(index) < NEIGHBOURS or not len(near):
         return irradiance
     values = irradiance.reshape(-1, 3)[index].astype(float)
@@ -40,6 +44,8 @@ def blend_seams(irradiance: Array, known: NDArray[np.bool_], texels: Texels, lab
     along = np.linalg.norm(offset, axis=2) / (RADIUS * spacing)
     facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[near]), 0) ** 8
     weight = np.exp(-(lift**2 + along**2) / 2) * facing
+    beyond = labels.reshape(-1)[index] >= BEYOND
+    weight *= beyond[others] == beyond[near][:, None]
     weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing
     mean = np.einsum("nk,nkx->nx", weight, values[others]) / weight.sum(axis=1, keepdims=True)
     blended = irradiance.reshape(-1, 3).copy()

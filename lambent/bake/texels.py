@@ -17,6 +17,7 @@ Array = NDArray[np.floating]
 Indices = NDArray[np.integer]
 POINTS = 4  # per texel
 PULL = 0.25  # texels
+BEYOND = 1 << 40  # added to the label of a chart, for texels that no viewer sees (see viewers.py)
 CANDIDATES_AT_ONCE = 1 << 21  # (triangle, texel) pairs tested in one go: some 200 MB
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from lambent.bake.denoise import denoise, fill
+from lambent.bake.denoise import denoise, denoise_charts, fill, layers_of
 
 
 def test_gutters_take_what_is_next_to_them() -> None:
@@ -40,3 +41,18 @@ def test_noise_falls_and_the_mean_stays() -> None:
 
 def test_darkness_stays_dark() -> None:
     assert not denoise(np.zeros((16, 16, 3))).any()
+
+
+def test_a_bright_chart_stays_out_of_a_dark_one_beside_it() -> None:
+    labels = np.full((64, 64), -1)
+    labels[:, :31], labels[:, 33:] = 3, 7
+    known = labels >= 0
+    rng = np.random.default_rng(0)
+    noisy = np.where(labels == 7, 100.0, 1.0)[..., None] * rng.gamma(4, 1 / 4, (64, 64, 3)) * known[..., None]
+    layers = layers_of(noisy, known, labels)
+    assert {int(layers[0, 0]), int(layers[0, 63])} == {0, 1} and layers[0, 32] == -1
+    clean, joined = denoise_charts(noisy, known, labels), denoise(fill(noisy, known, labels))
+    assert clean[:, 30].mean() == pytest.approx(1, abs=0.1), joined[:, 30].mean()
+    assert abs(joined[:, 30].mean() - 1) > 0.5, "in one layer the filter smears"
+    assert clean[:, 33:36].mean() == pytest.approx(100, abs=10)
+    assert not layers_of(np.where(known, 1.0, 0.0)[..., None] * np.ones(3), known, labels)[known].any()

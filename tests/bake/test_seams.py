@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from lambent.bake.seams import blend_seams
-from lambent.bake.texels import POINTS, Texels
+from lambent.bake.texels import BEYOND, POINTS, Texels
 
 N, GAP = 20, 4
 
@@ -41,3 +43,12 @@ def test_what_lies_above_is_not_mixed_in() -> None:
 def test_texels_that_were_not_sampled_do_not_count() -> None:
     texels, labels, image = two_charts(height=0.0)
     assert np.allclose(blend_seams(image, labels == 0, texels, labels)[:, :N], 1.0)
+
+
+def test_triangles_without_area_and_hidden_parts_are_left_alone() -> None:
+    texels, labels, image = two_charts(height=0.0)
+    with np.errstate(all="raise"):
+        bare = replace(texels, spacing=np.zeros(len(texels.index)))
+        assert (blend_seams(image, labels >= 0, bare, labels) == image).all()
+    hidden = np.where(labels == 1, 1 + BEYOND, labels)
+    assert np.allclose(blend_seams(image, labels >= 0, texels, hidden)[:, :N], 1.0)

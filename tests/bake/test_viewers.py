@@ -1,0 +1,103 @@
+"""Texels that lie across an occluder hold the light of the side in view."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.texels import BEYOND, POINTS, Texels
+from lambent.bake.viewers import seen, viewing_places, without_hidden
+from lambent.materials.document import Material
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import Camera, ImageEnvironment, Scene, SceneObject
+from tests.bake.small_scenes import TINY, constant_picture
+
+OVER = 0.5  # metres that walls go on above the ceiling, and ceiling and floor beyond the walls
+GREY = Material(kd=0.5)
+SIDE = 2.0
+
+
+def house(folder: Path) -> Scene:
+    """A furnace of sheets (irradiance pi within) under a sky that puts a hundred times as much on what sticks out."""
+    wide, tall = SIDE + 2 * OVER, SIDE + OVER
+    low, high = -OVER, SIDE + OVER
+    sheets = {
+        "floor": patch((low, 0, high), (wide, 0, 0), (0, 0, -wide)),
+        "ceiling": patch((low, SIDE, low), (wide, 0, 0), (0, 0, wide)),
+        "back": patch((0, 0, 0), (SIDE, 0, 0), (0, tall, 0)),
+        "front": patch((SIDE, 0, SIDE), (-SIDE, 0, 0), (0, tall, 0)),
+        "left": patch((0, 0, SIDE), (0, 0, -SIDE), (0, tall, 0)),
+        "right": patch((SIDE, 0, 0), (0, 0, SIDE), (0, tall, 0)),
+    }
+    objects = tuple(SceneObject(name, mesh, "grey", emission=(0.5, 0.5, 0.5)) for name, mesh in sheets.items())
+    camera = Camera("inside", (1.0, 1.0, 1.0), (1.0, 1.0, 0.0))
+    return Scene("house", objects, {"grey": GREY}, environment=ImageEnvironment(constant_picture(folder, 100.0)),
+                 cameras=(camera,))  # fmt: skip
+
+
+def looked_up(store, point: np.ndarray, name: str) -> float:
+    """Irradiance as the renderer reads it: bilinear at the light map's coordinates of the nearest triangle's point."""
+    from scipy.ndimage import map_coordinates
+
+    image = store.read("light_map/irradiance").astype(float).mean(axis=2)
+    record = next(o for o in store.documents["scene"]["objects"] if o["name"] == name)
+    faces = store.read("geometry/faces")[record["first_face"] :][: record["face_count"]]
+    p, uv2 = store.read("geometry/positions")[faces].astype(float), store.read("geometry/uv2")[faces].astype(float)
+    for corners, places in zip(p, uv2, strict=True):
+        edges = (corners[1:] - corners[0]).T
+        weights, *_ = np.linalg.lstsq(edges, point - corners[0], rcond=None)
+        if weights.min() >= -1e-6 and weights.sum() <= 1 + 1e-6:
+            at = places[0] + weights @ (places[1:] - places[0])
+            row, column = at[1] * image.shape[0] - 0.5, at[0] * image.shape[1] - 0.5
+            return float(map_coordinates(image, [[row], [column]], order=1, mode="nearest")[0])
+    raise AssertionError(f"{point} is not on {name}")
+
+
+def test_light_from_above_the_ceiling_does_not_leak_down_the_wall(tmp_path: Path) -> None:
+    store = bake(house(tmp_path), tmp_path / "s", quality=replace(TINY, light_map_texels=64))
+    inner = [np.array([x, SIDE - 1e-3, 0.0]) for x in np.linspace(0.1, 1.9, 13)]
+    assert np.allclose([looked_up(store, p, "back") for p in inner], np.pi, rtol=0.1)
+    corner = [np.array([x, 0.0, 1e-3]) for x in np.linspace(0.1, 1.9, 13)]
+    assert np.allclose([looked_up(store, p, "floor") for p in corner], np.pi, rtol=0.1)
+    outer = looked_up(store, np.array([1.0, SIDE + OVER - 1e-3, 0.0]), "back")
+    assert outer > 30, "what no viewer sees keeps its own light"
+
+
+def test_only_what_cameras_reach_is_seen(tmp_path: Path) -> None:
+    scene = house(tmp_path)
+    traced = SceneBuilder(scene).build()
+    places = viewing_places(scene, traced)
+    assert len(places) > 100 and (places > 0).all() and (places < SIDE).all()
+    points = np.array([[1, 1, 0], [1, SIDE + 0.1, 0], [1, 0, 1], [1, 1, 0]], float)
+    normals = np.array([[0, 0, 1], [0, 0, 1], [0, 1, 0], [0, 0, -1]], float)
+    assert seen(traced, places, points, normals).tolist() == [True, False, True, False]
+    assert not seen(traced, places[:0], points, normals).any()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def variant() -> None:
+    from lambent.bake.engine import engine
+
+    engine()
+    assert mi.variant()
+
+
+def test_hidden_points_and_texels_by_hand() -> None:
+    """A row of five texels of one chart: seen, half seen, and three hidden; then another chart."""
+    index = np.arange(6)
+    vectors = np.zeros((6, POINTS, 3), np.float32)
+    texels = Texels(6, 1, index, np.zeros((6, POINTS), int), vectors, vectors, vectors, np.ones(6))
+    in_view = np.zeros((6, POINTS), bool)
+    in_view[0], in_view[1, :2] = True, True
+    labels = np.array([[3, 3, 3, 3, 3, 4]])
+    valid, parted = without_hidden(texels, np.ones((6, POINTS), bool), in_view, labels)
+    assert valid.sum(axis=1).tolist() == [4, 2, 0, 4, 4, 4]
+    assert parted.tolist() == [[3, 3, 3, 3 + BEYOND, 3 + BEYOND, 4 + BEYOND]]
+    everything, same = without_hidden(texels, np.ones((6, POINTS), bool), ~np.zeros((6, POINTS), bool), labels)
+    assert everything.all() and (same == labels).all()
