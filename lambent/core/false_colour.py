@@ -20,7 +20,6 @@ from lambent.core.errors import UserError
 Floats = NDArray[np.floating[Any]]
 
 LM_PER_W = 179.0
-LUMINANCE_UNIT, ILLUMINANCE_UNIT = "cd/m2", "lx"
 # Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
 STOPS = np.array(
     [
@@ -29,13 +28,25 @@ STOPS = np.array(
     ]
 )  # fmt: skip
 BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-LEAST, MOST = 1e-4, 1e9  # cd/m^2 that a range can name
+LEAST, MOST = 1e-4, 1e9  # numbers that a range can name
 DECADES = 3.0  # of a logarithmic range that is chosen by the picture
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """What a picture's numbers are to people: its unit, and how many of it one of Y of linear Rec.709 is."""
+
+    unit: str
+    per_y: float
+
+
+LUMINANCE, ILLUMINANCE = Quantity("cd/m2", LM_PER_W), Quantity("lx", LM_PER_W)
+NOISE = Quantity("%", 100.0)  # of a relative standard error
+
+
+@dataclass(frozen=True)
 class Range:
-    """From `low` (dark blue) to `high` (red), in cd/m^2 or lx; below is black, above white."""
+    """From `low` (dark blue) to `high` (red), in a quantity's unit; below is black, above white."""
 
     low: float = 1.0
     high: float = 1000.0
@@ -72,9 +83,9 @@ class Range:
         return inside or [self.low, self.high]
 
 
-def photometric(radiance: Floats) -> Floats:
-    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance."""
-    return np.asarray(LM_PER_W * luminance(radiance))
+def photometric(radiance: Floats, quantity: Quantity = LUMINANCE) -> Floats:
+    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance; or another quantity."""
+    return np.asarray(quantity.per_y * luminance(radiance))
 
 
 def fitting_range(values: Floats, *, log: bool = True) -> Range:
@@ -115,7 +126,7 @@ def number(value: float) -> str:
     )
 
 
-def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE_UNIT) -> NDArray[np.uint8]:
+def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE.unit) -> NDArray[np.uint8]:
     """A copy of an encoded picture (H, W, 3) with the scale and its numbers over its right edge."""
     from PIL import Image, ImageDraw, ImageFont
 

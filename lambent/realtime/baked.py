@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
-from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.store.contract import SIDES, ObjectRecord, SceneRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -46,6 +46,8 @@ class BakedScene:
     missing: tuple[str, ...] = ()
     uv: Array | None = None
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
+    noise: Array | None = None  # (H, W), relative standard error of the light map
+    noise_back: Array | None = None
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -77,6 +79,10 @@ def read_baked(store: Store) -> BakedScene:
             missing.append(f"{name}: {bad} values are negative or not finite and were set to 0")
         return values
 
+    def noise(side: str) -> Array | None:
+        name = noise_name(side)
+        return finite(store.read(name))[0] if name in store else None
+
     masked = {name for name, textures in record.textures.items() if "opacity" in textures.parts}
     two_sided = any(
         contract.is_two_sided(record.materials[o.material], masked=o.material in masked) for o in record.objects
@@ -102,6 +108,8 @@ def read_baked(store: Store) -> BakedScene:
         tuple(missing),
         uv=store.read("geometry/uv"),
         textures=read_textures(store, record),
+        noise=noise(SIDES[0]),
+        noise_back=noise(SIDES[1]),
     )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.false_colour import LM_PER_W, Range
+from lambent.core.false_colour import ILLUMINANCE, LUMINANCE, NOISE, Quantity, Range
 from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import hammersley, radical_inverse
@@ -44,8 +44,13 @@ from lambent.store.store import Store
 
 Floats = NDArray[np.float32]
 LIGHT_MAP = "light-map"  # irradiance, in the place of radiance
-# Weights of diffuse, specular, sky, irradiance.
-SHOW = {"full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0), LIGHT_MAP: (0, 0, 0, 1)}
+LIGHT_MAP_NOISE = "noise"  # its relative standard error before it was denoised
+# Weights of diffuse, specular, sky, what the light map holds.
+SHOW = {
+    "full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0),
+    LIGHT_MAP: (0, 0, 0, 1), LIGHT_MAP_NOISE: (0, 0, 0, 1),
+}  # fmt: skip
+QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # of what is shown; of everything else luminance
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
 SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
 
@@ -69,7 +74,7 @@ class FrameState:
     view_transform : str
         filmic, neutral, linear, or false-colour: luminance in colours of `scale`.
     scale : false_colour.Range
-        What the false colours mean, in cd/m^2, or in lx where the light map is shown.
+        What the false colours mean, in the unit of `quantity_of(show)`.
     near_m : float, optional
         Nearer things are cut away; by default a ten-thousandth of the scene's size.
     materials : mapping
@@ -81,7 +86,8 @@ class FrameState:
     planar : str
         How planar reflectors are drawn: auto, off (by their probes), or a way of `mirror_integrators`.
     show : str
-        full, diffuse, specular, or light-map: the irradiance, W/m^2.
+        full, diffuse, specular, light-map: the irradiance, W/m^2, or noise: its relative standard error, which is
+        always in false colours.
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
     antialias : bool
@@ -118,13 +124,18 @@ class FrameState:
             raise UserError(
                 "unknown view transform", got=self.view_transform, expected=", ".join(reversed(VIEW_TRANSFORMS))
             )
-        if self.view_transform == FALSE_COLOUR:
+        if self.is_false_coloured:
             self.scale.check()
         if self.show not in SHOW:
             raise UserError("unknown part of the light", got=self.show, expected=", ".join(SHOW))
         if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
             size = f"{self.width}x{self.height}"
             raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
+
+    @property
+    def is_false_coloured(self) -> bool:
+        """Whether the display image is in false colours."""
+        return self.view_transform == FALSE_COLOUR or self.show == LIGHT_MAP_NOISE
 
     def samples(self, material: Material, roughness: float = 1.0) -> int:
         """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
@@ -177,7 +188,9 @@ class Renderer:
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
         encoder = self.device.create_command_encoder()
-        calls = self._encode_light(encoder, draws, views, planar_integrator(state.integrator, state.planar), target)
+        calls = self._encode_light(
+            encoder, draws, views, planar_integrator(state.integrator, state.planar), target, state.show
+        )
         radiance = target.radiance
         if state.accumulate is not None:
             stamps = self._timer.writes("accumulate")
@@ -249,7 +262,7 @@ class Renderer:
 
     def _draws(self, state: FrameState) -> list[Draw]:
         """What to draw, with every material's buffers up to date."""
-        wanted = INTEGRATORS[state.integrator]
+        wanted = INTEGRATORS["diffuse" if SHOW[state.show][3] else state.integrator]
         draws, groups = [], {}
         for name, buffers in self.resources.materials.items():
             material = state.materials.get(name, self.scene.record.materials[name])
@@ -287,19 +300,26 @@ class Renderer:
         data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
         data["eye"][3] = np.floor((jitter[0] + 0.5) * TILE) % TILE
         data["show"] = SHOW[state.show]
-        data["scale"] = (state.scale.low, state.scale.high, state.scale.log, LM_PER_W)
+        data["scale"] = (state.scale.low, state.scale.high, state.scale.log, quantity_of(state.show).per_y)
         data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
-        data["view_transform"] = VIEW_TRANSFORMS[state.view_transform]
+        data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
         data["exposure"] = 2.0**state.exposure_ev
         return data
 
     def _encode_light(
-        self, encoder: Any, draws: list[Draw], views: list[MirrorView], planar: Integrator | None, target: Any
+        self,
+        encoder: Any,
+        draws: list[Draw],
+        views: list[MirrorView],
+        planar: Integrator | None,
+        target: Any,
+        show: str,
     ) -> int:
         depth = {"view": target.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
         with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
         first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
         first.set_bind_group(0, self._frame_group)
+        light_group = self.resources.noise_group if show == LIGHT_MAP_NOISE else None
         calls = self._depth.draw(first, self.resources)
         first.end()
         if views and planar:
@@ -311,14 +331,15 @@ class Renderer:
             **self._timer.writes("shade"),
         )
         shade.set_bind_group(0, self._frame_group)
-        calls += self._shade.draw(shade, self.resources, draws, target.radiance.format, self._planar.shown_group)
-        calls += self._sky.draw(shade, self.resources, target.radiance.format)
+        format = target.radiance.format
+        calls += self._shade.draw(shade, self.resources, draws, format, self._planar.shown_group, light_group)
+        calls += self._sky.draw(shade, self.resources, format)
         shade.end()
         return calls
 
     def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
         # Blended false colours would name luminances that are not there.
-        smooth = state.antialias and state.accumulate is None and state.view_transform != FALSE_COLOUR
+        smooth = state.antialias and state.accumulate is None and not state.is_false_coloured
         edged = self._targets.picture("edged", state.width, state.height) if smooth else None
         shown = target_view if edged is None else edged.create_view()
         self._tonemap.encode(encoder, self._frame_group, radiance, shown, self._timer.writes("tonemap"))
@@ -334,6 +355,11 @@ class Renderer:
         size = (state.width, state.height, 1)
         data = self.device.queue.read_texture({"texture": texture}, {"bytes_per_row": row}, size)
         return np.frombuffer(data, dtype).reshape(state.height, state.width, 4)[..., :3]
+
+
+def quantity_of(show: str) -> Quantity:
+    """What the numbers of a picture are that shows this part of the light."""
+    return QUANTITIES.get(show, LUMINANCE)
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -226,6 +227,7 @@ class SceneResources:
         self._light_maps = [flat_texture(device, scene.irradiance), flat_texture(device, scene.irradiance_back)]
         self.light_map_views = [texture.create_view() for texture in self._light_maps]
         self.light_group = layouts.group(layouts.light, *self.light_map_views)
+        self._device, self._layouts = device, layouts
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
         self._environment = cube_texture(device, [environment])
         self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
@@ -246,6 +248,14 @@ class SceneResources:
         records = scene.record.objects
         self.cut_out = [record for record in records if self.materials[record.material].pictures.masked]
         self.whole_ranges = _ranges([record for record in records if record not in self.cut_out])
+
+    @cached_property
+    def noise_group(self) -> Any:
+        """In the place of `light_group`: how exact the light map is."""
+        both = (self.scene.noise, self.scene.noise_back)
+        grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
+        textures = [flat_texture(self._device, values) for values in grey]
+        return self._layouts.group(self._layouts.light, *(texture.create_view() for texture in textures))
 
 
 def _ranges(records: list[ObjectRecord]) -> list[tuple[int, int]]:

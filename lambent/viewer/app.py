@@ -74,6 +74,7 @@ def run(
     if fault is not None:
         state.missing = (*state.missing, fault)  # stays in sight: a message is gone before the window is there
     state.comparison, state.film, state.notes = Comparison(), FilmOptions(), light_map_notes(store)
+    state.light_map_noise = scene.noise is not None
     geometry = Geometry(scene.positions, scene.faces, scene.record.objects)
     pictures = Pictures(Renderer(open_device(device_needs(scene)), scene))
     window = Window(state, geometry, pictures, size=size, frames=frames)

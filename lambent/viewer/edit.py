@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material, load_material
 from lambent.realtime.device import open_device
+from lambent.realtime.frame import LIGHT_MAP_NOISE
 from lambent.scenes.geometry import sphere
 from lambent.viewer.app import Window, check_display
 from lambent.viewer.editor.documents import kind_of
@@ -71,7 +73,8 @@ def editor_state(
 ) -> ViewerState:
     """The state that the window of `run` starts with."""
     measurement, start, other, home = _materials(file, material)
-    state = ViewerState.of(preview_record(start), CHOICES, "orbit", folder=folder)
+    choices = replace(CHOICES, shows=tuple(show for show in CHOICES.shows if show != LIGHT_MAP_NOISE))
+    state = ViewerState.of(preview_record(start), choices, "orbit", folder=folder)
     state.preview = _preview(file, environments)
     state.select(OBJECT)
     editor = Editor(state.edits, start.name, folder, state.say)

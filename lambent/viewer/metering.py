@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.false_colour import LM_PER_W, Range, fitting_range, photometric
+from lambent.core.false_colour import LM_PER_W, LUMINANCE, Quantity, Range, fitting_range, photometric
 
 Floats = NDArray[np.floating[Any]]
 KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
@@ -20,7 +20,7 @@ LIMIT_EV = 12.0
 
 @dataclass(frozen=True)
 class Reading:
-    """Of one picture, in cd/m^2 (lx where it shows the light map). `counts` (B,) lie between `edges` (B + 1,)."""
+    """Of one picture, in the unit of what it shows. `counts` (B,) lie between `edges` (B + 1,)."""
 
     mean: float
     log_mean: float
@@ -36,10 +36,10 @@ class Reading:
         return min(max(math.log2(KEY * LM_PER_W / self.log_mean), -LIMIT_EV), LIMIT_EV)
 
 
-def read(radiance: Floats) -> Reading | None:
-    """Reading of a picture (H, W, 3) of radiance; None where all of it is black."""
+def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
+    """Reading of a picture (H, W, 3) of radiance, or of another quantity; None where all of it is black."""
     every = max(1, math.isqrt(radiance.shape[0] * radiance.shape[1] // PIXELS))
-    values = photometric(np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64)).ravel()
+    values = photometric(np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64), quantity).ravel()
     values = values[np.isfinite(values)]
     lit = values[values > 0]
     if not lit.size:

@@ -13,18 +13,19 @@ import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode
-from lambent.core.false_colour import ILLUMINANCE_UNIT, LUMINANCE_UNIT, Range, with_scale
+from lambent.core.false_colour import Range, with_scale
 from lambent.core.images import write_image
 from lambent.materials.document import Material
 from lambent.realtime.device import adapter_info
-from lambent.realtime.frame import LIGHT_MAP, QMC_N, SHOW, FrameState, Renderer
+from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer, quantity_of
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.mirror_integrators import CHOICES as PLANAR_WAYS
-from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, FALSE_COLOUR, VIEW_TRANSFORMS
+from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
 from lambent.viewer.input import Rect
 from lambent.viewer.pacing import Pacer, Plan
+from lambent.viewer.quantity import is_false_coloured, shown_scale
 from lambent.viewer.state import Choices, Statistics, ViewerState
 
 CHOICES = Choices(
@@ -173,14 +174,13 @@ class Picture:
 
 def scaled(display: NDArray[np.uint8], frame: FrameState) -> NDArray[np.uint8]:
     """A picture of the frame as it is kept: false colours with the scale that says what they mean."""
-    if frame.view_transform != FALSE_COLOUR:
+    if not frame.is_false_coloured:
         return display
-    return with_scale(display, frame.scale, ILLUMINANCE_UNIT if frame.show == LIGHT_MAP else LUMINANCE_UNIT)
+    return with_scale(display, frame.scale, quantity_of(frame.show).unit)
 
 
 def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
     """The frame that shows the state at full size."""
-    false = state.view_transform == FALSE_COLOUR
     return FrameState(
         state.camera.model_copy(update={"name": ""}),  # another name is no other picture
         width,
@@ -193,7 +193,7 @@ def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
         lookup=state.lookup,
         planar=state.planar,
         show=state.show,
-        scale=state.scale if false else Range(),
+        scale=shown_scale(state) if is_false_coloured(state) else Range(),
         near_m=state.near_m,
     )
 

@@ -19,6 +19,7 @@ from lambent.viewer.input import Rect
 from lambent.viewer.markers import Markers, outline
 from lambent.viewer.metering import read
 from lambent.viewer.picture import Picture, frame_state
+from lambent.viewer.quantity import is_false_coloured, set_shown_scale, shown_quantity, shown_scale, shows_noise
 from lambent.viewer.readback import read_picture, read_pixel
 from lambent.viewer.state import ViewerState
 
@@ -151,13 +152,13 @@ class Pictures:
         if a.radiance is None:
             return
         stale = a.version != self._read_version and now_s - self._read_s >= METER_S
-        asked = meter.expose_wanted or (meter.fit_wanted and state.view_transform == FALSE_COLOUR)
+        asked = meter.expose_wanted or (meter.fit_wanted and is_false_coloured(state))
         if (meter.wanted and stale) or asked:
-            meter.reading = read(read_picture(self.device, a.radiance))
+            meter.reading = read(read_picture(self.device, a.radiance), shown_quantity(state))
             self._read_version, self._read_s = a.version, now_s
             self._apply(state)
         meter.under_cursor = None
-        if meter.cursor is not None and (meter.readout_on or state.view_transform == FALSE_COLOUR):
+        if meter.cursor is not None and (meter.readout_on or is_false_coloured(state)):
             x, y = meter.cursor
             beyond = self._comparing and state.comparison is not None and state.comparison.mode == "side by side"
             picture = b if beyond and b is not None and state.comparison and x > state.comparison.split else a
@@ -167,12 +168,14 @@ class Pictures:
     def _apply(self, state: ViewerState) -> None:
         """Set what was to follow from a reading."""
         meter = state.meter
-        if meter.expose_wanted and meter.reading is not None:
+        if meter.expose_wanted and shows_noise(state):
+            state.say("nothing to meter: the picture shows noise, not light")
+        elif meter.expose_wanted and meter.reading is not None:
             state.exposure_ev = meter.reading.exposure_ev
-        if meter.expose_wanted and meter.reading is None:
+        elif meter.expose_wanted:
             state.say("nothing to meter: the picture is black")
-        if meter.fit_wanted and state.view_transform == FALSE_COLOUR and meter.reading is not None:
-            state.scale = meter.reading.ranges[0 if state.scale.log else 1]
+        if meter.fit_wanted and is_false_coloured(state) and meter.reading is not None:
+            set_shown_scale(state, meter.reading.ranges[0 if shown_scale(state).log else 1])
             meter.fit_wanted = False
         meter.expose_wanted = False
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Mode = Literal["orbit", "walk"]
 MESSAGE_S = 6.0
 TARGET_MS = 1e3 / 15
+NOISE_SCALE = Range(0.5, 50.0)  # percent
 UNDO_LIMIT = 200
 
 
@@ -187,6 +188,8 @@ class ViewerState:
     adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
     target_ms: float = TARGET_MS  # that a frame in motion should take
     scale: Range = field(default_factory=Range)  # of false colour
+    noise_scale: Range = field(default_factory=lambda: NOISE_SCALE)  # of the noise of the light map
+    light_map_noise: bool = False  # whether the store says how exact its light map is
     near_m: float | None = None  # nearer things are cut away; None: by the scene's size
     walker: Walker = field(default_factory=lambda: Walker(cameras.WALK_M_S, cameras.EYE_HEIGHT_M))
     views: SavedViews | None = None

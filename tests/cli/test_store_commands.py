@@ -66,6 +66,18 @@ def test_false_colour_names_the_luminance(lambent, store, tmp_path):
     assert lambent(*common, "--linear").code == 0, "the range is found"
 
 
+def test_noise_of_the_light_map(lambent, refused, store, tmp_path):
+    from lambent.store.store import Store
+
+    file = tmp_path / "a.png"
+    common = ("render", store, "-o", file, "--size", "192x128", "--show", "noise")
+    assert "lambent bake" in refused(*common), "the store does not say"
+    assert not file.exists()
+    Store.open(store).put("light_map/noise", "light_map", np.full((4, 4), 0.2, np.float16), key="by hand")
+    assert lambent(*common, "--range", "1:100").code == 0
+    np.testing.assert_allclose(read_encoded(file)[-8, 20], false_colour(np.array(20.0), Range(1, 100)), atol=0.01)
+
+
 def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
     from lambent.store.views import change_views
     from tests.viewer.small_store import SIDE
@@ -96,6 +108,9 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
         (("-o", "a.mp4", "--camera", "side"), "a film needs a path"),
         (("-o", "a.mp4", "--path", "tuor"), "did you mean 'tour'?"),
         (("-o", "a.png", "--integrator", "ring"), "did you mean 'rings'?"),
+        (("-o", "a.png", "--planar", "marchd"), "did you mean 'marched'?"),
+        (("-o", "a.png", "--planar", "thesis"), "rings does not draw reflectors so"),
+        (("-o", "a.png", "--integrator", "path", "--planar", "off"), "the path tracer traces reflectors"),
         (("-o", "a.png", "--samples", "0"), "--samples"),
         (("-o", "a.png", "--integrator", "path"), "name it with --scene"),
     ],

@@ -1,5 +1,7 @@
 """What the walk window draws besides the picture, on a real adapter, without a window."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,30 @@ def test_the_light_map_shows_irradiance(renderer):
     irradiance = renderer.image(FrameState(FRONT, 96, 64, show="light-map"))
     np.testing.assert_allclose(irradiance[-1], 2.0, rtol=1e-3)
     assert irradiance[0].max() == 0, "the sky has none"
+
+
+def test_the_noise_of_the_light_map_is_shown_in_percent(renderer):
+    noisy = Renderer(renderer.device, replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32)))
+    frame = FrameState(FRONT, 96, 64, show="noise", scale=Range(1, 100))
+    np.testing.assert_allclose(noisy.image(frame)[-1], 0.125, rtol=1e-3)
+    expected = false_colour(np.array(12.5), frame.scale)
+    shown = noisy.display_image(frame) / 255
+    np.testing.assert_allclose(shown[-1], np.tile(expected, (96, 1)), atol=0.01)
+    assert shown[0].max() == 0, "the sky has none"
+    assert renderer.image(frame).max() == 0, "a store without it shows black"
+
+
+def test_noise_has_a_range_of_its_own(renderer, state):
+    pictures = Pictures(Renderer(renderer.device, replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32))))
+    state.show, state.meter.wanted, state.meter.fit_wanted = "noise", True, False
+    drawn(pictures, state)
+    before = state.scale
+    assert state.meter.reading.log_mean == pytest.approx(12.5, rel=1e-3), "black is left out"
+    state.meter.fit_wanted = state.meter.expose_wanted = True
+    exposure_ev = state.exposure_ev
+    drawn(pictures, state)
+    assert state.noise_scale == state.meter.reading.ranges[0] and state.scale == before
+    assert state.exposure_ev == exposure_ev, "noise sets no exposure"
 
 
 def test_near_things_are_cut_away(renderer):

@@ -69,9 +69,18 @@ class ShadePass:
         self._pipelines: dict[tuple[Any, ...], Any] = {}
 
     def draw(
-        self, target: Any, resources: SceneResources, draws: list[Draw], format: str, planar_group: Any = None
+        self,
+        target: Any,
+        resources: SceneResources,
+        draws: list[Draw],
+        format: str,
+        planar_group: Any = None,
+        light_group: Any = None,
     ) -> int:
-        """Encode into the render pass `target`, whose group 0 is set; returns the draw calls."""
+        """Encode into the render pass `target`, whose group 0 is set; returns the draw calls.
+
+        `light_group` stands in for that of the light maps.
+        """
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
         for draw in draws:
@@ -79,7 +88,7 @@ class ShadePass:
             target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
             target.set_bind_group(2, draw.item.group(draw.integrator.prefiltered))
-            target.set_bind_group(3, planar_group if draw.planar else resources.light_group)
+            target.set_bind_group(3, planar_group if draw.planar else light_group or resources.light_group)
             target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
         return len(draws)
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.false_colour import ILLUMINANCE_UNIT, LEAST, LUMINANCE_UNIT, MOST, Range, number
-from lambent.realtime.frame import LIGHT_MAP
+from lambent.core.false_colour import LEAST, MOST, Range, number
 from lambent.viewer.panels.widgets import explain, rows
+from lambent.viewer.quantity import set_shown_scale, shown_quantity, shown_scale, shows_noise
 from lambent.viewer.state import ViewerState
 
 TITLE = "Light meter"
@@ -28,7 +28,7 @@ def draw(state: ViewerState) -> None:
             ("mean", f"{number(reading.mean)} {unit}"),
             ("log-average", f"{number(reading.log_mean)} {unit}"),
             ("darkest, brightest", f"{number(reading.low)}, {number(reading.high)} {unit}"),
-            ("log-average is grey at", f"{reading.exposure_ev:+.2f} EV"),
+            *([] if shows_noise(state) else [("log-average is grey at", f"{reading.exposure_ev:+.2f} EV")]),
         ],
         "meter",
     )
@@ -44,14 +44,14 @@ def draw(state: ViewerState) -> None:
 
 def draw_range(state: ViewerState, metered: bool) -> None:
     """The ends of the scale, its steps, and the button that fits it to the picture."""
-    scale, unit = state.scale, unit_of(state)
+    scale, unit = shown_scale(state), unit_of(state)
     imgui.set_next_item_width(-imgui.calc_text_size("range").x - 90)
     changed, ends = imgui.input_float2(f"range, {unit}##range", [scale.low, scale.high], "%.4g")
-    explain("luminance of the lowest and of the highest colour; what is below is black, above white")
+    explain("numbers of the lowest and of the highest colour; what is below is black, above white")
     if changed:
         _take(state, replace(scale, low=float(ends[0]), high=float(ends[1])))
     changed, log = imgui.checkbox("decades", scale.log)
-    explain("even steps of the logarithm, or of the luminance itself")
+    explain("even steps of the logarithm, or of the number itself")
     if changed:
         _take(state, Range(scale.low if scale.low >= LEAST else scale.high / 1e3, scale.high, log))
     if metered:
@@ -62,13 +62,13 @@ def draw_range(state: ViewerState, metered: bool) -> None:
 
 def unit_of(state: ViewerState) -> str:
     """Of what the picture shows."""
-    return ILLUMINANCE_UNIT if state.show == LIGHT_MAP else LUMINANCE_UNIT
+    return shown_quantity(state).unit
 
 
 def _take(state: ViewerState, scale: Range) -> None:
     """Use a range where it is one."""
     least = LEAST if scale.log else 0.0
     if least <= scale.low < scale.high <= MOST:
-        state.scale = scale
+        set_shown_scale(state, scale)
     else:
         state.say(f"not a range: {scale.low:g} to {scale.high:g}; the first number is to be the smaller one")

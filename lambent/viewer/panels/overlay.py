@@ -6,10 +6,10 @@ import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.false_colour import STOPS, number, photometric
-from lambent.realtime.passes.tonemap import FALSE_COLOUR
 from lambent.viewer.comparison import error_scale
 from lambent.viewer.input import Rect
 from lambent.viewer.panels.metering import unit_of
+from lambent.viewer.quantity import is_false_coloured, shown_quantity, shown_scale
 from lambent.viewer.state import ViewerState
 
 MARGIN_PX = 12
@@ -52,8 +52,8 @@ def _scale_bar(state: ViewerState, picture: Rect) -> None:
     comparison = state.comparison
     if comparison is not None and comparison.mode == "error map" and comparison.figures is not None:
         marks, stops, unit = error_scale(comparison.kind)
-    elif state.view_transform == FALSE_COLOUR:
-        scale, unit, stops = state.scale, unit_of(state), STOPS
+    elif is_false_coloured(state):
+        scale, unit, stops = shown_scale(state), unit_of(state), STOPS
         marks = [(float(scale.share(np.array(value))), number(value)) for value in scale.marks()]
     else:
         return
@@ -89,7 +89,7 @@ def _readout(state: ViewerState, picture: Rect) -> None:
     if meter.under_cursor is None or meter.cursor is None:
         return
     light = np.array(meter.under_cursor)
-    text = f"{number(float(photometric(light)))} {unit_of(state)}"
+    text = f"{number(float(photometric(light, shown_quantity(state))))} {unit_of(state)}"
     detail = "RGB " + " ".join(f"{value:.3g}" for value in meter.under_cursor)
     behind = imgui.get_background_draw_list()
     line = imgui.get_text_line_height()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from lambent.realtime.passes.tonemap import FALSE_COLOUR
+from lambent.store.contract import SIDES, noise_name
 from lambent.viewer.panels import metering
 from lambent.viewer.panels.widgets import choice, explain, slider
+from lambent.viewer.quantity import is_false_coloured, shows_noise
 from lambent.viewer.state import TARGET_MS, ViewerState
 
 TITLE = "View"
@@ -15,6 +16,8 @@ FOV_DEG = (10.0, 120.0)
 SPEED_M_S, EYE_M = (0.1, 10.0), (0.1, 3.0)
 NEAR_M = (0.001, 5.0)
 FRAME_MS = (8.0, 250.0)
+AMBER = (1.0, 0.75, 0.35, 1.0)
+NO_NOISE = "the store lacks it; `lambent bake` of the same scene adds it from the samples that it keeps"
 
 
 def draw(state: ViewerState) -> None:
@@ -29,9 +32,14 @@ def draw(state: ViewerState) -> None:
             state.screenshot_wanted = True
         explain("PNG as shown, EXR as linear radiance (P)")
     state.view_transform = choice("transform", state.view_transform, state.choices.view_transforms)
-    if state.view_transform == FALSE_COLOUR:
-        metering.draw_range(state, metered)
     state.show = choice("show", state.show, state.choices.shows)
+    explain("all light, a part of it, the light map's irradiance, or its noise before denoising (standard error, %)")
+    if shows_noise(state) and not state.light_map_noise:
+        imgui.push_style_color(imgui.Col_.text, AMBER)
+        imgui.text_wrapped(f"{noise_name(SIDES[0])}: {NO_NOISE}")
+        imgui.pop_style_color()
+    if is_false_coloured(state):
+        metering.draw_range(state, metered)
     if state.preview is None:
         _camera(state)
     if metered:
