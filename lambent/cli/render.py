@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PATH_TRACER = "path"
 DEFAULT_SPP = {PATH_TRACER: 64, "qmc": 256}
-FALSE_COLOUR, NOISE = "false-colour", "noise"
+FALSE_COLOUR = "false-colour"
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 FILM_SUPERSAMPLES = 4  # of the radiance in a picture sequence
 Picture = Callable[["CameraRecord", "Progress"], Any]
@@ -53,11 +53,15 @@ def command(
     ] = None,
     linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
     part: Annotated[
+        str, typer.Option("--show", help="full, diffuse, specular, or light-map: irradiance, in lx.")
+    ] = "full",
+    planar: Annotated[
         str,
         typer.Option(
-            "--show", help="full, diffuse, specular, light-map: irradiance, in lx, or noise: its standard error, %."
+            help="How flat mirrors and floors are drawn: auto, off (from their probes), or as the integrator knows: "
+            "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
-    ] = "full",
+    ] = "auto",
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     json: Json = False,
@@ -73,8 +77,7 @@ def command(
     from lambent.store.views import read_views, with_views
 
     check_writable(output, (*WRITABLE, FILM))
-    false = view == FALSE_COLOUR or part == NOISE
-    scale = parse_range(false_range, log=not linear) if false or false_range else None
+    scale = parse_range(false_range, log=not linear) if view == FALSE_COLOUR or false_range else None
     if view not in VIEWS:
         hint = did_you_mean(view, VIEWS)
         raise UserError("unknown view transform", field="--view", got=view, expected=", ".join(VIEWS), hint=hint)
@@ -92,7 +95,7 @@ def command(
         width, height = even_size(width, height)
     began = time.perf_counter()
     views = _views(record, camera, path, fps if film or row else None)
-    how = Look(exposure_ev, view, scale, part)
+    how = Look(exposure_ev, view, scale, part, planar)
     radiance, shown = pictures(opened, width, height, integrator, samples, how, scene, film=film or row)
     with progress_bar() as progress:
         if film or row:
@@ -131,17 +134,17 @@ def pictures(
     if integrator == PATH_TRACER:
         if look.part != "full":
             raise UserError("the path tracer shows all light", field="--show", got=look.part, expected="full")
+        if look.planar != "auto":
+            raise UserError("the path tracer traces reflectors", field="--planar", got=look.planar, expected="auto")
         radiance = _path_traced(store, width, height, samples or DEFAULT_SPP[PATH_TRACER], scene)
     else:
         from lambent.realtime.device import open_device
         from lambent.realtime.frame import FrameState, Renderer
         from lambent.realtime.integrators import integrator as named
-        from lambent.store.contract import SIDES, noise_name
+        from lambent.realtime.mirror_integrators import check_planar
 
-        if look.part == NOISE and noise_name(SIDES[0]) not in store:
-            hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
-            raise UserError("the store does not say how exact its light map is", field="--show", got=NOISE, hint=hint)
         named(integrator)  # an unknown one is said before the device is opened
+        check_planar(integrator, look.planar)
         renderer = Renderer(open_device(), store)
         for text in renderer.missing:
             say(f"note: {text}")
@@ -151,6 +154,7 @@ def pictures(
             return FrameState(
                 camera, width, height, integrator=integrator, n=n, exposure_ev=look.exposure_ev,
                 view_transform="filmic" if look.view == FALSE_COLOUR else look.view, show=look.part,
+                planar=look.planar,
             )  # fmt: skip
 
         def radiance(camera: CameraRecord, progress: Progress) -> Any:
@@ -158,7 +162,7 @@ def pictures(
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
             return renderer.still_radiance(state(camera), *((FILM_SUPERSAMPLES,) if film else ()))
 
-        if integrator != "qmc" and look.plain:
+        if integrator != "qmc" and look.view != FALSE_COLOUR:
             show_frame = renderer.display_image if film else renderer.still
             return radiance, lambda camera, progress: show_frame(state(camera))
 
@@ -188,16 +192,14 @@ class Look:
     view: str = "filmic"
     scale: Range | None = None
     part: str = "full"
-
-    @property
-    def plain(self) -> bool:
-        """Whether colours are those of light, not false ones."""
-        return self.view != FALSE_COLOUR and self.part != NOISE
+    planar: str = "auto"
 
     def shown(self, radiance: Any) -> Any:
         """uint8 (H, W, 3), encoded."""
         from lambent.core.colour import shown
         from lambent.core.false_colour import (
+            ILLUMINANCE_UNIT,
+            LUMINANCE_UNIT,
             Range,
             false_colour,
             fitting_range,
@@ -206,16 +208,14 @@ class Look:
         )
         from lambent.core.images import to_bytes
 
-        if self.plain:
+        if self.view != FALSE_COLOUR:
             return to_bytes(shown(radiance, self.view, self.exposure_ev))
-        from lambent.realtime.frame import quantity_of
-
-        quantity = quantity_of(self.part)
-        values = photometric(radiance, quantity)
+        values = photometric(radiance)
         scale = self.scale or Range(0.0, 0.0)
         if scale.low == scale.high:
             scale = self.scale = fitting_range(values, log=scale.log)
-        return with_scale(to_bytes(false_colour(values, scale)), scale, quantity.unit)
+        unit = ILLUMINANCE_UNIT if self.part == "light-map" else LUMINANCE_UNIT
+        return with_scale(to_bytes(false_colour(values, scale)), scale, unit)
 
 
 def _path_traced(store: Store, width: int, height: int, spp: int, place: str | None) -> Picture:

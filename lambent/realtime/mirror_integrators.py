@@ -85,6 +85,15 @@ def planar_integrator(integrator: str, way: str) -> Integrator | None:
     return ways.get(way, next(iter(ways.values())))
 
 
+def check_planar(integrator: str, way: str) -> None:
+    """Raise `UserError` where an integrator does not know a way: a frame would draw with its first."""
+    planar_integrator(integrator, way)
+    known = (AUTO, OFF, *PLANAR.get(integrator, {}))
+    if way not in known:
+        expected = ", ".join(known)
+        raise UserError(f"{integrator} does not draw reflectors so", field="--planar", got=way, expected=expected)
+
+
 def is_interleaved(how: Integrator) -> bool:
     """Whether neighbouring pixels sample lobes in turns, so that the picture is cleaned afterwards."""
     return how.table is interleaved_table
