@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PATH_TRACER = "path"
 DEFAULT_SPP = {PATH_TRACER: 64, "qmc": 256}
-FALSE_COLOUR = "false-colour"
+FALSE_COLOUR, NOISE = "false-colour", "noise"
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 FILM_SUPERSAMPLES = 4  # of the radiance in a picture sequence
 Picture = Callable[["CameraRecord", "Progress"], Any]
@@ -53,7 +53,10 @@ def command(
     ] = None,
     linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
     part: Annotated[
-        str, typer.Option("--show", help="full, diffuse, specular, or light-map: irradiance, in lx.")
+        str,
+        typer.Option(
+            "--show", help="full, diffuse, specular, light-map: irradiance, in lx, or noise: its standard error, %."
+        ),
     ] = "full",
     planar: Annotated[
         str,
@@ -77,7 +80,8 @@ def command(
     from lambent.store.views import read_views, with_views
 
     check_writable(output, (*WRITABLE, FILM))
-    scale = parse_range(false_range, log=not linear) if view == FALSE_COLOUR or false_range else None
+    false = view == FALSE_COLOUR or part == NOISE
+    scale = parse_range(false_range, log=not linear) if false or false_range else None
     if view not in VIEWS:
         hint = did_you_mean(view, VIEWS)
         raise UserError("unknown view transform", field="--view", got=view, expected=", ".join(VIEWS), hint=hint)
@@ -142,7 +146,11 @@ def pictures(
         from lambent.realtime.frame import FrameState, Renderer
         from lambent.realtime.integrators import integrator as named
         from lambent.realtime.mirror_integrators import check_planar
+        from lambent.store.contract import SIDES, noise_name
 
+        if look.part == NOISE and noise_name(SIDES[0]) not in store:
+            hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
+            raise UserError("the store does not say how exact its light map is", field="--show", got=NOISE, hint=hint)
         named(integrator)  # an unknown one is said before the device is opened
         check_planar(integrator, look.planar)
         renderer = Renderer(open_device(), store)
@@ -162,7 +170,7 @@ def pictures(
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
             return renderer.still_radiance(state(camera), *((FILM_SUPERSAMPLES,) if film else ()))
 
-        if integrator != "qmc" and look.view != FALSE_COLOUR:
+        if integrator != "qmc" and look.plain:
             show_frame = renderer.display_image if film else renderer.still
             return radiance, lambda camera, progress: show_frame(state(camera))
 
@@ -194,12 +202,15 @@ class Look:
     part: str = "full"
     planar: str = "auto"
 
+    @property
+    def plain(self) -> bool:
+        """Whether colours are those of light, not false ones."""
+        return self.view != FALSE_COLOUR and self.part != NOISE
+
     def shown(self, radiance: Any) -> Any:
         """uint8 (H, W, 3), encoded."""
         from lambent.core.colour import shown
         from lambent.core.false_colour import (
-            ILLUMINANCE_UNIT,
-            LUMINANCE_UNIT,
             Range,
             false_colour,
             fitting_range,
@@ -208,14 +219,16 @@ class Look:
         )
         from lambent.core.images import to_bytes
 
-        if self.view != FALSE_COLOUR:
+        if self.plain:
             return to_bytes(shown(radiance, self.view, self.exposure_ev))
-        values = photometric(radiance)
+        from lambent.realtime.frame import quantity_of
+
+        quantity = quantity_of(self.part)
+        values = photometric(radiance, quantity)
         scale = self.scale or Range(0.0, 0.0)
         if scale.low == scale.high:
             scale = self.scale = fitting_range(values, log=scale.log)
-        unit = ILLUMINANCE_UNIT if self.part == "light-map" else LUMINANCE_UNIT
-        return with_scale(to_bytes(false_colour(values, scale)), scale, unit)
+        return with_scale(to_bytes(false_colour(values, scale)), scale, quantity.unit)
 
 
 def _path_traced(store: Store, width: int, height: int, spp: int, place: str | None) -> Picture:
