@@ -19,7 +19,7 @@ REVISION = {
     "light_map": 2,
     "irradiance": 1,
     "environment": 1,
-    "probe": 3,
+    "probe": 4,
 }  # raised when a bake's result changes
 
 

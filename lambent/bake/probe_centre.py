@@ -28,12 +28,13 @@ MOVES = 4
 ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides
 
 
-def probe_centre(builder: SceneBuilder, name: str, without: Any) -> Array:
-    """(3,) float64 world position; `without` is the Mitsuba scene without the object."""
+def probe_centre(builder: SceneBuilder, name: str, without: Any, solids: SolidTest | None = None) -> Array:
+    """(3,) float64 world position; `without` is the Mitsuba scene without the object, `solids` its own if given."""
     scene = builder.scene
     if name in scene.probe_centres:
         return np.asarray(scene.probe_centres[name], float)
-    return centre_of(scene.object(name).mesh, np.mean(scene.bounds, axis=0), SolidTest(builder, without), without)
+    solids = solids or SolidTest(builder, without)
+    return centre_of(scene.object(name).mesh, np.mean(scene.bounds, axis=0), solids, without)
 
 
 def centre_of(mesh: Mesh, middle: Array, solids: SolidTest, without: Any) -> Array:

@@ -96,11 +96,14 @@ def parallax_deg(seen: Seen, centre: Array, planes: Array) -> float:
 def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, str]:
     """Which objects are to be cut: by name, the digit of each face's part. Deterministic."""
     curved = [o for o in scene.objects if _may_be_cut(scene, o)]
-    builder = SceneBuilder(scene) if curved else None
+    if not curved:
+        return {}
+    builder = SceneBuilder(scene)
+    solids = SolidTest(builder, None)
     cuts = {}
     for i, o in enumerate(curved):
         progress(i, len(curved), "what probes see")
-        pieces = _pieces_of(builder, o)
+        pieces = _pieces_of(builder, o, solids)
         if len(pieces) > 1:
             part = np.zeros(len(o.mesh.faces), int)
             for number, faces in enumerate(pieces):
@@ -147,10 +150,10 @@ def _may_be_cut(scene: Scene, o: SceneObject) -> bool:
     return wants_one and len(o.mesh.faces) >= FACES and flat_axis(o.mesh) is None
 
 
-def _pieces_of(builder: Any, o: SceneObject) -> list[Faces]:
+def _pieces_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest) -> list[Faces]:
     """Faces of the object's parts; one where it stays whole."""
     without = builder.build(leave_out={o.name})
-    solids, middle = SolidTest(builder, without), np.mean(builder.scene.bounds, axis=0)
+    solids, middle = anywhere.within(without), np.mean(builder.scene.bounds, axis=0)
 
     def share(faces: Faces) -> float:
         part = _sub_mesh(o.mesh, faces)

@@ -17,6 +17,7 @@ from lambent.bake.probe import MIRROR_DEPTH, LightMapCache, Surroundings, bake_p
 from lambent.bake.probe_centre import encloses, probe_centre
 from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from
 from lambent.bake.quality import Quality
+from lambent.bake.solids import SolidTest
 
 Array = NDArray[np.floating]
 
@@ -34,6 +35,10 @@ class ProbeSet:
         self._cache = None if traced else LightMapCache(self._builder, irradiance, irradiance_back)
 
     @cached_property
+    def _solids(self) -> SolidTest:
+        return SolidTest(self._builder, self._whole)
+
+    @cached_property
     def _whole(self) -> Any:
         return self._builder.build()
 
@@ -46,7 +51,7 @@ class ProbeSet:
         Planes that the scene gives are taken as they are; others are found from what the probe sees.
         """
         without = self._builder.build(leave_out=family(self._builder.scene.parts, name))
-        centre = probe_centre(self._builder, name, without)
+        centre = probe_centre(self._builder, name, without, self._solids.within(without))
         left_out = not encloses(self._builder, name, centre, self._whole)
         seen = without if left_out else self._whole
         depth = quality.max_depth if self._cache is None else MIRROR_DEPTH

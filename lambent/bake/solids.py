@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import drjit as dr
@@ -58,6 +59,12 @@ class SolidTest:
         solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
+
+    def within(self, scene: Any) -> SolidTest:
+        """The same test in another Mitsuba scene of the same builder; what is closed is not asked again."""
+        other = copy.copy(self)
+        other._scene = scene
+        return other
 
     def embedded(self, positions: Array, normals: Array) -> NDArray[np.bool_]:
         """For points (n, 3) on surfaces of normals (n, 3): whether they lie within a solid. (n,) bool."""
