@@ -52,6 +52,7 @@ SHOW = {
 }  # fmt: skip
 QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # of what is shown; of everything else luminance
 QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
+SMOOTH_PRIOR = 0.5  # share of the prior from which edges are those of one frame, and so are blended
 SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
 
 
@@ -90,6 +91,8 @@ class FrameState:
         always in false colours.
     accumulate : int, optional
         Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
+    prior : float
+        Share, in the display image of a progressive series, of the last picture of few samples that was displayed.
     antialias : bool
         Edges of the display image are blended, or, when accumulating, frames are jittered.
     jitter_px : tuple of float
@@ -111,6 +114,7 @@ class FrameState:
     planar: str = AUTO
     show: str = "full"
     accumulate: int | None = None
+    prior: float = 0.0
     antialias: bool = True
     jitter_px: tuple[float, float] = (0.0, 0.0)
 
@@ -171,6 +175,7 @@ class Renderer:
         )
         self._frame_group = self._layouts.group(self._layouts.frame, self._frame_buffer, self.resources.sampler)
         self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
+        self._few: Any = None  # radiance of the last displayed frame of few samples
         self._counts: dict[str, Any] = {}
 
     def draw(self, state: FrameState, target_view: Any = None) -> Any:
@@ -192,6 +197,8 @@ class Renderer:
             encoder, draws, views, planar_integrator(state.integrator, state.planar), target, state.show
         )
         radiance = target.radiance
+        if passing:
+            self._few = radiance
         if state.accumulate is not None:
             stamps = self._timer.writes("accumulate")
             radiance = self._accumulate.encode(encoder, radiance, state.accumulate, stamps)
@@ -303,6 +310,7 @@ class Renderer:
         data["scale"] = (state.scale.low, state.scale.high, state.scale.log, quantity_of(state.show).per_y)
         data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
         data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
+        data["prior"] = state.prior
         data["exposure"] = 2.0**state.exposure_ev
         return data
 
@@ -339,12 +347,18 @@ class Renderer:
 
     def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
         # Blended false colours would name luminances that are not there.
-        smooth = state.antialias and state.accumulate is None and not state.is_false_coloured
+        prior = self._few if self._has_prior(state, radiance) else None
+        alone = state.accumulate is None or (prior is not None and state.prior > SMOOTH_PRIOR)
+        smooth = state.antialias and alone and not state.is_false_coloured
         edged = self._targets.picture("edged", state.width, state.height) if smooth else None
         shown = target_view if edged is None else edged.create_view()
-        self._tonemap.encode(encoder, self._frame_group, radiance, shown, self._timer.writes("tonemap"))
+        self._tonemap.encode(encoder, self._frame_group, (radiance, prior), shown, self._timer.writes("tonemap"))
         if edged is not None:
             self._smooth.encode(encoder, edged, target_view, self._timer.writes("smooth"))
+
+    def _has_prior(self, state: FrameState, radiance: Any) -> bool:
+        there = self._few is not None and self._few.size == radiance.size
+        return state.accumulate is not None and state.prior > 0 and there
 
     def _read(self, radiance: Any, state: FrameState) -> Floats:
         dtype = np.float16 if radiance.format == "rgba16float" else np.float32

@@ -1,8 +1,9 @@
 """When to draw the picture, how large, and with which integrator.
 
 While anything the picture shows changes: the few-sample integrator, on fewer pixels where the adapter is too slow for
-them. `REST_S` after the last change: every frame adds samples of `qmc` to the picture, up to a stated count; then
-nothing is drawn any more.
+them, and without mirror pictures of planar reflectors (which show their probes then) where even half of the width and
+height takes too long with them. `REST_S` after the last change: the same once more, whole and with everything; then
+every frame adds samples of `qmc` to the picture, up to a stated count; then nothing is drawn any more.
 """
 
 from __future__ import annotations
@@ -14,14 +15,69 @@ BUDGET_S = 1 / 15  # a frame in motion should take no longer
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
 PROBE_FRAMES = 8
 FIXED_SHARE = 1.5  # a frame in motion may take so many times what it takes without pixels
+LEAST_MIRRORED = 0.5  # mirror pictures are not worth fewer pixels than that
+MIRROR_COST = 4.0  # times that a frame may take with them; measured in software: 3 to 4
+PRIOR_SAMPLES = 16  # of `qmc` that the last picture of few samples counts for, as long as there are few of those
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One picture to draw: its size relative to the window, and its index in the accumulation (None: few samples)."""
+    """One picture to draw: its size relative to the window, its index in the accumulation (None: few samples), and
+    whether planar reflectors get mirror pictures."""
 
     scale: float
     accumulate: int | None
+    mirrors: bool = True
+
+
+WHOLE = Plan(1.0, None)
+
+
+class Resolution:
+    """The size of frames of one kind in motion, by what they took so far."""
+
+    def __init__(self, scale: float) -> None:
+        self.scale = scale
+        self._late = 0  # frames that took too long although no fewer pixels can be drawn
+        self._times: dict[float, float] = {}  # seconds by scale
+        self._fixed_s = self._pixels_s = 0.0  # of a frame of no pixels, and of all pixels besides
+
+    def restart(self, scale: float) -> None:
+        """Forget what was learnt."""
+        self.__init__(scale)  # type: ignore[misc]
+
+    def seconds(self, scale: float) -> float:
+        """What a frame would take."""
+        return self._fixed_s + self._pixels_s * scale * scale
+
+    def learn(self, scale: float, seconds: float, budget_s: float) -> None:
+        """Take in what a frame took, and choose the size of the next."""
+        before = self._times.get(scale, seconds)
+        # A mean, but one that forgets a stall (a shader being compiled) at the next frame of this size.
+        self._times[scale] = min((before + seconds) / 2, 1.2 * seconds)
+        self._fixed_s = min(self._without_pixels_s(), seconds)
+        self._pixels_s = (seconds - self._fixed_s) / scale**2
+        # Fewer pixels do not buy what costs the same with any number of them.
+        budget_s = max(budget_s, FIXED_SHARE * self._fixed_s)
+        fits = next((s for s in SCALES if self.seconds(s) <= budget_s), SCALES[-1])
+        fits_well = next((s for s in SCALES if self.seconds(s) <= 0.7 * budget_s), SCALES[-1])
+        if fits < self.scale:
+            self.scale = fits
+        elif fits_well > self.scale:
+            self.scale = fits_well
+        elif seconds > budget_s:
+            self._late += 1
+            if self._late % PROBE_FRAMES == 0:  # what more pixels cost may have been learnt from a stall
+                self.scale = SCALES[max(0, SCALES.index(self.scale) - 1)]
+                self._times = {scale: time for scale, time in self._times.items() if scale < self.scale}
+
+    def _without_pixels_s(self) -> float:
+        """What a frame of no pixels would take, by the least and the most pixels drawn so far."""
+        small, large = min(self._times), max(self._times)
+        if small == large:
+            return 0.0
+        per_pixel = (self._times[large] - self._times[small]) / (large**2 - small**2)
+        return max(0.0, self._times[small] - max(per_pixel, 0.0) * small**2)
 
 
 class Pacer:
@@ -29,14 +85,23 @@ class Pacer:
 
     def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
         self.accumulate_to = accumulate_to
-        self.moving_scale = 0.5 if slow_adapter else 1.0
+        self._mirrors = not slow_adapter  # in motion
+        start = 0.5 if slow_adapter else 1.0
+        self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirror pictures, and without
         self._shown: object = None
         self._changed_s = 0.0
         self._accumulated = 0
         self._last: Plan | None = None
         self._budget_s = BUDGET_S
-        self._late = 0  # frames that took too long although no fewer pixels can be drawn
-        self._times: dict[float, float] = {}  # seconds of frames in motion, by their scale
+
+    @property
+    def moving(self) -> Plan:
+        """The next frame in motion."""
+        return Plan(self._sizes[self._mirrors].scale, None, self._mirrors)
+
+    @property
+    def moving_scale(self) -> float:
+        return self.moving.scale
 
     @property
     def shown(self) -> object:
@@ -55,7 +120,7 @@ class Pacer:
         """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
         if picture != self._shown:
             self._shown, self._changed_s, self._accumulated = picture, now_s, 0
-            return Plan(self.moving_scale if adaptive else 1.0, None)
+            return self.moving if adaptive else WHOLE
         return self._next(refine) if now_s - self._changed_s >= REST_S else None
 
     def wait_s(self, now_s: float, *, refine: bool) -> float | None:
@@ -64,41 +129,34 @@ class Pacer:
 
     def _next(self, refine: bool) -> Plan | None:
         """What a resting camera still lacks."""
-        if refine:
-            return Plan(1.0, self._accumulated) if self._accumulated < self.accumulate_to else None
-        return None if self._last == Plan(1.0, None) else Plan(1.0, None)
+        if not (self._accumulated or self._last == WHOLE):
+            return WHOLE
+        return Plan(1.0, self._accumulated) if refine and self._accumulated < self.accumulate_to else None
 
     def drawn(self, plan: Plan) -> None:
         self._last = plan
         self._accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
-    def cost(self, plan: Plan, seconds: float) -> None:
-        """Learn what a frame in motion took, and choose the size of the next."""
+    def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
+        """Learn what a frame in motion took, with so many mirror pictures, and choose the next."""
         if plan.accumulate is not None:
             return
-        before = self._times.get(plan.scale, seconds)
-        # A mean, but one that forgets a stall (a shader being compiled) at the next frame of this size.
-        self._times[plan.scale] = min((before + seconds) / 2, 1.2 * seconds)
-        fixed_s = min(self._fixed_s(), seconds)
-        # Fewer pixels do not buy what costs the same with any number of them.
-        budget_s = max(self._budget_s, FIXED_SHARE * fixed_s)
-        pixels_s = (seconds - fixed_s) / plan.scale**2
-        fits = next((s for s in SCALES if fixed_s + pixels_s * s * s <= budget_s), SCALES[-1])
-        fits_well = next((s for s in SCALES if fixed_s + pixels_s * s * s <= 0.7 * budget_s), SCALES[-1])
-        if fits < self.moving_scale:
-            self.moving_scale = fits
-        elif fits_well > self.moving_scale:
-            self.moving_scale = fits_well
-        elif seconds > budget_s:
-            self._late += 1
-            if self._late % PROBE_FRAMES == 0:  # what more pixels cost may have been learnt from a stall
-                self.moving_scale = SCALES[max(0, SCALES.index(self.moving_scale) - 1)]
-                self._times = {scale: time for scale, time in self._times.items() if scale < self.moving_scale}
+        size = self._sizes[plan.mirrors]
+        size.learn(plan.scale, seconds, self._budget_s)
+        if plan.mirrors and mirrors and size.seconds(LEAST_MIRRORED) > self._budget_s:
+            self._mirrors = False
+        elif not plan.mirrors and plan.scale == 1.0 and MIRROR_COST * seconds <= self._budget_s:
+            self._mirrors = True
+            self._sizes[True].restart(LEAST_MIRRORED)
 
-    def _fixed_s(self) -> float:
-        """What a frame of no pixels would take, by the least and the most pixels drawn so far."""
-        small, large = min(self._times), max(self._times)
-        if small == large:
-            return 0.0
-        per_pixel = (self._times[large] - self._times[small]) / (large**2 - small**2)
-        return max(0.0, self._times[small] - max(per_pixel, 0.0) * small**2)
+
+def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:
+    """How much of the last picture of few samples is shown beside the mean of `accumulated` frames of `samples` each.
+
+    Few frames of `qmc` are noise, and to show them at once would be a step back: with share a/(a + N) of the sharp
+    picture, the noise shown is never more than that of 4 a frames. It is 0 at the end.
+    """
+    weight = PRIOR_SAMPLES / samples
+    share = weight / (accumulated + weight)
+    last = weight / (accumulate_to + weight)
+    return max(0.0, (share - last) / (1 - last))

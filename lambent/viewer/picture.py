@@ -20,11 +20,12 @@ from lambent.realtime.device import adapter_info
 from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer, quantity_of
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.mirror_integrators import CHOICES as PLANAR_WAYS
+from lambent.realtime.mirror_integrators import OFF
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
 from lambent.viewer.input import Rect
-from lambent.viewer.pacing import Pacer, Plan
+from lambent.viewer.pacing import Pacer, Plan, prior_share
 from lambent.viewer.quantity import is_false_coloured, shown_scale
 from lambent.viewer.state import Choices, Statistics, ViewerState
 
@@ -104,8 +105,9 @@ class Picture:
         self._renderer.finish()
         seconds = time.perf_counter() - started
         self._pacer.drawn(plan)
-        self._pacer.cost(plan, seconds)
-        state.statistics = self._statistics(seconds, plan.scale)
+        drawn = self._renderer.statistics
+        self._pacer.cost(plan, seconds, drawn["mirrors"])
+        state.statistics = self._statistics(drawn, seconds, plan)
 
     def wait_s(self, state: ViewerState) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
@@ -134,7 +136,11 @@ class Picture:
 
     def _planned(self, frame: FrameState, plan: Plan) -> FrameState:
         if plan.accumulate is not None:
-            return replace(frame, integrator="qmc", n=self._rest_n, accumulate=plan.accumulate)
+            shown = plan.accumulate + 1
+            prior = 0.0 if frame.integrator == "qmc" else prior_share(shown, self._pacer.accumulate_to, self._rest_n)
+            return replace(frame, integrator="qmc", n=self._rest_n, accumulate=plan.accumulate, prior=prior)
+        if not plan.mirrors:
+            frame = replace(frame, planar=OFF)
         width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
         return replace(frame, width=width, height=height)
 
@@ -156,8 +162,7 @@ class Picture:
         """The same in samples per pixel and lobe."""
         return self._pacer.accumulated * self._rest_n
 
-    def _statistics(self, seconds: float, scale: float) -> Statistics:
-        drawn = self._renderer.statistics
+    def _statistics(self, drawn: Mapping[str, Any], seconds: float, plan: Plan) -> Statistics:
         return Statistics(
             adapter=self._adapter,
             integrator=drawn["integrator"],
@@ -168,7 +173,8 @@ class Picture:
             samples=drawn["samples_per_pixel"],
             accumulated=self._pacer.accumulated * self._rest_n,
             accumulate_to=REST_FRAMES * self._rest_n,
-            scale=scale,
+            scale=plan.scale,
+            mirrors=drawn["mirrors"] if plan.mirrors else None,
         )
 
 

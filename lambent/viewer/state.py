@@ -139,6 +139,7 @@ class Statistics:
     accumulated: int = 0  # per pixel, since the camera rests
     accumulate_to: int = 0
     scale: float = 1.0  # of the picture's width and height, by the pacing
+    mirrors: int | None = 0  # planar reflectors drawn by mirror pictures; None: left out, by the pacing
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Pacer, Plan
+from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Pacer, Plan, prior_share
 
 
 def pacer(**options):
@@ -35,9 +35,56 @@ def test_motion_returns_to_few_samples_at_once():
     assert step(p, "b", 2.0) == Plan(1.0, 0)
 
 
+def test_a_slow_adapter_is_sharp_before_it_refines():
+    p = pacer(slow_adapter=True)
+    assert step(p, "a", 0.0) == Plan(0.5, None, mirrors=False)
+    assert [step(p, "a", 1.0 + k) for k in range(3)] == [Plan(1.0, None), Plan(1.0, 0), Plan(1.0, 1)]
+
+
+def walk(p, with_mirrors_s, without_s, frames):
+    """Frames in motion that take so long at full size; returns the plans."""
+    plans = []
+    for _ in range(frames):
+        plans.append(plan := p.moving)
+        p.cost(plan, (with_mirrors_s if plan.mirrors else without_s) * plan.scale**2, int(plan.mirrors))
+    return plans
+
+
+def test_mirror_pictures_are_left_out_where_half_the_size_is_too_slow_with_them():
+    p = pacer()
+    plans = walk(p, 6 * BUDGET_S, 1.5 * BUDGET_S, 30)
+    assert plans[0].mirrors and not plans[1].mirrors
+    assert {plan.mirrors for plan in plans[1:]} == {False} and plans[-1].scale == 0.75
+    p = pacer()
+    assert all(plan.mirrors for plan in walk(p, 2 * BUDGET_S, 0.5 * BUDGET_S, 30)), "half the size is enough"
+
+
+def test_mirror_pictures_come_back_when_there_is_time_for_them():
+    p = pacer()
+    p.cost(p.moving, 50 * BUDGET_S, 1)  # a shader being compiled
+    plans = walk(p, 0.3 * BUDGET_S, 0.1 * BUDGET_S, 10)
+    assert not plans[0].mirrors and plans[-1] == Plan(1.0, None)
+    assert step(p, "a", 0.0) == plans[-1], "what is at rest has them in any case"
+
+
+def test_a_scene_without_reflectors_keeps_what_it_has():
+    p = pacer()
+    p.cost(Plan(1.0, None), 10 * BUDGET_S, mirrors=0)
+    assert p.moving.mirrors
+
+
+@pytest.mark.parametrize("samples", [1, 8])
+def test_the_noise_of_few_samples_is_not_shown(samples):
+    """One frame has the variance 1/samples; what is shown of N of them, (1 - prior)^2/(samples N), never much of it."""
+    shares = [prior_share(n, 128, samples) for n in range(1, 129)]
+    assert all(a > b for a, b in zip(shares, shares[1:], strict=False)) and shares[-1] == 0
+    shown = [(1 - share) ** 2 / (samples * n) for n, share in enumerate(shares, 1)]
+    assert max(shown) < 1.5 / 64
+
+
 def test_without_refinement_a_slow_adapter_sharpens_once():
     p = pacer(slow_adapter=True)
-    assert step(p, "a", 0.0, refine=False) == Plan(0.5, None)
+    assert step(p, "a", 0.0, refine=False) == Plan(0.5, None, mirrors=False)
     assert step(p, "a", 1.0, refine=False) == Plan(1.0, None)
     assert step(p, "a", 2.0, refine=False) is None
     assert p.wait_s(2.0, refine=False) is None
@@ -84,11 +131,11 @@ def test_pixels_are_not_given_away_for_what_they_do_not_cost():
     """A frame takes 150 ms whatever its size, and 50 ms per full picture: 66 ms cannot be met, and is not sought."""
     p = pacer()
     for _ in range(30):
-        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
     assert p.moving_scale >= 0.5
     seen = set()
     for _ in range(10):
-        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
         seen.add(p.moving_scale)
     assert len(seen) == 1, "it does not swing"
 
@@ -96,10 +143,10 @@ def test_pixels_are_not_given_away_for_what_they_do_not_cost():
 def test_a_stall_at_the_start_is_forgotten():
     """The first frame waits three seconds for its shaders; then a frame takes 150 ms of itself."""
     p = pacer(slow_adapter=True)
-    p.cost(Plan(p.moving_scale, None), 3.0)
+    p.cost(p.moving, 3.0)
     assert p.moving_scale == SCALES[-1]
     seen = []
     for _ in range(60):
-        p.cost(Plan(p.moving_scale, None), 0.15 + 0.05 * p.moving_scale**2)
+        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
         seen.append(p.moving_scale)
     assert set(seen[-20:]) == {seen[-1]} and seen[-1] >= 0.35

@@ -21,7 +21,7 @@ class TonemapPass:
         self._device = device
         texture = {"sample_type": "unfilterable-float", "view_dimension": "2d"}
         self._group_layout = device.create_bind_group_layout(
-            entries=[{"binding": 0, "visibility": wgpu.ShaderStage.FRAGMENT, "texture": texture}]
+            entries=[{"binding": i, "visibility": wgpu.ShaderStage.FRAGMENT, "texture": texture} for i in (0, 1)]
         )
         module = device.create_shader_module(code=assemble("tonemap.wgsl"))
         self._pipeline = device.create_render_pipeline(
@@ -31,10 +31,14 @@ class TonemapPass:
             primitive={"topology": "triangle-list"},
         )
 
-    def encode(self, encoder: Any, frame_group: Any, radiance: Any, target: Any, timestamps: dict[str, Any]) -> None:
-        """Draw the texture `radiance` into the view `target`."""
+    def encode(
+        self, encoder: Any, frame_group: Any, radiance: tuple[Any, Any], target: Any, timestamps: dict[str, Any]
+    ) -> None:
+        """Draw textures of radiance into the view `target`: the second, if any, with the share that the frame says."""
+        seen, prior = radiance
+        views = [(seen if texture is None else texture).create_view() for texture in (seen, prior)]
         group = self._device.create_bind_group(
-            layout=self._group_layout, entries=[{"binding": 0, "resource": radiance.create_view()}]
+            layout=self._group_layout, entries=[{"binding": i, "resource": view} for i, view in enumerate(views)]
         )
         draw = encoder.begin_render_pass(
             color_attachments=[{"view": target, "load_op": "clear", "store_op": "store"}], **timestamps

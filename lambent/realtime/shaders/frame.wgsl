@@ -10,7 +10,7 @@ struct Frame {
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
     exposure: f32,   // factor on radiance, 2^EV
-    unused: f32,
+    prior: f32,      // share of the picture of few samples that is shown beside a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
 }
 

@@ -5,6 +5,7 @@
 #include "false_colour.wgsl"
 
 @group(1) @binding(0) var radiance: texture_2d<f32>;
+@group(1) @binding(1) var prior: texture_2d<f32>; // of few samples; `radiance` again where there is none
 
 // Filmic curve of core.colour.filmic (Narkowicz 2015, a fit of the ACES reference transform).
 fn filmic(c: vec3f) -> vec3f {
@@ -31,7 +32,8 @@ fn srgb(c: vec3f) -> vec3f {
 }
 
 @fragment fn tonemap_main(screen: Screen) -> @location(0) vec4f {
-    let seen = textureLoad(radiance, vec2i(screen.position.xy), 0).rgb;
+    let at = vec2i(screen.position.xy);
+    let seen = mix(textureLoad(radiance, at, 0).rgb, textureLoad(prior, at, 0).rgb, frame.prior);
     if (frame.view_transform == 3u) { return vec4f(false_colour(seen), 1.0); }
     let light = frame.exposure * seen;
     var shown = light;

@@ -22,6 +22,7 @@ def draw(state: ViewerState) -> None:
         ("samples per pixel", str(s.samples)),
         ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
         ("draw calls", str(s.draw_calls)),
+        ("mirror pictures", "left out in motion" if s.mirrors is None else str(s.mirrors)),
     ]
     if state.editor is not None:
         table.append(("disks, curves, error", f"{1e3 * state.editor.shown.moving_seconds:.1f} ms while a slider moves"))
