@@ -1,5 +1,7 @@
 """What the window draws when: quick in motion, better at rest, then nothing."""
 
+import itertools
+
 import pytest
 
 from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Pacer, Plan, prior_share
@@ -77,7 +79,7 @@ def test_a_scene_without_reflectors_keeps_what_it_has():
 def test_the_noise_of_few_samples_is_not_shown(samples):
     """One frame has the variance 1/samples; what is shown of N of them, (1 - prior)^2/(samples N), never much of it."""
     shares = [prior_share(n, 128, samples) for n in range(1, 129)]
-    assert all(a > b for a, b in zip(shares, shares[1:], strict=False)) and shares[-1] == 0
+    assert all(a > b for a, b in itertools.pairwise(shares)) and shares[-1] == 0
     shown = [(1 - share) ** 2 / (samples * n) for n, share in enumerate(shares, 1)]
     assert max(shown) < 1.5 / 64
 
