@@ -78,11 +78,12 @@ def _is_hole(si: Any, active: Any) -> Any:
 
 @dr.syntax
 def _behind_holes(scene, ray, active):  # type: ignore[no-untyped-def]
-    si = scene.ray_intersect(ray, active)
-    again = _is_hole(si, active)
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
+    si.t = dr.full(mi.Float, dr.inf, dr.width(ray.o))  # nothing is met where `active` is false
+    again = active
     while again:
-        ray = si.spawn_ray(ray.d)
         si = scene.ray_intersect(ray, again)
+        ray = si.spawn_ray(ray.d)
         again = _is_hole(si, again)
     return si
 
@@ -93,18 +94,23 @@ def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tup
         return scene.sample_emitter_direction(si, u, True, active)  # type: ignore[no-any-return]
     ds, value = scene.sample_emitter_direction(si, u, False, active)
     lit = active & (ds.pdf > 0)
-    lit &= ~_blocked(scene, si.spawn_ray_to(ds.p), mi.Point3f(ds.p), mi.Bool(lit))
+    lit &= ~hidden(scene, si, ds, lit, True)
     return ds, dr.select(lit, value, 0.0)
+
+
+def hidden(scene: Any, si: Any, ds: Any, active: Any, holes: bool) -> Any:
+    """Whether anything without a hole stands between `si` and the point that an emitter was sampled at."""
+    ray = si.spawn_ray_to(ds.p)
+    return _blocked(scene, ray, mi.Point3f(ds.p), mi.Bool(active)) if holes else scene.ray_test(ray, active)
 
 
 @dr.syntax
 def _blocked(scene, ray, target, active):  # type: ignore[no-untyped-def]
-    si = scene.ray_intersect(ray, active)
-    blocked = active & si.is_valid()
-    again = _is_hole(si, active)
+    blocked = mi.Bool(False)
+    again = active
     while again:
-        ray = si.spawn_ray_to(target)
         si = scene.ray_intersect(ray, again)
+        ray = si.spawn_ray_to(target)
         blocked = si.is_valid()
         again = _is_hole(si, again)
     return blocked
@@ -130,14 +136,17 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  
 
         bsdf = si.bsdf(ray)
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, value = sample_emitter(scene, si, sampler.next_2d(active), lit, holes)
+        ds, value = scene.sample_emitter_direction(si, sampler.next_2d(active), False, lit)
         lit &= ds.pdf > 0
         wo = si.to_local(ds.d)
         f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
             ctx, si, wo, sampler.next_1d(active), sampler.next_2d(active), active
         )
         weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, pdf_bsdf))
-        result += dr.select(lit, throughput * f * value * weight, 0.0)
+        brought = throughput * f * value * weight
+        lit &= dr.max(brought) > 0  # a narrow lobe sees few emitters: no ray is spent on the shadows of the others
+        lit &= ~hidden(scene, si, ds, lit, holes)
+        result += dr.select(lit, brought, 0.0)
 
         throughput *= f_sample
         origin = mi.SurfaceInteraction3f(si)
