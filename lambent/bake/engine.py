@@ -93,6 +93,11 @@ def engine() -> Engine:
 
     if mi.variant() != chosen.variant:
         mi.set_variant(chosen.variant)
+    import drjit as dr
+
+    # Looking for what stays the same in a loop traces its body twice, and a loop within it four times; kernels gain
+    # nothing by it here.
+    dr.set_flag(dr.JitFlag.OptimizeLoops, False)
     return chosen
 
 

@@ -73,8 +73,7 @@ def _dominant(points: Array, normals: Array, omega: Array) -> Array:
     major = np.abs(normals).max(axis=1, keepdims=True)
     normal_bin = np.round(normals / major * ANGLE_BINS / 2).astype(int)
     step = max(0.02, 0.02 * float(np.median(np.linalg.norm(points, axis=1))))
-    keys = np.concatenate([normal_bin, np.round(offset / step).astype(int)[:, None]], axis=1)
-    _, group = np.unique(keys, axis=0, return_inverse=True)
+    _, group = np.unique(_packed(normal_bin, np.round(offset / step).astype(int)), return_inverse=True)
     weight = np.bincount(group.reshape(-1), omega)
     planes = []
     for g in np.argsort(-weight)[:CANDIDATES]:
@@ -85,6 +84,14 @@ def _dominant(points: Array, normals: Array, omega: Array) -> Array:
         if d > CLEARANCE:
             planes.append([*n, d])
     return np.array(planes).reshape(-1, 4)
+
+
+def _packed(normal_bin: NDArray[np.integer], step: NDArray[np.integer]) -> NDArray[np.integer]:
+    """One number per bin, in the order of the bins: a single key sorts many times faster than rows of four."""
+    packed = np.zeros(len(step), np.int64)
+    for column in normal_bin.T:
+        packed = packed * (ANGLE_BINS + 1) + column + ANGLE_BINS // 2
+    return packed * (2 * int(np.abs(step).max()) + 1) + step + int(np.abs(step).max())
 
 
 def _box(points: Array) -> Array:

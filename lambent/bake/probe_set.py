@@ -32,6 +32,7 @@ class ProbeSet:
         traced = irradiance is None
         self._builder = SceneBuilder(atlas.scene, atlas.uv2, diffuse=traced, measured=lookups_of(atlas.scene))
         balance_emitters(self._builder)
+        self._left_out: tuple[frozenset[str], Any] | None = None
         self._cache = None if traced else LightMapCache(self._builder, irradiance, irradiance_back)
 
     @cached_property
@@ -42,6 +43,13 @@ class ProbeSet:
     def _whole(self) -> Any:
         return self._builder.build()
 
+    def _without(self, names: frozenset[str]) -> Any:
+        """The scene without these objects; kept until others are asked for, as parts of one object share it."""
+        if self._left_out is None or self._left_out[0] != names:
+            self._left_out = None
+            self._left_out = names, self._builder.build(leave_out=names)
+        return self._left_out[1]
+
     def bake(self, name: str, quality: Quality, seed: int) -> tuple[dict[str, Array], dict[str, Any]]:
         """Arrays radiance, distance and planes of one object's probe, and what to note.
 
@@ -50,7 +58,7 @@ class ProbeSet:
 
         Planes that the scene gives are taken as they are; others are found from what the probe sees.
         """
-        without = self._builder.build(leave_out=family(self._builder.scene.parts, name))
+        without = self._without(frozenset(family(self._builder.scene.parts, name)))
         centre = probe_centre(self._builder, name, without, self._solids.within(without))
         left_out = not encloses(self._builder, name, centre, self._whole)
         seen = without if left_out else self._whole
