@@ -113,7 +113,8 @@ class _Points:
 
 
 def _vectors(array: Array) -> Any:
-    return mi.Vector3f(np.ascontiguousarray(array.reshape(-1, 3).T, dtype=np.float32))
+    """mi.Vector3f of an array (..., 3), component by component: a whole array's size would stand in the kernels."""
+    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(c, dtype=np.float32)) for c in array.reshape(-1, 3).T))
 
 
 def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampling) -> Array:
@@ -128,8 +129,8 @@ def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampl
     thread = dr.arange(mi.UInt32, n * samples)
     texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
     point = (
-        texel % points.count * POINTS + (k // 2) % POINTS
-    )  # the low bit already steers the azimuth of Hammersley points
+        texel % dr.opaque(mi.UInt32, points.count) * POINTS + (k // 2) % POINTS
+    )  # the low bit already steers the azimuth of Hammersley points; a constant count would compile every tile anew
     at = paths.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
