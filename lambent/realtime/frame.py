@@ -25,13 +25,13 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame_data import FRAME_DTYPE
-from lambent.realtime.integrators import INTEGRATORS, Integrator, integrator
+from lambent.realtime.integrators import INTEGRATORS, integrator
 from lambent.realtime.mirror import MirrorView, mirror_views
 from lambent.realtime.mirror_integrators import AUTO, TILE, planar_integrator
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.planar import MOST_MIRRORS, PlanarPass
-from lambent.realtime.passes.shade import Draw, ShadePass
+from lambent.realtime.passes.shade import FRINGE, Draw, ShadePass
 from lambent.realtime.passes.sky import SkyPass
 from lambent.realtime.passes.smooth import SmoothPass
 from lambent.realtime.passes.tonemap import FALSE_COLOUR, VIEW_TRANSFORMS, TonemapPass
@@ -141,6 +141,11 @@ class FrameState:
         """Whether the display image is in false colours."""
         return self.view_transform == FALSE_COLOUR or self.show == LIGHT_MAP_NOISE
 
+    @property
+    def is_smoothed(self) -> bool:
+        """Whether edges of a single frame are blended: false colours would name numbers that are not there."""
+        return self.antialias and not self.is_false_coloured
+
     def samples(self, material: Material, roughness: float = 1.0) -> int:
         """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
         return self.n or (QMC_N if self.integrator == "qmc" else automatic_n(material, roughness))
@@ -166,6 +171,7 @@ class Renderer:
         self._depth = DepthPass(device, self._layouts)
         self._planar = PlanarPass(device, self._layouts, self.resources, self._depth)
         self._shade = ShadePass(device, self._layouts, planar_layout=self._planar.shown_layout)
+        self._fringe = ShadePass(device, self._layouts, FRINGE)
         self._sky, self._accumulate = SkyPass(device, self._layouts), AccumulatePass(device)
         self._tonemap = TonemapPass(device, self._layouts)
         self._smooth = SmoothPass(device, self._layouts, self.resources.sampler)
@@ -193,9 +199,7 @@ class Renderer:
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
         encoder = self.device.create_command_encoder()
-        calls = self._encode_light(
-            encoder, draws, views, planar_integrator(state.integrator, state.planar), target, state.show
-        )
+        calls = self._encode_light(encoder, draws, views, state, target, passing and state.is_smoothed)
         radiance = target.radiance
         if passing:
             self._few = radiance
@@ -290,7 +294,11 @@ class Renderer:
         """The planar reflectors that this frame draws a mirror picture for."""
         if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
             return []
-        return mirror_views(data, self.scene.record.reflectors, state.width, state.height, MOST_MIRRORS)
+        record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
+        widest = {
+            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes), default=0.0) for o in record.objects
+        }
+        return mirror_views(data, record.reflectors, state.width, state.height, MOST_MIRRORS, widest)
 
     def _frame_data(self, state: FrameState) -> NDArray[np.void]:
         camera, width, height = state.camera, state.width, state.height
@@ -319,16 +327,20 @@ class Renderer:
         encoder: Any,
         draws: list[Draw],
         views: list[MirrorView],
-        planar: Integrator | None,
+        state: FrameState,
         target: Any,
-        show: str,
+        smoothed: bool,
     ) -> int:
+        """Encode the passes up to linear radiance; `smoothed` blends the edges of masked surfaces."""
+        planar = planar_integrator(state.integrator, state.planar)
+        light_group = self.resources.noise_group if state.show == LIGHT_MAP_NOISE else None
+        cut_out = {record.name for record in self.resources.cut_out} if smoothed else set()
+        fringes = [draw for draw in draws if draw.item.record.name in cut_out]
         depth = {"view": target.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
         with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
         first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
         first.set_bind_group(0, self._frame_group)
-        light_group = self.resources.noise_group if show == LIGHT_MAP_NOISE else None
-        calls = self._depth.draw(first, self.resources)
+        calls = self._depth.draw(first, self.resources, fringed=bool(fringes))
         first.end()
         if views and planar:
             calls += self._planar.encode(encoder, views, draws, planar, self._frame_group, target, self._timer)
@@ -342,14 +354,14 @@ class Renderer:
         format = target.radiance.format
         calls += self._shade.draw(shade, self.resources, draws, format, self._planar.shown_group, light_group)
         calls += self._sky.draw(shade, self.resources, format)
+        calls += self._fringe.draw(shade, self.resources, fringes, format, light_group=light_group)
         shade.end()
         return calls
 
     def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
-        # Blended false colours would name luminances that are not there.
         prior = self._few if self._has_prior(state, radiance) else None
         alone = state.accumulate is None or (prior is not None and state.prior > SMOOTH_PRIOR)
-        smooth = state.antialias and alone and not state.is_false_coloured
+        smooth = alone and state.is_smoothed
         edged = self._targets.picture("edged", state.width, state.height) if smooth else None
         shown = target_view if edged is None else edged.create_view()
         self._tonemap.encode(encoder, self._frame_group, (radiance, prior), shown, self._timer.writes("tonemap"))

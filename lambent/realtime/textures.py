@@ -7,7 +7,8 @@ normal              mean slopes, and twice the variance of the slopes within a t
                     2010, "LEAN mapping", without the covariance)
 direction           cosine and sine of the doubled angle
 opacity             every level has the share of surface that level 0 has (Castano 2010), so that leaves keep
-                    their area; the test at the cutoff is sharp, edges are smoothed as those of triangles are
+                    their area where the test at the cutoff is sharp; beside it the share of what passes the test
+                    on level 0, which is how much is covered where a pixel is larger than a texel
 """
 
 from __future__ import annotations
@@ -121,8 +122,11 @@ class Pictures:
             return Picture(self._uploaded(_halves(normal_levels(texels)), "rgba16float"))
         if part == "direction":
             return Picture(self._uploaded(_halves(chain(doubled_angle(texels))), "rg16float"))
-        made = roughness_levels(texels) if part == "roughness" else opacity_levels(texels, cutoff)
-        return Picture(self._uploaded(_halves(made), "r16float"))
+        if part == "opacity":
+            covered = chain(np.asarray(texels) >= cutoff)
+            made = [np.concatenate(both, axis=-1) for both in zip(opacity_levels(texels, cutoff), covered, strict=True)]
+            return Picture(self._uploaded(_halves(made), "rg16float"))
+        return Picture(self._uploaded(_halves(roughness_levels(texels)), "r16float"))
 
     def _uploaded(self, levels: list[Any], format: str) -> Any:
         height, width = levels[0].shape[:2]

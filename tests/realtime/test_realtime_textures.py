@@ -109,6 +109,44 @@ def test_what_is_behind_a_hole_is_seen(device) -> None:
     np.testing.assert_allclose(Renderer(device, solid).image(FrameState(FRONT, 8, 8)), 1.0, rtol=1e-3)
 
 
+def shown(renderer: Renderer, size: int, **how) -> np.ndarray:
+    """Light of a picture as it is shown in motion, without a view transform: (size, size)."""
+    frame = FrameState(FRONT, size, size, view_transform="linear", **how)
+    return srgb_decode(renderer.display_image(frame)[..., 0].astype(np.float32) / 255)
+
+
+def test_edges_of_a_mask_are_as_wide_as_a_pixel_in_motion(device) -> None:
+    """Texels of 8 pixels, the mask's edge a quarter into a pixel: the mean of light and dark by what is covered."""
+    opaque = (np.arange(8) < 4).astype(np.float16) * np.ones((8, 1))
+    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque[..., None])))
+    moved = replace(scene, positions=scene.positions + np.float32([0.25 / 64, 0, 0]))
+    middle = shown(Renderer(device, moved), 64)[32, 8:56]
+    expected = 0.8 * (np.arange(48) < 24)
+    expected[24] = 0.2
+    np.testing.assert_allclose(middle, expected, atol=0.05)
+
+
+def test_small_holes_become_a_mean_in_motion(device) -> None:
+    """Of texels far smaller than pixels a third are holes: two thirds of the light at each size."""
+    opaque = (np.arange(768) % 3 < 2) * np.ones((768, 1))
+    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque[..., None])))
+    renderer = Renderer(device, scene)
+    for size in (16, 50, 96):
+        inside = shown(renderer, size)[2:-2, 2:-2]
+        np.testing.assert_allclose(inside, 0.8 * 2 / 3, atol=0.06)
+        assert shown(renderer, size, antialias=False)[2:-2, 2:-2].max() > 0.75, "one frame alone is a test"
+
+
+def test_no_pixel_of_a_masked_surface_is_lost_in_motion(device) -> None:
+    """What is covered in part and what is covered whole make up what the test alone finds."""
+    opaque = np.random.default_rng(5).random((8, 8, 1)).astype(np.float16)
+    masked = Renderer(device, square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque))))
+    finely_tested = shown(masked, 512, antialias=False).mean()
+    assert shown(masked, 128).mean() == pytest.approx(finely_tested, rel=0.02)
+    covered = Renderer(device, square(Material(name="m", kd=0.8), MaterialTextures(opacity=constant(1.0))))
+    np.testing.assert_array_equal(shown(covered, 64), shown(covered, 64, antialias=False))
+
+
 @pytest.mark.parametrize("integrator", ["rings", "fis", "lobe-4.24", "lobe-4.25", "qmc", "split-sum"])
 def test_a_roughness_picture_equals_a_material_of_that_roughness(device, integrator: str) -> None:
     """Half of everything: the samples move, the filter narrows, as a material of half the numbers has it."""

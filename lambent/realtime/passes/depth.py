@@ -30,12 +30,15 @@ class DepthPass:
         cut_out = device.create_shader_module(code=assemble("mask.wgsl"))
         groups = [layouts.frame, layouts.material]
         self._whole = _pipeline(device, groups[:1], whole)
-        self._cut_out = _pipeline(
-            device, groups, cut_out, {"module": cut_out, "entry_point": "mask_main", "targets": []}
+        self._cut_out, self._solid = (
+            _pipeline(device, groups, cut_out, {"module": cut_out, "entry_point": entry, "targets": []})
+            for entry in ("mask_main", "solid_main")
         )
 
-    def draw(self, target: Any, resources: SceneResources) -> int:
+    def draw(self, target: Any, resources: SceneResources, fringed: bool = False) -> int:
         """Encode into the render pass `target`, whose group 0 is set; returns the draw calls.
+
+        With `fringed` pixels that a masked surface covers in part are left open, for `passes.shade.FRINGE`.
 
         The materials' bind groups must be there. The pass that follows shades where depths are equal, and so need not
         look for holes again.
@@ -48,7 +51,7 @@ class DepthPass:
             target.draw_indexed(count * 3, 1, first * 3)
         cut_out = resources.cut_out
         if cut_out:
-            target.set_pipeline(self._cut_out)
+            target.set_pipeline(self._solid if fringed else self._cut_out)
         for record in cut_out:
             target.set_bind_group(1, resources.materials[record.material].group)
             target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)

@@ -35,9 +35,15 @@ class Stage:
     entry: str = "shade_main"
     front_face: str = "ccw"
     further_targets: tuple[str, ...] = ()
+    blended: bool = False  # laid over what is behind by its alpha, in no order, instead of standing for it
 
 
 SHADE = Stage()
+FRINGE = Stage("fringe.wgsl", "fringe_main", blended=True)  # of masked surfaces, after what is whole
+_OVER = {
+    "color": {"src_factor": "src-alpha", "dst_factor": "one-minus-src-alpha", "operation": "add"},
+    "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
+}
 
 
 def constants_of(draw: Draw) -> dict[str, int]:
@@ -87,7 +93,7 @@ class ShadePass:
             record = draw.item.record
             target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
-            target.set_bind_group(2, draw.item.group(draw.integrator.prefiltered))
+            target.set_bind_group(2, draw.item.group(draw.integrator.cube))
             target.set_bind_group(3, planar_group if draw.planar else light_group or resources.light_group)
             target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
         return len(draws)
@@ -103,13 +109,21 @@ class ShadePass:
                 fragment={
                     "module": module,
                     "entry_point": self._stage.entry,
-                    "targets": [{"format": target} for target in (format, *self._stage.further_targets)],
+                    "targets": self._targets(format),
                     "constants": constants,
                 },
                 primitive={**TRIANGLES, "front_face": self._stage.front_face},
-                depth_stencil={"format": DEPTH_FORMAT, "depth_write_enabled": False, "depth_compare": "equal"},
+                depth_stencil={
+                    "format": DEPTH_FORMAT,
+                    "depth_write_enabled": False,
+                    "depth_compare": "greater" if self._stage.blended else "equal",
+                },
             )
         return self._pipelines[key]
+
+    def _targets(self, format: str) -> list[dict[str, Any]]:
+        blend = {"blend": _OVER} if self._stage.blended else {}
+        return [{"format": target, **blend} for target in (format, *self._stage.further_targets)]
 
     def _module(self, draw: Draw) -> Any:
         specular = "planar_shown.wgsl" if draw.planar else "probe_light.wgsl"

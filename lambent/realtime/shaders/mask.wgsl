@@ -6,3 +6,8 @@
 @fragment fn mask_main(v: Varyings) {
     if (is_hole(v.uv)) { discard; }
 }
+
+// What is covered in part is drawn later, see fringe.wgsl.
+@fragment fn solid_main(v: Varyings) {
+    if (coverage(v.uv) < SOLID) { discard; }
+}

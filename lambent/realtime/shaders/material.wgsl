@@ -72,3 +72,17 @@ fn painted(uv: vec2f) -> Painted {
 fn is_hole(uv: vec2f) -> bool {
     return textureSample(opacity_picture, picture_sampler, place(5u, uv)).r < material.diffuse_scale.w;
 }
+
+const SOLID = 0.95; // coverage from which a pixel counts as covered
+
+// How much of a pixel the surface covers. Where texels are larger than pixels the test has an edge, as wide as a pixel;
+// where they are smaller the share of those that pass it. Takes derivatives.
+fn coverage(uv: vec2f) -> f32 {
+    let at = place(5u, uv);
+    let opacity = textureSample(opacity_picture, picture_sampler, at).rg;
+    let texels = vec2f(textureDimensions(opacity_picture));
+    let texels_per_px = max(length(dpdx(at) * texels), length(dpdy(at) * texels));
+    let slope = length(vec2f(dpdx(opacity.r), dpdy(opacity.r)));
+    let edge = clamp((opacity.r - material.diffuse_scale.w) / max(slope, 1e-4) + 0.5, 0.0, 1.0);
+    return mix(edge, opacity.g, smoothstep(0.5, 2.0, texels_per_px));
+}
