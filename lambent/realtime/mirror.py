@@ -11,7 +11,7 @@ is 1 (times w) in the plane and falls with the distance along every ray to 1 - a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from lambent.store.contract import ReflectorRecord
 
 Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
+MOST_MARGIN = 0.2  # of the picture's longer side: what a wide lobe sees beyond is left to the probe
 STEP_PX = 32  # sizes are multiples of this: five MIP levels without remainder
 CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plane is not mirrored
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
@@ -64,9 +65,14 @@ class MirrorView:
 
 
 def mirror_views(
-    frame: NDArray[np.void], reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int
-) -> list[MirrorView]:
-    """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`."""
+    frame: NDArray[np.void], reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
+    widest: Mapping[str, float] | None = None,
+) -> list[MirrorView]:  # fmt: skip
+    """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
+
+    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger mirror picture. All pictures
+    of a frame have one size.
+    """
     seen = []
     for reflector in reflectors:
         plane = np.asarray(reflector.plane, float)
@@ -77,7 +83,11 @@ def mirror_views(
         if share >= LEAST_SHARE:
             seen.append((share, reflector, plane))
     seen.sort(key=lambda one: -one[0])
-    views = (_view(frame, plane, r, share, width, height, i) for i, (share, r, plane) in enumerate(seen[:most]))
+    m = max((widest or {}).get(part.object, 0.0) for _, r, _ in seen[:most] for part in r.parts) if seen else 0.0
+    place = _padded(frame, (width, height), m)
+    views = (
+        _view(frame, plane, r, share, (width, height), place, i) for i, (share, r, plane) in enumerate(seen[:most])
+    )
     return [view for view in views if view is not None]
 
 
@@ -111,16 +121,16 @@ def _view(
     plane: Floats,
     reflector: ReflectorRecord,
     share: float,
-    width: int,
-    height: int,
+    size: tuple[int, int],
+    place: tuple[Floats, Floats],
     number: int,
 ) -> MirrorView | None:
     n, d = plane[:3], float(plane[3])
     turn = np.eye(3) - 2 * np.outer(n, n)
     mirrored = np.eye(4)
     mirrored[:3, :3], mirrored[:3, 3] = turn, -2 * d * n
-    wide, offset = _padded((width, height))
-    scale, shift = np.array([width, height]) / wide, (np.array([width, height]) + 2 * offset - wide) / wide
+    wide, offset = place
+    scale, shift = np.array(size) / wide, (np.array(size) + 2 * offset - wide) / wide
     clip = frame["clip_from_world"].T.astype(float) @ mirrored
     clip[0] = scale[0] * clip[0] + shift[0] * clip[3]
     clip[1] = scale[1] * clip[1] - shift[1] * clip[3]  # rows of pixels run down
@@ -154,9 +164,14 @@ def _view(
     return MirrorView(reflector, plane, seen, uniform, (int(wide[0]), int(wide[1])), share)
 
 
-def _padded(size: tuple[int, int]) -> tuple[Floats, Floats]:
-    """Size of the mirror picture of a frame of `size`, and where the frame's first pixel lies in it."""
-    wide = np.array([-(-(length + 2 * MARGIN_PX) // STEP_PX) * STEP_PX for length in size])
+def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[Floats, Floats]:
+    """Size of the mirror picture of a frame of `size`, and where the frame's first pixel lies in it.
+
+    The margin holds the half-width 2 m of the widest lobe about the rays at the edges.
+    """
+    focal_px = size[1] / 2 / float(np.linalg.norm(frame["up"][:3]))
+    margin = max(MARGIN_PX, int(min(MOST_MARGIN * max(size), 2 * m * focal_px)))
+    wide = np.array([-(-(length + 2 * margin) // STEP_PX) * STEP_PX for length in size])
     return wide, (wide - np.array(size)) // 2
 
 

@@ -15,7 +15,8 @@ from lambent.realtime import patterns
 from lambent.realtime.integrators import Integrator
 
 Floats = NDArray[np.floating]
-TILE = 16  # pixels that sample a lobe in turns
+TILE = 64  # pixels that sample a lobe in turns
+TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.12  # of the filter, against one that covers the lobe: found by experiment
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
@@ -44,16 +45,16 @@ def fixed_table(lobe: Lobe, n: int) -> Floats:
 
 
 def interleaved_table(lobe: Lobe, n: int) -> Floats:
-    """`fixed_table`, then 16 spirals of n samples, one for each pixel of a tile of 4 x 4: (17 n, 4).
+    """`fixed_table`, then 64 spirals of n samples, one for each pixel of a tile of 8 x 8: (65 n, 4).
 
-    Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/16 and
-    beta = fract(3.0902 o): all 16 together cover the lobe's mass evenly with 16 n samples.
+    Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/64 and
+    beta = fract(TURN o): all 64 together cover the lobe's mass evenly, and so do every fourth of them.
     """
     ggx = lobe.distribution == "ggx"
     k, blocks = np.arange(n), [fixed_table(lobe, n)]
     for o in range(TILE):
         r = patterns.radius((k + (o + 0.5) / TILE) / n, ggx)
-        phi = 2 * np.pi * (0.618034 * k + 3.0902 * o % 1)
+        phi = 2 * np.pi * (0.618034 * k + TURN * o % 1)
         slopes = np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1)
         blocks.append(patterns.table(slopes, INTERLEAVED_BIAS / patterns.relative_density(slopes, ggx), lobe))
     return np.concatenate(blocks)
@@ -62,7 +63,7 @@ def interleaved_table(lobe: Lobe, n: int) -> Floats:
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
         "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, THREE_STEPS),
-        "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 8}),
+        "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, "HIDDEN_DROP": 0.8}),
         "fixed": Integrator("planar_quadrature.wgsl", fixed_table, THREE_STEPS),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},

@@ -15,7 +15,7 @@ from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.frame_data import FRAME_DTYPE
-from lambent.realtime.mirror import covered_share, mirror_views
+from lambent.realtime.mirror import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, mirror_views
 from lambent.realtime.mirror_integrators import interleaved_table, multi_ring_table
 from lambent.realtime.patterns import radius
 from lambent.realtime.unbaked import unbaked_scene
@@ -182,11 +182,29 @@ def test_covered_share_of_a_square_that_fills_half_the_picture() -> None:
 def test_spirals_of_a_tile_share_the_lobe_evenly() -> None:
     lobe = Lobe(mx=0.1, my=0.05)
     rows = interleaved_table(lobe, 7)
-    assert rows.shape == (7 * 17, 4)
-    slopes = rows[7:, :2] / [0.1, 0.05]
-    mass = np.sort(1 - np.exp(-(slopes**2).sum(axis=1)))
-    np.testing.assert_allclose(mass, (np.arange(112) + 0.5) / 112, atol=1e-5)
-    assert np.abs(slopes.mean(axis=0)).max() < 0.05
+    assert rows.shape == (7 * 65, 4)
+    slopes = (rows[7:, :2] / [0.1, 0.05]).reshape(64, 7, 2)
+    mass = np.sort(1 - np.exp(-(slopes**2).sum(axis=-1)), axis=None)
+    np.testing.assert_allclose(mass, (np.arange(448) + 0.5) / 448, atol=1e-5)
+    assert np.abs(slopes.mean(axis=(0, 1))).max() < 0.02
+    for first in range(4):  # what four rows of four pixels have between them
+        assert np.abs(slopes[first::4].mean(axis=(0, 1))).max() < 0.05
+
+
+def test_wide_lobes_have_a_wider_mirror_picture() -> None:
+    sizes = []
+    for m in (0.01, 0.05, 0.1, 0.4):
+        (view,) = mirror_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4, {"floor": m})
+        sizes.append(view.size)
+        at, wide = view.uniform["offset"], np.array(view.size)
+        assert np.all(at >= MARGIN_PX)
+        corner = view.frame["clip_from_world"].T.astype(float) @ [0.1, 0.4, 0.0, 1]  # the target's image
+        flat = frame_of(CAMERA)["clip_from_world"].T.astype(float) @ [0.1, -0.4, 0.0, 1]
+        pixel = [(v[:2] / v[3] * [1, -1] + 1) / 2 * size for v, size in ((corner, wide), (flat, (WIDTH, HEIGHT)))]
+        np.testing.assert_allclose(pixel[0] - at, pixel[1], atol=1e-3)
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[-1]
+    assert sizes[-1][0] <= WIDTH * (1 + 2 * MOST_MARGIN) + STEP_PX
 
 
 def test_multi_rings_of_ten_are_three_of_three() -> None:

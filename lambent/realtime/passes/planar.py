@@ -18,7 +18,7 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer, Target
 
 FORMAT = "rgba16float"
-CLEANED = ("rgba16float", "r16float")
+CLEANED = ("rgba16float", "rgba16float", "rg16float")
 MOST_MIRRORS = 4  # reflectors of a frame; those that cover less of it are left to their probes
 _FLAT = {"sample_type": "float", "view_dimension": "2d"}
 _EXACT = {"sample_type": "unfilterable-float", "view_dimension": "2d"}
@@ -34,7 +34,7 @@ class PlanarPass:
         # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. Shading's light maps, which have the same
         # numbers, are not read here.
         self._look_up = self._group_layout({"buffer": {"type": "uniform"}}, {"texture": _FLAT}, {"texture": _EXACT})
-        self.shown_layout = self._group_layout(*[{"texture": _FLAT}] * 2, *[{"texture": _EXACT}] * 4)
+        self.shown_layout = self._group_layout(*[{"texture": _FLAT}] * 2, *[{"texture": _EXACT}] * 5)
         self._clean_layout = self._group_layout(*[{"texture": _EXACT}] * 2)
         self._clean = self._clean_pipeline()
         self._cleaned: list[Any] = []

@@ -24,6 +24,8 @@ struct Mirror { // MIRROR_DTYPE in mirror.py
 @group(3) @binding(1) var mirror_light: texture_2d<f32>;
 @group(3) @binding(2) var mirror_planes: texture_2d<f32>;
 
+override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the mirror picture shows something else before it
+
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the mirror picture
 
@@ -106,6 +108,13 @@ fn mirror_sample(texel: vec2f, level: f32) -> vec3f {
     let uv = clamp(texel, vec2f(0.5), mirror.size - 0.5) / mirror.size;
     let found = textureSampleLevel(mirror_light, linear_sampler, uv, wanted);
     return found.rgb / max(found.a, 1e-3);
+}
+
+// How much a hit counts: less where it lies behind what the picture shows there, by 2 to 8 % of its depth.
+fn seen_share(hit: Hit) -> f32 {
+    let plane = plane_at(hit.texel);
+    let deeper = 1.0 - plane.w / min(dot(plane.xyz, hit.q), -1e-6);
+    return 1.0 - HIDDEN_DROP * clamp((deeper - 0.02) / 0.06, 0.0, 1.0);
 }
 
 // Level at which a texel covers the solid angle of a sample: omega t^2/D^2 |N.v|/|N.wi| f^2/cos^3 texels, D and v from

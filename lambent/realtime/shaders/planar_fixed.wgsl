@@ -10,6 +10,8 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
     let here = lobe_here(index, s);
     let lobe = here.lobe;
     var sum = vec3f(0.0);
+    var mirrored = vec3f(0.0); // gains of all samples that the mirror picture has
+    var kept = vec3f(1e-9);    // of those not dropped
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let q = samples[first + k];
@@ -20,9 +22,12 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let w = to_world(s, at.wi);
         let hit = march(place, w, fract(first_jitter + 0.618034 * f32(k)));
         let inside = hit.inside;
-        sum += g * inside * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega));
+        let counted = g * inside * seen_share(hit);
+        sum += counted * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega));
+        mirrored += g * inside;
+        kept += counted;
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * g, beyond.w + share * at.wi, beyond.omega + share * exp2(2.0 * half_log2_omega));
     }
-    return (sum + from_probe(s, beyond)) / f32(SAMPLES);
+    return (sum * mirrored / kept + from_probe(s, beyond)) / f32(SAMPLES);
 }
