@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,10 @@ def _no_table(lobe: Lobe, n: int) -> Floats:
     return np.zeros((n, 4), np.float32)
 
 
+# Levels by smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Published estimates keep theirs.
+Cube = Literal["smooth", "box", "prefiltered"]
+
+
 @dataclass(frozen=True)
 class Integrator:
     """`table(lobe, n)` gives (rows, 4) float32; `rows` fixes their number where it is not the sample count n."""
@@ -31,16 +36,16 @@ class Integrator:
     table: Callable[[Lobe, int], Floats] = _no_table
     constants: Mapping[str, int] = field(default_factory=dict)
     rows: int | None = None
-    prefiltered: bool = False  # reads the cube prefiltered by roughness
+    cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered
     specular: bool = True
 
 
 INTEGRATORS: dict[str, Integrator] = {
     "rings": Integrator("quadrature.wgsl", patterns.rings_table),
-    "lobe-4.24": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 24}),
-    "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}),
-    "fis": Integrator("quadrature.wgsl", patterns.fis_table),
-    "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, prefiltered=True),
+    "lobe-4.24": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 24}, cube="box"),
+    "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
+    "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
+    "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
     "qmc": Integrator("qmc.wgsl"),
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }

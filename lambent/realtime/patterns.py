@@ -39,7 +39,9 @@ RINGS: dict[int, tuple[int, ...]] = {
 N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # of the roughnesses, at n = 7: where rings turn into a line, and how softly
 CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, against 1 on the mean; below 7 samples the latter
-STRETCH = {3: 0.91, 5: 0.92}  # of the rings' radii; .97 otherwise
+STRETCH = {3: 0.89, 5: 0.89, 7: 0.92}  # of the rings' radii; .93 otherwise, .97 of many samples
+BIAS = {3: 0.5, 5: 0.6, 7: 0.75}  # of the rings' filters, against filters that cover the lobe; .9 otherwise
+MANY = 30  # samples: from here on filters hardly blur
 LINE_TEMPER = 1.16  # tau sqrt(n), see `line_pattern`
 BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
@@ -69,8 +71,9 @@ class Pattern:
 def ring_pattern(n: int, ggx: bool = False) -> Pattern:
     """A centre and staggered rings, each ring where half of its mass lies inside.
 
-    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe, and filters of .6 of
-    what would cover it, because a trilinear look-up blurs by itself.
+    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe. Filters of .6 of what
+    would cover the lobe are the sharpest and leave the highlight of a small lamp in pieces, one per sample; those of
+    `ring_bias` leave it nearly whole, and rings drawn in by `STRETCH` keep the lobe as wide as it is.
     """
     counts = ring_counts(n)
     centred = counts[0] == 1 and n > 1
@@ -83,7 +86,7 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
             weight[0] = mass
         else:
             mass = count * weight[-1]
-            r = STRETCH.get(n, 0.97) * float(radius(min((before + mass / 2) / n, 0.9999), ggx))
+            r = ring_stretch(n) * float(radius(min((before + mass / 2) / n, 0.9999), ggx))
         phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
         slopes.append(r * np.stack([np.cos(phi), np.sin(phi)], axis=-1))
         before += mass
@@ -92,8 +95,13 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
 
 
 def ring_bias(n: int) -> float:
-    """The filters of n samples on rings against filters that cover the lobe; n = 40 is close to the truth already."""
-    return {3: 0.46, 5: 0.55}.get(n, 0.6 if n < 40 else 1.0)
+    """The filters of n samples on rings against filters that cover the lobe; found by looking, per n."""
+    return BIAS.get(n, 0.9 if n < MANY else 1.0)
+
+
+def ring_stretch(n: int) -> float:
+    """The radii of n samples' rings against those that have half of a ring's mass inside."""
+    return STRETCH.get(n, 0.93 if n < MANY else 0.97)
 
 
 def line_pattern(n: int, ggx: bool = False) -> Pattern:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.cube_mips import finite, mip_chain
+from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 from lambent.realtime.device import WEBGPU_LIMITS
 from lambent.realtime.frame_data import OBJECT_DTYPE, lobe_data, material_data, sample_data
-from lambent.realtime.integrators import Integrator
+from lambent.realtime.integrators import Cube, Integrator
 from lambent.realtime.split_sum import prefiltered_cube
 from lambent.realtime.textures import PARTS, MaterialPictures, Pictures, material_pictures
 from lambent.store.contract import HALF_MAX, ObjectRecord
@@ -111,19 +111,21 @@ def inverse_depth(distance: Floats) -> Floats:
 
 
 class Light:
-    """A probe's cube maps on the GPU; the prefiltered one is made when split-sum asks for it."""
+    """A probe's cube maps on the GPU, each made when an integrator first asks for it.
+
+    `version` counts how often the light was replaced.
+    """
 
     def __init__(self, device: Any, probe: Probe | None, sampler: Any) -> None:
         self._device, self._sampler = device, sampler
-        self._prefiltered: Any = None
-        radiance = np.zeros((6, 1, 1, 3), np.float32) if probe is None else finite(probe.radiance)[0]
+        self._radiance = np.zeros((6, 1, 1, 3), np.float32) if probe is None else probe.radiance
+        self._cubes: dict[Cube, Any] = {}
+        self.version = 0
         distance = None if probe is None else probe.distance
         self.centre = (0.0, 0.0, 0.0) if probe is None else probe.centre
-        self.texels = float(np.log2(radiance.shape[1] / 2))  # half the log2 of N^2/4 texels per unit area (4.17)
-        self._radiance = cube_texture(device, mip_chain(radiance))
+        self.irradiance = () if probe is None else probe.irradiance
         depth = np.full((6, 1, 1, 1), 1e-4, np.float32) if distance is None else inverse_depth(distance)
         self.depth_view = cube_texture(device, [depth], "r16float").create_view(dimension="cube")
-        self.radiance_view = self._radiance.create_view(dimension="cube")
         planes = np.zeros((0, 4), np.float32) if probe is None else np.asarray(probe.planes, np.float32)
         self.plane_count = -(-len(planes) // PLANE_STEP) * PLANE_STEP
         about_centre = np.zeros((max(1, self.plane_count), 4), np.float32)  # a zero plane is never approached
@@ -133,16 +135,25 @@ class Light:
         self.has_distance = distance is not None
 
     def replace_radiance(self, cube: Floats) -> None:
-        """Show other light, (6, N, N, 3) of the same N."""
-        self._radiance = cube_texture(self._device, mip_chain(finite(cube)[0]))
-        self.radiance_view, self._prefiltered = self._radiance.create_view(dimension="cube"), None
+        """Show other light, (6, N, N, 3)."""
+        self._radiance, self._cubes = cube, {}
+        self.version += 1
 
-    def view(self, prefiltered: bool) -> Any:
-        if not prefiltered:
-            return self.radiance_view
-        if self._prefiltered is None:
-            self._prefiltered = prefiltered_cube(self._device, self._radiance, self._sampler)
-        return self._prefiltered.create_view(dimension="cube")
+    def view(self, cube: Cube) -> Any:
+        return self._texture(cube).create_view(dimension="cube")
+
+    def half_log2_texels(self, cube: Cube) -> float:
+        """Half the log2 of texels per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17), of which a look-up blurs one."""
+        return float(np.log2(self._radiance.shape[1] / 2) - (np.log2(SMOOTH_AREA) / 2 if cube == "smooth" else 0))
+
+    def _texture(self, cube: Cube) -> Any:
+        if cube not in self._cubes:
+            if cube == "prefiltered":
+                self._cubes[cube] = prefiltered_cube(self._device, self._texture("box"), self._sampler)
+            else:
+                chain = smooth_chain if cube == "smooth" else mip_chain
+                self._cubes[cube] = cube_texture(self._device, chain(finite(self._radiance)[0]))
+        return self._cubes[cube]
 
     def lookup(self, wanted: str) -> str:
         """The look-up to use where `wanted` is "auto" or cannot be had: planes, else the distance map, else plain."""
@@ -189,22 +200,24 @@ class ObjectResources:
 
     def __init__(self, device: Any, layouts: Layouts, record: ObjectRecord, light: Light) -> None:
         self.record, self.light, self._layouts = record, light, layouts
-        data = np.zeros(1, OBJECT_DTYPE)
-        data["centre"][0] = (*light.centre, light.texels)
-        data["emission"][0, :3] = record.emission
-        self._uniform = device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
-        self._groups: dict[bool, Any] = {}
-        self._lit_by: Any = None  # the view that the groups hold
+        self._device = device
+        self._groups: dict[Cube, Any] = {}
+        self._version = light.version  # of the light that the groups hold
 
-    def group(self, prefiltered: bool) -> Any:
+    def group(self, cube: Cube) -> Any:
         light = self.light
-        if self._lit_by is not light.radiance_view:
-            self._lit_by, self._groups = light.radiance_view, {}
-        if prefiltered not in self._groups:
-            self._groups[prefiltered] = self._layouts.group(
-                self._layouts.object, self._uniform, light.planes, light.view(prefiltered), light.depth_view
+        if self._version != light.version:
+            self._version, self._groups = light.version, {}
+        if cube not in self._groups:
+            data = np.zeros(1, OBJECT_DTYPE)
+            data["centre"][0] = (*light.centre, light.half_log2_texels(cube))
+            data["emission"][0, :3] = self.record.emission
+            data["irradiance"][0, : len(light.irradiance)] = light.irradiance
+            uniform = self._device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
+            self._groups[cube] = self._layouts.group(
+                self._layouts.object, uniform, light.planes, light.view(cube), light.depth_view
             )
-        return self._groups[prefiltered]
+        return self._groups[cube]
 
 
 class SceneResources:

@@ -26,7 +26,7 @@ def test_ring_counts_add_up(n: int) -> None:
 def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, ggx: bool) -> None:
     pattern = patterns.ring_pattern(n, ggx)
     assert pattern.weight.mean() == pytest.approx(1)
-    r = np.linalg.norm(pattern.slopes, axis=-1) / patterns.STRETCH.get(n, 0.97)
+    r = np.linalg.norm(pattern.slopes, axis=-1) / patterns.ring_stretch(n)
     inside = r**2 / (1 + r**2) if ggx else 1 - np.exp(-(r**2))
     before, first = 0.0, 0
     for count in patterns.ring_counts(n):

@@ -101,7 +101,7 @@ class PlanarPass:
             record = draw.item.record
             render.set_pipeline(self._pipeline(draw))
             render.set_bind_group(1, draw.material_group)
-            render.set_bind_group(2, draw.item.group(False))
+            render.set_bind_group(2, draw.item.group(draw.integrator.cube))
             render.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
         render.end()
         return len(draws)
