@@ -68,6 +68,11 @@ class LightMapCache:
         light = reflected * this_side + transmitted * other_side
         return light * si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active) if self._textured else light
 
+    def irradiance(self, si: Any, active: Any) -> Any:
+        """Irradiance of the light map on the normal's side."""
+        uv2 = si.shape.eval_attribute_3(UV2_ATTRIBUTE, si, active)
+        return mi.Color3f(self._front.eval(mi.Point2f(uv2.x, uv2.y), active))
+
 
 def _texture(image: Array) -> Any:
     return mi.Texture2f(mi.TensorXf(image.astype(np.float32)), wrap_mode=dr.WrapMode.Clamp)

@@ -51,7 +51,7 @@ class Seen:
 
 def seen_from(mesh: Mesh, without: Any, count: int = RAYS) -> Seen:
     """Cosine distributed rays from points evenly spread over a mesh; `without` is the Mitsuba scene without it."""
-    points, normals = _spread(mesh, count)
+    points, normals = spread(mesh, count)
     local = cosine_hemisphere(r2(count))
     aside = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
     t = normalize(np.cross(aside, normals))
@@ -186,7 +186,7 @@ def _sub_mesh(mesh: Mesh, faces: Faces) -> Mesh:
     return Mesh(*arrays, renumbered.reshape(-1, 3).astype(np.uint32))
 
 
-def _spread(mesh: Mesh, count: int) -> tuple[Array, Array]:
+def spread(mesh: Mesh, count: int) -> tuple[Array, Array]:
     """Points and normals (count, 3), evenly over the area."""
     corners = mesh.positions[mesh.faces].astype(float)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -15,9 +15,21 @@ from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe import MIRROR_DEPTH, LightMapCache, Surroundings, bake_probe
 from lambent.bake.probe_centre import encloses, probe_centre
-from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from
+from lambent.bake.probe_modes import (
+    CLOSE,
+    OWN,
+    RAYS,
+    TRIAL_SAMPLES,
+    TRIAL_TEXELS,
+    WORTH,
+    Mirrored,
+    judged,
+    mirrored,
+)
+from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from, spread
 from lambent.bake.quality import Quality
 from lambent.bake.solids import SolidTest
+from lambent.bake.viewers import viewing_places
 
 Array = NDArray[np.floating]
 
@@ -50,17 +62,45 @@ class ProbeSet:
             self._left_out = names, self._builder.build(leave_out=names)
         return self._left_out[1]
 
+    @cached_property
+    def _places(self) -> Array:
+        return viewing_places(self._builder.scene, self._whole)
+
+    def _mirrored(self, name: str, seed: int) -> Mirrored | None:
+        """What viewers see mirrored in an object; None where that is too little, or light goes through it."""
+        scene = self._builder.scene
+        o = scene.object(name)
+        material = scene.materials[o.material]
+        if self._cache is None or material.transmits:
+            return None
+        points, normals = spread(o.mesh, RAYS)
+        lifted = points + normals * (CLOSE * float(np.ptp(o.mesh.positions, axis=0).max()))
+        own = [self._builder.meshes[part] for part in family(scene.parts, name)]
+        return mirrored(lifted, normals, self._places, material, self._whole, self._cache, MIRROR_DEPTH, own, seed)
+
+    def _better_held(self, rays: Mirrored, centre: Array, without: Any, seed: int) -> bool:
+        """Whether a probe that holds its object shows what it mirrors better than one without."""
+        errors = []
+        for first in (without, self._whole):
+            around = Surroundings(first, self._whole, self._cache, MIRROR_DEPTH)
+            trial = bake_probe(around, centre, TRIAL_TEXELS, TRIAL_SAMPLES, seed)
+            errors.append(judged(rays, trial, centre).best)
+        return errors[1] < WORTH * errors[0]
+
     def bake(self, name: str, quality: Quality, seed: int) -> tuple[dict[str, Array], dict[str, Any]]:
         """Arrays radiance, distance and planes of one object's probe, and what to note.
 
         Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
-        `hidden_share` and `parallax_deg` of `probe_parts`.
+        `hidden_share` and `parallax_deg` of `probe_parts`, `mirror_error` and `seen_irradiance` of `probe_modes`.
 
         Planes that the scene gives are taken as they are; others are found from what the probe sees.
         """
         without = self._without(frozenset(family(self._builder.scene.parts, name)))
         centre = probe_centre(self._builder, name, without, self._solids.within(without))
         left_out = not encloses(self._builder, name, centre, self._whole)
+        rays = self._mirrored(name, seed)
+        if left_out and rays is not None and rays.own.mean() > OWN:
+            left_out = not self._better_held(rays, centre, without, seed)
         seen = without if left_out else self._whole
         depth = quality.max_depth if self._cache is None else MIRROR_DEPTH
         around = Surroundings(seen, self._whole, self._cache, depth)
@@ -74,6 +114,12 @@ class ProbeSet:
         arrays = {"radiance": probe.radiance, "distance": probe.distance, "planes": planes}
         of_surface = seen_from(self._builder.scene.object(name).mesh, seen)
         meta = {"centre": [float(x) for x in centre], "object_left_out": left_out, "traced": self._cache is None}
+        if rays is not None:
+            about = planes.reshape(-1, 4) + np.outer(planes.reshape(-1, 4)[:, :3] @ centre, [0, 0, 0, 1])
+            found = judged(rays, probe, centre, about)
+            meta["mirror_error"] = round(found.best, 3)
+            if found.scales:
+                meta["seen_irradiance"] = [float(value) for value in found.irradiance]
         meta["hidden_share"] = round(hidden_share(of_surface, centre, seen), 3)
         meta["parallax_deg"] = round(parallax_deg(of_surface, centre, planes), 2)
         return arrays, meta

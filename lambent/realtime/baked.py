@@ -21,12 +21,17 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4)."""
+    """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4).
+
+    `irradiance`, nine numbers, is what the probe alone would give (`store.contract`), where the object is to be shown
+    only the share of it that its light map has.
+    """
 
     centre: tuple[float, float, float]
     radiance: Array
     distance: Array | None = None
     planes: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+    irradiance: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +119,13 @@ def read_baked(store: Store) -> BakedScene:
 
 
 def _probe(store: Store, name: str, radiance: Array) -> Probe:
-    x, y, z = store.artefact(contract.probe_name(name, "radiance")).meta["centre"]
+    meta = store.artefact(contract.probe_name(name, "radiance")).meta
+    x, y, z = meta["centre"]
     distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))
     return Probe(
         (float(x), float(y), float(z)),
         radiance,
         store.read(distance) if distance in store else None,
         store.read(planes).reshape(-1, 4) if planes in store else np.zeros((0, 4), np.float32),
+        contract.probe_irradiance(meta),
     )

@@ -28,7 +28,7 @@ MATERIAL_DTYPE = np.dtype(  # Material in shaders/material.wgsl
         ("lie", "f4", (2 * len(PARTS), 4)),
     ]
 )  # fmt: skip
-OBJECT_DTYPE = np.dtype([("centre", "f4", 4), ("emission", "f4", 4)])
+OBJECT_DTYPE = np.dtype([("centre", "f4", 4), ("emission", "f4", 4), ("irradiance", "f4", 12)])
 
 
 def lobe_data(lobes: tuple[Lobe, ...]) -> NDArray[np.void]:

@@ -9,7 +9,11 @@
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before they were denoised; may be absent
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
-    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] with OBJECT left out
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], OBJECT left out where
+                                           meta["object_left_out"]; meta["seen_irradiance"], may be absent: luminance of
+                                           the irradiance it would give, as a sum over 1, x, y, z, xy, yz, 3zz - 1, xz,
+                                           xx - yy of the normal; its light is to be scaled by the share of that
+                                           that the light map has, at most 1
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
@@ -20,10 +24,12 @@ The scene record (cameras, materials, objects...) is the document "scene"; times
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.store.store import Store
 
@@ -112,6 +118,14 @@ class SceneRecord(_Record):
 def probe_name(object_name: str, part: str) -> str:
     """Name of a probe's array; `part` is radiance, distance or planes."""
     return f"probe/{object_name}/{part}"
+
+
+def probe_irradiance(meta: Mapping[str, Any]) -> tuple[float, ...]:
+    """What a probe alone would give (see the head), where the light map is to scale it; else nothing."""
+    found = meta.get("seen_irradiance", [])
+    if not isinstance(found, list) or len(found) not in (0, 9):
+        raise UserError("broken store", field="seen_irradiance", got=found, expected="nine numbers")
+    return tuple(float(value) for value in found)
 
 
 def noise_name(side: str) -> str:

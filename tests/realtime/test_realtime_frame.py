@@ -117,6 +117,20 @@ def test_back_of_a_reflector_reflects_its_own_side(device) -> None:
         np.testing.assert_allclose(image, expected, rtol=0.02)
 
 
+def test_a_niche_is_shown_the_share_of_the_probe_that_its_light_map_has(device) -> None:
+    glossy = Material(name="m", lobes=(Lobe(mx=0.2, my=0.2, r0=1.0, alpha=0.5),))
+    scene = wall_scene(glossy, np.ones((6, 8, 8, 3), np.float32), irradiance=(np.pi / 4,) * 3)
+
+    def shown(*irradiance: float) -> np.ndarray:
+        probes = {name: replace(probe, irradiance=irradiance) for name, probe in scene.probes.items()}
+        return Renderer(device, replace(scene, probes=probes)).image(FrameState(CAMERA, 16, 12, antialias=False))
+
+    whole = shown()
+    np.testing.assert_allclose(shown(np.pi, *[0] * 8), whole / 4, rtol=2e-3)
+    np.testing.assert_allclose(shown(np.pi / 8, *[0] * 8), whole, rtol=2e-3)  # never more than the probe has
+    np.testing.assert_allclose(shown(np.pi / 3, 0, 0, np.pi / 3, 0, 0, np.pi / 6, 0, 0), whole / 4, rtol=2e-3)
+
+
 def test_show_splits_the_light(device) -> None:
     both = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.2, my=0.2),))
     scene = baked_scene(sphere_and_torus(), both, studio(32), irradiance=(1, 1, 1))

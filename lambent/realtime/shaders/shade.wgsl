@@ -32,12 +32,12 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let along = brushed - n * dot(n, brushed);
     let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
     let t = normalize(select(cross(n, other), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown);
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0);
 }
 
 fn surface_light(v: Varyings, front: bool) -> vec3f {
     let view = normalize(frame.eye.xyz - v.p_world);
-    let s = shading_frame(v, select(-1.0, 1.0, front), view);
+    var s = shading_frame(v, select(-1.0, 1.0, front), view);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
 
     let e_front = textureSampleLevel(light_map, linear_sampler, v.uv2, 0.0).rgb;
@@ -47,6 +47,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     let diffuse = diffuse_light(wo.z, e_here, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
+    s.open = open_share(s.n, e_here);
     let specular = specular_light(wo, s);
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return clamp(light, vec3f(0.0), vec3f(HALF_MAX));

@@ -19,6 +19,7 @@ struct PlacedLobe {
 struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
+    irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
@@ -38,6 +39,7 @@ struct Surface {
     x: vec3f,      // position about the probe's centre
     pixel: vec2u,
     painted: Painted,
+    open: f32,     // share of the probe's light that reaches the pixel
 }
 
 // A lobe where the pictures have changed its numbers: the samples, of slopes of the material's mx and my, grow by
@@ -126,6 +128,15 @@ fn to_world(s: Surface, w: vec3f) -> vec3f {
     return w.x * s.t + w.y * s.b + w.z * s.n;
 }
 
+// Near things hide from a niche most of what the probe sees. The irradiance of the light map, e, knows how much; the
+// probe's own is known to the second band of harmonics (bake/probe_modes.py).
+fn open_share(n: vec3f, e: vec3f) -> f32 {
+    let i = object.irradiance;
+    let whole = dot(i[0], vec4f(1.0, n)) + dot(i[1], vec4f(n.xy * n.yz, 3.0 * n.z * n.z - 1.0, n.x * n.z))
+        + i[2].x * (n.x * n.x - n.y * n.y);
+    return select(1.0, clamp(dot(e, vec3f(0.2126, 0.7152, 0.0722)) / max(whole, 1e-6), 0.0, 1.0), whole > 0.0);
+}
+
 // Light from local direction w, averaged over the solid angle omega sr; half_log2_omega = log2(omega)/2.
 // On the cube that is omega t^2/d^2 (seen from the probe, d away) / cos b^3 texels (4.16, 4.17), cos b = max|w|/|w|.
 fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
@@ -133,12 +144,12 @@ fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     let major = max_norm(found.direction);
     let stretch = found.t * found.t * length(found.direction) / (major * major * major);
     let level = half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w;
-    return textureSampleLevel(radiance_cube, linear_sampler, found.direction, max(level, 0.0)).rgb;
+    return s.open * textureSampleLevel(radiance_cube, linear_sampler, found.direction, max(level, 0.0)).rgb;
 }
 
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
     let found = find(s.x, to_world(s, w));
-    return textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+    return s.open * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // A sample of a lobe: wi is wo mirrored about the half vector h; not `seen` where the lobe does not go.

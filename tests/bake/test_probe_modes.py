@@ -1,0 +1,94 @@
+"""Probes of hollow and of round things, and how their error is measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.probe_modes import Mirrored, basis_of, by_planes, error, irradiance_of, open_share
+from lambent.core.cubemap import face_directions
+from lambent.core.frames import normalize
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.geometry import merge, patch, sphere
+from lambent.scenes.scene import Camera, ImageEnvironment, Scene, SceneObject
+from tests.bake.small_scenes import TINY, constant_picture
+
+PAINT = Material(kd=0.5, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.04),))
+
+
+def rays(**given: object) -> Mirrored:
+    one = np.array([[0.0, 0.0, 1.0]])
+    values = {"origins": 0 * one, "directions": one, "normals": one, "radiance": one * 0 + 1.0}
+    scalars = {"irradiance": np.ones(1), "share": np.ones(1), "own": np.zeros(1, bool)}
+    return Mirrored(**{**values, **scalars, **given})
+
+
+def test_irradiance_of_a_cube_against_its_integral() -> None:
+    w = normalize(face_directions(64))
+    n = normalize(np.random.default_rng(0).normal(size=(50, 3)))
+    even = irradiance_of(np.full((6, 16, 16, 3), 2.0))
+    assert np.allclose(basis_of(n) @ even, 2 * np.pi, rtol=2e-3)
+    a = normalize(np.array([1.0, 2.0, -2.0]))
+    linear = irradiance_of(np.repeat((w @ a)[..., None], 3, axis=-1))  # L = a.w: E = 2 pi/3 a.n
+    assert np.allclose(basis_of(n) @ linear, 2 * np.pi / 3 * (n @ a), atol=5e-3)
+    squared = irradiance_of(np.repeat((w @ a)[..., None] ** 2, 3, axis=-1))  # E = pi/4 (1 + (a.n)^2)
+    assert np.allclose(basis_of(n) @ squared, np.pi / 4 * (1 + (n @ a) ** 2), atol=5e-3)
+
+
+def test_error_and_share_by_hand() -> None:
+    assert error(rays(), np.ones(1)) == pytest.approx(0, abs=1e-4)
+    assert error(rays(), np.full(1, 3.0)) == pytest.approx(np.log(2), abs=1e-3)  # log((1 + 3)/(1 + 1))
+    whole = np.array([4.0, *[0] * 8])
+    assert open_share(rays(), whole) == pytest.approx(0.25) and open_share(rays(), whole / 100) == pytest.approx(1)
+
+
+def test_planes_turn_the_look_up_as_the_renderer_does() -> None:
+    cube = np.zeros((6, 64, 64, 3))
+    cube[0] = 1.0  # +x
+    slanted = normalize(np.array([[1.0, 0.0, 1.2]]))
+    wall = np.array([[-1.0, 0.0, 0.0, 2.0]])  # x = 2
+    beside = rays(origins=np.array([[0.0, 0.0, -2.0]]), directions=slanted)
+    assert by_planes(beside, cube, np.zeros(3), wall[:0])[0] == 0, "without planes it looks to +z"
+    assert by_planes(beside, cube, np.zeros(3), wall)[0] == pytest.approx(1, abs=1e-4), "the wall at (2, 0, .4)"
+
+
+def well(folder: Path) -> Scene:
+    """A pit of five painted walls, 1 m wide and 2 m deep, under a sky of radiance 1, and a painted ball above it."""
+    walls = [
+        patch((-0.5, -2, 0.5), (1, 0, 0), (0, 0, -1)),
+        patch((-0.5, -2, -0.5), (1, 0, 0), (0, 2, 0)),
+        patch((0.5, -2, 0.5), (-1, 0, 0), (0, 2, 0)),
+        patch((-0.5, -2, 0.5), (0, 0, -1), (0, 2, 0)),
+        patch((0.5, -2, -0.5), (0, 0, 1), (0, 2, 0)),
+    ]
+    objects = (
+        SceneObject("well", merge(walls), "paint"),
+        SceneObject("ball", sphere(0.2, 24, 12), "paint"),
+    )
+    camera = Camera("above", (0.0, 2.0, 0.3), (0.0, 0.0, 0.0))
+    return Scene("pit", objects, {"paint": PAINT}, environment=ImageEnvironment(constant_picture(folder)),
+                 cameras=(camera,))  # fmt: skip
+
+
+def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
+    scene = well(tmp_path)
+    scene = replace(scene, objects=scene.objects[:1])
+    store = bake(scene, tmp_path / "s", quality=replace(TINY, light_map_samples=(256, 256)))
+    meta = store.artefact("probe/well/radiance").meta
+    if meta["object_left_out"]:  # then the probe sees the sky alone
+        assert meta["seen_irradiance"][0] == pytest.approx(np.pi, rel=0.01)
+        assert np.abs(meta["seen_irradiance"][1:]).max() < 0.02
+    assert "seen_irradiance" in meta or not meta["object_left_out"]
+    assert meta["mirror_error"] < 0.3
+
+
+def test_a_ball_in_the_open_keeps_all_its_light(tmp_path: Path) -> None:
+    scene = well(tmp_path)
+    store = bake(replace(scene, objects=scene.objects[1:]), tmp_path / "s", quality=TINY)
+    meta = store.artefact("probe/ball/radiance").meta
+    assert meta["object_left_out"] and "seen_irradiance" not in meta
+    assert meta["mirror_error"] < 0.01
