@@ -124,7 +124,6 @@ class Light:
         distance = None if probe is None else probe.distance
         self.centre = (0.0, 0.0, 0.0) if probe is None else probe.centre
         self.irradiance = () if probe is None else probe.irradiance
-        self.irradiance = () if probe is None else probe.irradiance
         depth = np.full((6, 1, 1, 1), 1e-4, np.float32) if distance is None else inverse_depth(distance)
         self.depth_view = cube_texture(device, [depth], "r16float").create_view(dimension="cube")
         planes = np.zeros((0, 4), np.float32) if probe is None else np.asarray(probe.planes, np.float32)
@@ -213,7 +212,6 @@ class ObjectResources:
             data = np.zeros(1, OBJECT_DTYPE)
             data["centre"][0] = (*light.centre, light.half_log2_texels(cube))
             data["emission"][0, :3] = self.record.emission
-            data["irradiance"][0, : len(light.irradiance)] = light.irradiance
             data["irradiance"][0, : len(light.irradiance)] = light.irradiance
             uniform = self._device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
             self._groups[cube] = self._layouts.group(
