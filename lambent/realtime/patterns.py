@@ -71,9 +71,9 @@ class Pattern:
 def ring_pattern(n: int, ggx: bool = False) -> Pattern:
     """A centre and staggered rings, each ring where half of its mass lies inside.
 
-    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe. Filters of .6 of what
-    would cover the lobe are the sharpest and leave the highlight of a small lamp in pieces, one per sample; those of
-    `ring_bias` leave it nearly whole, and rings drawn in by `STRETCH` keep the lobe as wide as it is.
+    All samples of the rings carry the same mass, the centre more: by experiment 1.8/n of the lobe. Filters of .6 of
+    what would cover the lobe are the sharpest and leave the highlight of a small lamp in pieces, one per sample; those
+    of `ring_bias` leave it nearly whole, and rings drawn in by `ring_stretch` keep the lobe as wide as it is.
     """
     counts = ring_counts(n)
     centred = counts[0] == 1 and n > 1
