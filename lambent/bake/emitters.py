@@ -24,7 +24,11 @@ FLOOR = 0.1  # of the mean weight: no emitter is left out, what the pilot did no
 
 
 def balance_emitters(builder: SceneBuilder) -> None:
-    """Set the sampling weights of a builder's emitters, for the scenes it builds from now on. Deterministic."""
+    """Set the sampling weights of a builder's emitters, for the scenes it builds from now on. Deterministic.
+
+    The environment is guided first (`sky_guide`): what it brings then depends on how it is sampled.
+    """
+    builder.guide_sky()
     emitters = builder.emitters()
     if len(emitters) < 2:
         return

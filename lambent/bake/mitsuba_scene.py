@@ -91,6 +91,17 @@ class SceneBuilder:
         found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._lights
         return [*found, self._environment] if self._environment is not None else found
 
+    def guide_sky(self) -> None:
+        """Have the environment sampled by where it is seen, in scenes built from now on, unless that is of no use."""
+        from lambent.bake.guided_sky import guided_sky
+        from lambent.bake.sky_guide import learn
+
+        if self._environment is not None:
+            whole = self.build()
+            guide = learn(self.scene, whole, self._environment)
+            if guide is not None:
+                self._environment = guided_sky(self._environment, guide, whole.bbox())
+
     def weigh_emitters(self, weights: Array) -> None:
         """Set how often each of `emitters()` is chosen, relative to the others, in scenes built from now on."""
         import mitsuba as mi

@@ -104,6 +104,13 @@ def hidden(scene: Any, si: Any, ds: Any, active: Any, holes: bool) -> Any:
     return _blocked(scene, ray, mi.Point3f(ds.p), mi.Bool(active)) if holes else scene.ray_test(ray, active)
 
 
+def in_shadow(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
+    """Whether anything without a hole stands in the way of a ray. `holes` is `has_holes(scene)`."""
+    if not holes:
+        return scene.ray_test(ray, active)
+    return intersect(scene, ray, active, True).is_valid()
+
+
 @dr.syntax
 def _blocked(scene, ray, target, active):  # type: ignore[no-untyped-def]
     blocked = mi.Bool(False)
@@ -134,9 +141,11 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  
         active &= si.is_valid() & (depth < max_depth)
         result += dr.select(active, throughput * cache(si, active), 0.0)
 
+        at = mi.SurfaceInteraction3f(si)  # whose normal is on the ray's side: a guided sky asks which side is lit
+        at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)
         bsdf = si.bsdf(ray)
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, value = scene.sample_emitter_direction(si, sampler.next_2d(active), False, lit)
+        ds, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, lit)
         lit &= ds.pdf > 0
         wo = si.to_local(ds.d)
         f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
@@ -149,7 +158,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  
         result += dr.select(lit, brought, 0.0)
 
         throughput *= f_sample
-        origin = mi.SurfaceInteraction3f(si)
+        origin = mi.SurfaceInteraction3f(at)
         pdf = mi.Float(sample.pdf)
         direct = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         ray = si.spawn_ray(si.to_world(sample.wo))

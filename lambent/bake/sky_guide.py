@@ -1,0 +1,243 @@
+"""Where the sky is seen from: what a cheap pilot learns, so that rooms lit through windows are sampled by the windows.
+
+Surfaces are sorted by where they are (a regular grid) and by which way their lit side faces (six ways), so that both
+sides of a wall keep apart; of a sheet that light crosses either side knows the light of both. For each such group rays
+from some of its points find how much light each bin of directions (`sky_bins`) brings, the cosine included; the
+group's table draws bins in proportion to the root of its mean square, which has the least variance. Groups that see
+nearly all of their sky, or none, share one table: there the environment is sampled by its luminance alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake import paths
+from lambent.bake.sky_bins import BINS, COLUMNS, ROWS, SkyBins, middles
+from lambent.bake.work import seed_of
+from lambent.core.frames import normalize
+from lambent.scenes.scene import Scene
+
+Array = NDArray[np.floating]
+Indices = NDArray[np.integer]
+CELL_M, MOST_CELLS, MOST_TABLES = 0.5, 1 << 16, 4096
+SURFACE_POINTS = 1 << 18
+POINTS = 128  # of a group, that rays start from
+FIRST = 1  # ray per bin to see which groups need a table
+RAYS, LEAST = 4096, 16  # for a table: shared out by the light of the bins, and at least for each bin
+OPEN = 0.9  # share of the light of its hemisphere that a group sees: from here on it needs no table
+FEW = 0.2  # of the groups that see any sky: where fewer need a table, there is no guide
+DEFENSIVE = 0.15  # of a table's samples go by luminance alone: what the pilot has missed is not lost
+EVERYWHERE = 0.01  # of those go anywhere: no direction is left out
+SPREAD = 0.4  # of what a bin brings comes from the eight around it
+RAYS_AT_ONCE = 1 << 20
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Surfaces by place and way: cells of `size_m` from `low`, `shape` of them along x, y, z, six ways each."""
+
+    low: Array
+    size_m: float
+    shape: tuple[int, int, int]
+
+    def of(self, position: Any, normal: Any) -> Any:
+        """Number (mi.UInt32) of the group that points (mi.Point3f) with normals belong to."""
+        cell = [
+            dr.clip(mi.Int32(dr.floor((p - float(low)) * (1 / self.size_m))), 0, n - 1)
+            for p, low, n in zip((position.x, position.y, position.z), self.low, self.shape, strict=True)
+        ]
+        size = dr.abs(normal)
+        axis = dr.select((size.x >= size.y) & (size.x >= size.z), 0, dr.select(size.y >= size.z, 1, 2))
+        along = dr.select(axis == 0, normal.x, dr.select(axis == 1, normal.y, normal.z))
+        way = 2 * mi.UInt32(axis) + dr.select(along < 0, mi.UInt32(1), mi.UInt32(0))
+        place = mi.UInt32((cell[0] * self.shape[1] + cell[1]) * self.shape[2] + cell[2])
+        return place * 6 + way
+
+    @property
+    def count(self) -> int:
+        return int(np.prod(self.shape)) * 6
+
+
+def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
+    """The grid over a scene's bounds; its cells are as small as asked for, or as MOST_CELLS allow."""
+    low, high = (np.asarray(corner, float) for corner in scene.bounds)
+    size_m = max(size_m, float(np.prod(np.maximum(high - low, size_m)) / MOST_CELLS) ** (1 / 3))
+    while True:
+        shape = np.maximum(np.ceil((high - low) / size_m + 1e-6), 1).astype(int)
+        if shape.prod() <= MOST_CELLS:
+            return Groups(low, size_m, (int(shape[0]), int(shape[1]), int(shape[2])))
+        size_m *= 1.1
+
+
+class SkyGuide:
+    """What was learnt: a table of bins for each group that needs one; table 0 is for all that need none.
+
+    table (groups,) int: number of a group's table; shares (tables, BINS) of each table's samples.
+    """
+
+    def __init__(self, bins: SkyBins, groups: Groups, table: Indices, shares: Array) -> None:
+        self.bins, self.groups, self.shares = bins, groups, shares
+        self._table = mi.UInt32(table.astype(np.uint32))
+        cumulative = np.cumsum(shares, axis=1)
+        cumulative[:, -1] = 2  # rounding must not lead beyond the last
+        self._cumulative = mi.Float(cumulative.astype(np.float32).ravel())
+        self._share = mi.Float(shares.astype(np.float32).ravel())
+
+    def table_at(self, position: Any, normal: Any, active: Any = True) -> Any:
+        """Number of the table (mi.UInt32) at points of surfaces."""
+        return dr.gather(mi.UInt32, self._table, self.groups.of(position, normal), active)
+
+    def sample(self, table: Any, u: Any, active: Any = True) -> Any:
+        """Unit directions by tables."""
+        first = table * BINS
+        number = dr.binary_search(
+            0, BINS - 1, lambda i: dr.gather(mi.Float, self._cumulative, first + mi.UInt32(i), active) <= u.x
+        )
+        number = mi.UInt32(number)
+        share = dr.gather(mi.Float, self._share, first + number, active)
+        below = dr.gather(mi.Float, self._cumulative, first + dr.maximum(number, 1) - 1, active & (number > 0))
+        rest = dr.clip((u.x - below) / dr.maximum(share, 1e-12), 0, dr.one_minus_epsilon(mi.Float))
+        return self.bins.direction(number, mi.Point2f(rest, u.y))
+
+    def pdf(self, table: Any, w: Any, active: Any = True) -> Any:
+        """Density of `sample`, sr^-1."""
+        number, density = self.bins.find(w)
+        return dr.gather(mi.Float, self._share, table * BINS + number, active) * density
+
+
+def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> SkyGuide | None:
+    """The guide of a scene, None where no group needs a table. Deterministic.
+
+    Parameters
+    ----------
+    whole : mi.Scene
+        The scene as it is traced.
+    sky : mi.Emitter
+        Its environment.
+    keep_open : bool
+        Tables also for groups that see most of their sky.
+    """
+    bins = SkyBins(sky)
+    if not bins.luminance.any():
+        return None
+    size_m = CELL_M
+    while True:
+        groups = groups_of(scene, size_m)
+        pilot = _Pilot(whole, bins, _both_sides(whole, *surface_points(scene, SURFACE_POINTS)), groups)
+        if len(pilot.group) <= 4 * MOST_TABLES:
+            break
+        size_m = groups.size_m * 1.5
+    first = pilot.brought(np.arange(len(pilot.group)), np.full(BINS, FIRST), "first")
+    lit = (first[0] > 0).any(axis=1)
+    wanted = np.flatnonzero(lit & (keep_open | ~pilot.sees_most(first[0])))[:MOST_TABLES]
+    if len(wanted) <= FEW * lit.sum():
+        return None
+    light = bins.luminance / bins.luminance.sum()
+    more = pilot.brought(wanted, np.ceil(np.maximum(LEAST, RAYS * light)).astype(int), "more")
+    squares = np.where(more[1] > 0, more[1], first[1][wanted] * FIRST / RAYS)
+    shares = _spread(np.sqrt(squares)) * bins.luminance
+    plain = light * (1 - EVERYWHERE) + EVERYWHERE / BINS
+    shares = DEFENSIVE * plain + (1 - DEFENSIVE) * shares / shares.sum(axis=1, keepdims=True)
+    table = np.zeros(groups.count, int)
+    table[pilot.group[wanted]] = 1 + np.arange(len(wanted))
+    return SkyGuide(bins, groups, table, np.concatenate([plain[None], shares]))
+
+
+class _Pilot:
+    """Points by group, and rays from them."""
+
+    def __init__(
+        self, whole: Any, bins: SkyBins, points: tuple[Array, Array, NDArray[np.bool_]], groups: Groups
+    ) -> None:
+        self._whole, self._bins, self._holes = whole, bins, paths.has_holes(whole)
+        position, normal, crossed = points
+        number = np.array(groups.of(_vector(mi.Point3f, position), _vector(mi.Vector3f, normal)))
+        order = np.argsort(number, kind="stable")
+        self.group, start, count = np.unique(number[order], return_index=True, return_counts=True)
+        which = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
+        chosen = order[which]  # (groups, POINTS), spread evenly over those of the group
+        self._position, self._normal, self._crossed = position[chosen], normal[chosen], crossed[chosen]
+
+    def brought(self, which: Indices, rays: Indices, what: str) -> tuple[Array, Array]:
+        """Means (n, BINS) over rays (BINS,) of the cosine where the sky is seen, and of its square."""
+        means, squares = np.zeros((2, len(which), BINS))
+        number = np.repeat(np.arange(BINS), rays)
+        first = np.cumsum(rays) - rays
+        turn = np.arange(len(number)) - first[number]  # of a ray among those of its bin
+        point = (turn * POINTS // np.maximum(rays[number], POINTS) + turn + 7 * number) % POINTS
+        at_once = max(1, RAYS_AT_ONCE // len(number))
+        for start in range(0, len(which), at_once):
+            mine = slice(start, start + at_once)
+            cosine = self._cosines(which[mine], number, point, seed_of(0, "sky guide", what, start))
+            means[mine] = np.add.reduceat(cosine, first, axis=1) / rays
+            squares[mine] = np.add.reduceat(cosine**2, first, axis=1) / rays
+        return means, squares
+
+    def _cosines(self, which: Indices, number: Indices, point: Indices, seed: int) -> Array:
+        """(n, rays) of rays in bins `number` from the groups' `point`s; 0 where the sky is hidden."""
+        rays, width = len(number), len(which) * len(number)
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(seed, width)
+        thread = dr.arange(mi.UInt32, width)
+        place = thread // rays * POINTS + dr.gather(mi.UInt32, mi.UInt32(point.astype(np.uint32)), thread % rays)
+        bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), thread % rays)
+        w = self._bins.direction(bins, sampler.next_2d())
+        si = dr.zeros(mi.SurfaceInteraction3f, width)
+        si.p = dr.gather(mi.Point3f, _vector(mi.Point3f, self._position[which].reshape(-1, 3)), place)
+        si.n = mi.Normal3f(dr.gather(mi.Vector3f, _vector(mi.Vector3f, self._normal[which].reshape(-1, 3)), place))
+        dark = paths.in_shadow(self._whole, si.spawn_ray(w), mi.Bool(True), self._holes)
+        crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
+        cosine = dr.dot(w, si.n)
+        cosine = dr.select(crossed, dr.abs(cosine), dr.maximum(cosine, 0.0))
+        return np.array(dr.select(dark, 0.0, cosine)).reshape(len(which), rays)
+
+    def sees_most(self, brought: Array) -> NDArray[np.bool_]:
+        """Groups that see most of the light of the hemisphere that they face."""
+        light = self._bins.luminance
+        cosine = np.maximum(normalize(self._normal.mean(axis=1)) @ middles().T, 0)
+        return np.asarray((np.where(cosine > 0, brought, 0) @ light) >= OPEN * (cosine @ light))
+
+
+def surface_points(scene: Scene, count: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Points (count, 3) on a scene's surfaces, normals of their triangles, and whether light crosses there."""
+    rng = np.random.default_rng(0)
+    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    share = np.sqrt(area / area.sum())  # between area and number: small things are not forgotten
+    face = np.sort(rng.choice(len(area), size=count, p=share / share.sum()))
+    weights = rng.dirichlet((1, 1, 1), size=count)
+    crossed = [o.material in scene.measured or scene.materials[o.material].transmits for o in scene.objects]
+    crossed_there = np.repeat(crossed, [len(o.mesh.faces) for o in scene.objects])[face]
+    return np.einsum("kcx,kc->kx", corners[face], weights), normalize(cross[face]), crossed_there
+
+
+def _both_sides(
+    whole: Any, position: Array, normal: Array, crossed: NDArray[np.bool_]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The points, and those again, turned round, whose other side is not within a solid: what lies there faces them."""
+    si = dr.zeros(mi.SurfaceInteraction3f, len(position))
+    si.p, si.n = _vector(mi.Point3f, position), _vector(mi.Normal3f, normal)
+    behind = whole.ray_intersect(si.spawn_ray(-si.n))
+    inside = behind.is_valid() & (dr.dot(behind.n, si.n) < 0)
+    sheet = np.flatnonzero(~np.array(inside))
+    both = np.concatenate([np.arange(len(position)), sheet])
+    turned = np.concatenate([normal, -normal[sheet]])
+    return position[both], turned, crossed[both]
+
+
+def _spread(brought: Array) -> Array:
+    grid = np.pad(brought.reshape(-1, ROWS, COLUMNS), ((0, 0), (1, 1), (0, 0)), mode="edge")
+    grid = np.concatenate([grid[..., -1:], grid, grid[..., :1]], axis=2)
+    around = sum(grid[:, r : r + ROWS, c : c + COLUMNS] for r in range(3) for c in range(3) if (r, c) != (1, 1))
+    return (1 - SPREAD) * brought + SPREAD / 8 * np.asarray(around).reshape(len(brought), BINS)
+
+
+def _vector(kind: Any, array: Array) -> Any:
+    return kind(np.ascontiguousarray(array.T, dtype=np.float32))
