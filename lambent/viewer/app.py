@@ -86,6 +86,9 @@ def run(
         raise
     finally:
         pictures.close(state)
+        kept = state.keep_recording()
+        if kept is not None:
+            sys.stderr.write(f"lambent: note: the recorded walk was saved as {kept!r}\n")
     if state.unsaved:
         sys.stderr.write(f"lambent: note: {', '.join(state.unsaved)} changed and not saved\n")
 

@@ -64,7 +64,8 @@ class Meter:
     """What the window's meter shows. `wanted`: somebody looks at it, so that it is worth reading."""
 
     wanted: bool = False
-    fit_wanted: bool = True  # the range of false colour is to be fitted as soon as there is a reading
+    fit_wanted: bool = False  # the range of false colour is to be fitted as soon as there is a reading
+    fitted: set[bool] = field(default_factory=set)  # which ranges have been: of noise (True), of light (False)
     expose_wanted: bool = False  # so is the exposure
     reading: Reading | None = None
     cursor: tuple[float, float] | None = None  # of the mouse, as shares of the picture

@@ -39,6 +39,7 @@ class Resolution:
     def __init__(self, scale: float) -> None:
         self.scale = scale
         self._late = 0  # frames that took too long although no fewer pixels can be drawn
+        self._probe_at = PROBE_FRAMES  # of those
         self._times: dict[float, float] = {}  # seconds by scale
         self._fixed_s = self._pixels_s = 0.0  # of a frame of no pixels, and of all pixels besides
 
@@ -67,7 +68,8 @@ class Resolution:
             self.scale = fits_well
         elif seconds > budget_s:
             self._late += 1
-            if self._late % PROBE_FRAMES == 0:  # what more pixels cost may have been learnt from a stall
+            if self._late == self._probe_at:  # what more pixels cost may have been learnt from a stall
+                self._probe_at *= 4  # but each probe is seen: rarer from time to time
                 self.scale = SCALES[max(0, SCALES.index(self.scale) - 1)]
                 self._times = {scale: time for scale, time in self._times.items() if scale < self.scale}
 

@@ -152,6 +152,8 @@ class Pictures:
         if a.radiance is None:
             return
         stale = a.version != self._read_version and now_s - self._read_s >= METER_S
+        if is_false_coloured(state) and shows_noise(state) not in meter.fitted:
+            meter.fit_wanted = True  # for the first time
         asked = meter.expose_wanted or (meter.fit_wanted and is_false_coloured(state))
         if (meter.wanted and stale) or asked:
             meter.reading = read(read_picture(self.device, a.radiance), shown_quantity(state))
@@ -177,6 +179,7 @@ class Pictures:
         if meter.fit_wanted and is_false_coloured(state) and meter.reading is not None:
             set_shown_scale(state, meter.reading.ranges[0 if shown_scale(state).log else 1])
             meter.fit_wanted = False
+            meter.fitted.add(shows_noise(state))
         meter.expose_wanted = False
 
     # films

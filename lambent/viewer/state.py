@@ -314,6 +314,20 @@ class ViewerState:
             self.scrub(added, 0.0)
             self.say(f"saved the path {added.name}")
 
+    def keep_recording(self) -> str | None:
+        """Save what was recorded and not yet saved, because the window closes; returns the path's name."""
+        if self.recorder.on:
+            self.record()
+        draft = self.recorder.draft
+        if self.views is None or draft is None:
+            return None
+        before = {path.name for path in self.views.all.paths}
+        if not self.recorder.name.strip() or self.recorder.name in before:
+            self.recorder.name = self.views.free_path_name()
+        self.save_recording()
+        added = [path.name for path in self.views.all.paths if path.name not in before]
+        return added[0] if added else None
+
     def drop_recording(self) -> None:
         """Forget the draft."""
         if self.path is not None and self.path.path == self.recorder.draft:

@@ -152,3 +152,13 @@ def test_a_stall_at_the_start_is_forgotten():
         p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
         seen.append(p.moving_scale)
     assert set(seen[-20:]) == {seen[-1]} and seen[-1] >= 0.35
+
+
+def test_an_adapter_that_is_too_slow_is_left_alone():
+    """A frame takes 60 ms whatever its size, and 800 ms per full picture: larger ones are tried ever less often."""
+    p = pacer(slow_adapter=True)
+    scales = []
+    for _ in range(300):
+        scales.append(p.moving.scale)
+        p.cost(p.moving, 0.06 + 0.8 * p.moving.scale**2)
+    assert set(scales[100:]) <= {0.18, 0.25} and scales[100:].count(0.25) <= 2

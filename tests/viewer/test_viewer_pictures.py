@@ -72,15 +72,18 @@ def test_the_noise_of_the_light_map_is_shown_in_percent(renderer):
 
 def test_noise_has_a_range_of_its_own(renderer, state):
     pictures = Pictures(Renderer(renderer.device, replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32))))
-    state.show, state.meter.wanted, state.meter.fit_wanted = "noise", True, False
+    state.show, state.meter.wanted = "noise", True
     drawn(pictures, state)
     before = state.scale
     assert state.meter.reading.log_mean == pytest.approx(12.5, rel=1e-3), "black is left out"
-    state.meter.fit_wanted = state.meter.expose_wanted = True
+    state.noise_scale, state.meter.fit_wanted, state.meter.expose_wanted = Range(1, 2), True, True
     exposure_ev = state.exposure_ev
     drawn(pictures, state)
     assert state.noise_scale == state.meter.reading.ranges[0] and state.scale == before
     assert state.exposure_ev == exposure_ev, "noise sets no exposure"
+    state.show, state.view_transform = "full", "false-colour"
+    drawn(pictures, state)
+    assert state.scale == state.meter.reading.ranges[0] != before, "that of light is fitted when it is first shown"
 
 
 def test_near_things_are_cut_away(renderer):

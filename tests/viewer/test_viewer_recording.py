@@ -94,6 +94,20 @@ def test_record_save_rename_delete(state, tmp_path):
     assert state.views.delete_path("there") and read_views(tmp_path).paths == ()
 
 
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_recording_is_kept_when_the_window_closes(state, tmp_path, stopped):
+    assert state.keep_recording() is None
+    state.record()
+    for k in range(1, 20):
+        state.now_s, state.camera = 0.1 * k, at(0.1 * k)
+        state.recorder.take(state.camera, state.now_s)
+    if stopped:
+        state.record()
+        state.recorder.name = "tour"  # taken
+    name = state.keep_recording()
+    assert name == "walk 1" and [p.name for p in read_views(tmp_path).paths] == [name]
+
+
 def test_a_recording_ends_by_itself(state):
     state.record()
     assert not state.recorder.take(at(1), 1.0)

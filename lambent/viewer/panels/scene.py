@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import imgui
 
 from lambent.viewer.panels import recording
@@ -10,6 +12,7 @@ from lambent.viewer.state import ViewerState
 
 TITLE = "Scene"
 LISTED = 6
+WARNINGS = 3  # more are folded away: the panels below them would be out of sight
 
 
 def draw(state: ViewerState) -> None:
@@ -18,12 +21,22 @@ def draw(state: ViewerState) -> None:
         _cameras(state)
     _saving(state)
     recording.draw(state)
-    for warning in (*state.scene.warnings, *state.missing):
-        imgui.push_style_color(imgui.Col_.text, (1.0, 0.75, 0.35, 1.0))
-        imgui.push_text_wrap_pos()
-        imgui.text_unformatted(warning)
-        imgui.pop_text_wrap_pos()
-        imgui.pop_style_color()
+    imgui.push_style_color(imgui.Col_.text, (1.0, 0.75, 0.35, 1.0))
+    _lines(state.missing)
+    loaded = state.scene.warnings
+    if len(loaded) <= WARNINGS:
+        _lines(loaded)
+    elif imgui.tree_node(f"{len(loaded)} notes on the scene's file###warnings"):
+        _lines(loaded)
+        imgui.tree_pop()
+    imgui.pop_style_color()
+
+
+def _lines(texts: Sequence[str]) -> None:
+    imgui.push_text_wrap_pos()
+    for text in texts:
+        imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
 
 
 def _movement(state: ViewerState) -> None:
