@@ -136,12 +136,29 @@ def row_of(row: Measured, floor: Measured) -> dict[str, Any]:
     }
 
 
+def linear_fit(rows: list[Measured], floor: Measured) -> dict[str, float]:
+    """Time = offset + per_sample n, both in diffuse frames, and the largest deviation of a row from that line."""
+    n = np.array([row.n for row in rows], float)
+    times = np.array([median(a / b for a, b in zip(row.wall_ms, floor.wall_ms, strict=True)) for row in rows])
+    slope, offset = np.polyfit(n, times, 1)
+    deviation = np.abs(times - offset - slope * n).max()
+    return {key: round(float(v), 3) for key, v in (("per_sample", slope), ("offset", offset), ("deviation", deviation))}
+
+
 def summary_of(rows: list[Measured], scaled: list[Measured]) -> dict[str, Any]:
-    """Milliseconds per integrator and n at full coverage, and the exponent of time against pixels."""
+    """Milliseconds per integrator and n at full coverage, lines through the times, and time's exponent in pixels."""
     small, large = scaled
     growth = np.log(median(large.wall_ms) / median(small.wall_ms)) / np.log(4)
     wall_ms: dict[str, dict[str, float]] = {}
     for row in rows:
         if row.coverage == "full":
             wall_ms.setdefault(row.integrator, {})[str(row.n)] = round(median(row.wall_ms), 2)
-    return {"wall_ms_full": wall_ms, "growth": round(float(growth), 3)}
+    floors = {m.coverage: m for m in rows if m.integrator == "diffuse"}
+    linear = {
+        coverage: {
+            name: linear_fit([m for m in rows if (m.integrator, m.coverage) == (name, coverage)], floor)
+            for name in BY_N
+        }
+        for coverage, floor in floors.items()
+    }
+    return {"wall_ms_full": wall_ms, "linear_in_diffuse_frames": linear, "growth": round(float(growth), 3)}

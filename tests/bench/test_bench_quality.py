@@ -111,6 +111,14 @@ def test_frame_times_come_with_their_spread(monkeypatch: pytest.MonkeyPatch) -> 
         walk_cube.run(True, [Path("x.hdr")])
 
 
+def test_a_line_is_found_in_frame_times() -> None:
+    def measured(n: int | None, factor: float) -> walk_cube.Measured:
+        return walk_cube.Measured("rings", "full", n, None, None, [], [factor * ms for ms in (10.0, 30.0, 20.0)])
+
+    floor, rows = measured(None, 1.0), [measured(n, 0.7 + 0.4 * n) for n in (3, 5, 9)]
+    assert walk_cube.linear_fit(rows, floor) == {"per_sample": 0.4, "offset": 0.7, "deviation": 0.0}
+
+
 def test_the_bulge_covers_what_it_says() -> None:
     from lambent.realtime.device import open_device
 

@@ -1,0 +1,35 @@
+"""Accumulated frames: the error falls at least as fast as their number grows, and towards the truth."""
+
+from __future__ import annotations
+
+import pytest
+
+from lambent.bench import accumulate
+from lambent.core.errors import UserError
+from lambent.realtime.device import choose_adapter
+from lambent.scenes.environments import dusk
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _adapter() -> None:
+    try:
+        choose_adapter()
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+def test_frames_add_up_without_bias(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(accumulate, "OWN_ENVIRONMENTS", {"dusk": dusk})
+    monkeypatch.setattr(accumulate, "LOBES", accumulate.LOBES[:1])
+    monkeypatch.setattr(accumulate, "FRAMES", (1, 4, 16, 60))
+    monkeypatch.setattr(accumulate, "TRUTH_SPP", {True: 4096})
+    report = accumulate.run(True, [])
+    assert {row["case"] for row in report["rows"]} == {"dusk", "planar"}
+    assert all(slope < -1 for slope in report["summary"]["slope"].values())
+    assert all(abs(row["bias_z"]) < 4 for row in report["rows"])
+    assert all(psnr > 40 for psnr in report["summary"]["psnr_promised"].values())
+
+
+def test_the_slope_of_independent_samples_is_minus_one() -> None:
+    rows = [{"frames": n, "mse": 0.3 / n} for n in (1, 2, 4, 64)]
+    assert accumulate.slope_of(rows) == pytest.approx(-1)
