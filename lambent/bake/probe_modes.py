@@ -5,6 +5,8 @@ probe. What is chosen so, and only where it lowers the error to WORTH of what it
 
 - A probe leaves its object out, as round things need it, or holds it, as hollow things may, whose surfaces mirror each
   other (the reveal of a window, a frame). Tried where OWN of the rays meet the object itself.
+- Look-ups go by bounding planes, or, where those are too near to turn them rightly (a glass beside a bottle), by the
+  distance map, which costs more.
 - A surface within a niche is shown all that the probe sees, though near things hide most of it. The irradiance of the
   light map knows how much: light from the probe is scaled by its ratio to the irradiance that the probe alone would
   give, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II", scales by it in both
@@ -38,6 +40,8 @@ GRAZING = 0.05  # least cosine of a viewer
 OWN = 0.15
 WORTH = 0.85
 CLOSE = 1e-4  # of an object's size
+LIFT_M = 1e-4
+STEPS, GROWTH, NEAREST = 12, 1.6, 0.05  # of distance_lookup in surface.wgsl
 # E(n) of radiance up to the second band is a sum over BASIS of n (Ramamoorthi & Hanrahan 2001, eq. 10): the weight of
 # each is the cosine lobe's coefficient times the square of the harmonic's norm.
 WEIGHTS = np.array([1 / 4, 1 / 2, 1 / 2, 1 / 2, 15 / 16, 15 / 16, 5 / 64, 15 / 16, 15 / 64])
@@ -66,7 +70,8 @@ def mirrored(
 ) -> Mirrored | None:  # fmt: skip
     """What viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3): each in one point.
 
-    None where too few points are in view. `family` are the Mitsuba meshes of the object and of its other parts.
+    Of what transmits light they see what is behind: rays go straight on. None where too few points are in view.
+    `family` are the Mitsuba meshes of the object and of its other parts.
     """
     rng = np.random.default_rng(seed)
     found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
@@ -82,7 +87,9 @@ def mirrored(
     at, n = points[found], normals[found]
     view = normalize(eyes[found] - at)
     cosine = (view * n).sum(axis=1, keepdims=True)
-    directions = 2 * cosine * n - view
+    directions = -view if material.transmits else 2 * cosine * n - view
+    if material.transmits:
+        at = at - 2 * LIFT_M * n  # beyond the sheet
     ray = mi.Ray3f(mi.Point3f(_columns(at)), mi.Vector3f(_columns(directions)))
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed & 0xFFFFFFFF, len(at))
@@ -90,7 +97,7 @@ def mirrored(
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     met = scene.ray_intersect_preliminary(ray).shape
     own = np.any([np.array(met == mi.ShapePtr(mesh)) for mesh in family], axis=0)
-    below = scene.ray_intersect(mi.Ray3f(mi.Point3f(_columns(at)), mi.Vector3f(_columns(-n))))
+    below = scene.ray_intersect(mi.Ray3f(mi.Point3f(_columns(points[found])), mi.Vector3f(_columns(-n))))
     irradiance = np.array(cache.irradiance(below, below.is_valid())).T.astype(float)
     r0 = max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
     share = r0 + (1 - r0) * (1 - np.abs(cosine[:, 0])) ** 5
@@ -127,6 +134,34 @@ def by_planes(rays: Mirrored, radiance: Array, centre: Array, planes: Array) -> 
     return np.asarray(luminance(sample(radiance.astype(float), normalize(looked_up))))
 
 
+def by_distance(rays: Mirrored, radiance: Array, centre: Array, distance: Array) -> Array:
+    """The same by the distance map (6, N, N), stepped through as distance_lookup of surface.wgsl does."""
+    x, w = rays.origins - centre, rays.directions
+    length = np.linalg.norm(face_directions(distance.shape[1]), axis=-1)
+    inverse = (length / np.clip(distance, 1e-3, None))[..., None]
+
+    def behind(t: Array) -> Array:
+        p = x + t[:, None] * w
+        return np.asarray(np.abs(p).max(axis=1) * sample(inverse, normalize(p))[:, 0] - 1)
+
+    near, f_near = np.zeros(len(x)), np.full(len(x), -1.0)
+    far = np.maximum(np.linalg.norm(x, axis=1), NEAREST / np.maximum(sample(inverse, w)[:, 0], 1e-4))
+    f_far = behind(far)
+    for _ in range(STEPS - 1):
+        on = f_far < 0
+        near, f_near = np.where(on, far, near), np.where(on, f_far, f_near)
+        far = np.where(on, far * GROWTH, far)
+        f_far = np.where(on, behind(far), f_far)
+    met = f_far >= 0
+    for low, high in ((0.05, 0.95), (0.05, 0.95), (0.05, 0.95), (0.0, 1.0)):
+        t = near + (far - near) * (f_near / np.minimum(f_near - f_far, -1e-9)).clip(low, high)
+        f = behind(t)
+        near, f_near = np.where(f < 0, t, near), np.where(f < 0, f, f_near)
+        far, f_far = np.where(f < 0, far, t), np.where(f < 0, f_far, f)
+    looked_up = np.where(met[:, None], x + t[:, None] * w, w)
+    return np.asarray(luminance(sample(radiance.astype(float), normalize(looked_up))))
+
+
 def basis_of(n: Array) -> Array:
     """(..., 9) products of the components of unit vectors that WEIGHTS belong to."""
     x, y, z = n[..., 0], n[..., 1], n[..., 2]
@@ -149,25 +184,46 @@ def open_share(rays: Mirrored, irradiance: Array) -> Array:
 
 @dataclass(frozen=True)
 class Judged:
-    """The error of a probe, as it is and with light scaled by `open_share`; `irradiance` (9,) is the probe's."""
+    """The error of a probe, as it is and with light scaled by `open_share`, and by the distance map in place of planes.
+
+    `irradiance` (9,) is the probe's.
+    """
 
     plain: float
     scaled: float
     irradiance: Array
+    distance: float
 
     @property
     def scales(self) -> bool:
         return self.scaled < WORTH * self.plain
 
     @property
-    def best(self) -> float:
+    def by_planes(self) -> float:
         return self.scaled if self.scales else self.plain
 
+    @property
+    def needs_distance(self) -> bool:
+        return self.distance < WORTH * self.by_planes
 
-def judged(rays: Mirrored, probe: Probe, centre: Array, planes: Array | None = None) -> Judged:
-    """How well a probe shows what is mirrored, by `planes` (P, 4) about its centre, or those that are found for it."""
+    @property
+    def best(self) -> float:
+        return self.distance if self.needs_distance else self.by_planes
+
+
+def judged(
+    rays: Mirrored, probe: Probe, centre: Array, planes: Array | None = None, *, through: bool = False
+) -> Judged:
+    """How well a probe shows what is mirrored, by `planes` (P, 4) about its centre, or those that are found for it.
+
+    What is seen `through` an object is not scaled.
+    """
     if planes is None:
         planes = bounding_planes(probe.distance, probe.normals)
     light = by_planes(rays, probe.radiance, centre, planes.astype(float))
     irradiance = irradiance_of(probe.radiance)
-    return Judged(error(rays, light), error(rays, light * open_share(rays, irradiance)), irradiance)
+    share = np.ones(len(light)) if through else open_share(rays, irradiance)
+    plain, scaled = error(rays, light), error(rays, light * share)
+    stepped = by_distance(rays, probe.radiance, centre, probe.distance.astype(float))
+    distance = error(rays, stepped * (share if scaled < WORTH * plain else 1.0))
+    return Judged(plain, scaled, irradiance, distance)

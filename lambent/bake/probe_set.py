@@ -67,16 +67,20 @@ class ProbeSet:
         return viewing_places(self._builder.scene, self._whole)
 
     def _mirrored(self, name: str, seed: int) -> Mirrored | None:
-        """What viewers see mirrored in an object; None where that is too little, or light goes through it."""
+        """What viewers see mirrored in an object, or through it; None where that is too little."""
         scene = self._builder.scene
         o = scene.object(name)
         material = scene.materials[o.material]
-        if self._cache is None or material.transmits:
+        if self._cache is None:
             return None
         points, normals = spread(o.mesh, RAYS)
         lifted = points + normals * (CLOSE * float(np.ptp(o.mesh.positions, axis=0).max()))
         own = [self._builder.meshes[part] for part in family(scene.parts, name)]
         return mirrored(lifted, normals, self._places, material, self._whole, self._cache, MIRROR_DEPTH, own, seed)
+
+    def _transmits(self, name: str) -> bool:
+        scene = self._builder.scene
+        return scene.materials[scene.object(name).material].transmits
 
     def _better_held(self, rays: Mirrored, centre: Array, without: Any, seed: int) -> bool:
         """Whether a probe that holds its object shows what it mirrors better than one without."""
@@ -99,7 +103,7 @@ class ProbeSet:
         centre = probe_centre(self._builder, name, without, self._solids.within(without))
         left_out = not encloses(self._builder, name, centre, self._whole)
         rays = self._mirrored(name, seed)
-        if left_out and rays is not None and rays.own.mean() > OWN:
+        if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
             left_out = not self._better_held(rays, centre, without, seed)
         seen = without if left_out else self._whole
         depth = quality.max_depth if self._cache is None else MIRROR_DEPTH
@@ -116,7 +120,10 @@ class ProbeSet:
         meta = {"centre": [float(x) for x in centre], "object_left_out": left_out, "traced": self._cache is None}
         if rays is not None:
             about = planes.reshape(-1, 4) + np.outer(planes.reshape(-1, 4)[:, :3] @ centre, [0, 0, 0, 1])
-            found = judged(rays, probe, centre, about)
+            clear = self._transmits(name)
+            found = judged(rays, probe, centre, about, through=clear)
+            if found.needs_distance and given is None:
+                arrays["planes"] = planes[:0]
             meta["mirror_error"] = round(found.best, 3)
             if found.scales:
                 meta["seen_irradiance"] = [float(value) for value in found.irradiance]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.probe_modes import Mirrored, basis_of, by_planes, error, irradiance_of, open_share
+from lambent.bake.probe_modes import Mirrored, basis_of, by_distance, by_planes, error, irradiance_of, open_share
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
 from lambent.materials.document import Lobe, Material
@@ -54,6 +54,22 @@ def test_planes_turn_the_look_up_as_the_renderer_does() -> None:
     beside = rays(origins=np.array([[0.0, 0.0, -2.0]]), directions=slanted)
     assert by_planes(beside, cube, np.zeros(3), wall[:0])[0] == 0, "without planes it looks to +z"
     assert by_planes(beside, cube, np.zeros(3), wall)[0] == pytest.approx(1, abs=1e-4), "the wall at (2, 0, .4)"
+
+
+def test_the_distance_map_is_stepped_through_to_the_wall() -> None:
+    """A cube of 2 m about the centre: from any point within, what is looked up is the wall's colour there."""
+    w = normalize(face_directions(64))
+    distance = np.linalg.norm(face_directions(64), axis=-1)
+    rng = np.random.default_rng(1)
+    origins, directions = rng.uniform(-0.8, 0.8, (200, 3)), normalize(rng.normal(size=(200, 3)))
+    reach = np.min((np.sign(directions) - origins) / directions, axis=1)
+    hits = origins + reach[:, None] * directions
+    cube = np.repeat(2 + w[..., :1], 3, axis=-1)  # looked up at p: 2 + p_x/|p|
+    many = rays(origins=origins, directions=directions)
+    found = by_distance(many, cube, np.zeros(3), distance)
+    assert np.quantile(np.abs(found - 2 - normalize(hits)[:, 0]), 0.9) < 0.05  # few steps: a tenth ends beside the wall
+    walls = np.array([[*-np.sign(s) * np.eye(3)[i], 1.0] for i in range(3) for s in (1, -1)])
+    assert np.allclose(by_planes(many, cube, np.zeros(3), walls), 2 + normalize(hits)[:, 0], atol=5e-3)
 
 
 def well(folder: Path) -> Scene:
