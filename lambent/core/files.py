@@ -33,6 +33,19 @@ def atomic_path(path: Path) -> Iterator[Path]:
         beside.unlink(missing_ok=True)
 
 
+def check_place(path: Path) -> None:
+    """`UserError` where no file can be written at `path`: to ask before long work. Makes nothing that stays."""
+    path = Path(path)
+    if path.is_dir():
+        raise UserError("is a folder", file=path, expected="a name for a file")
+    folder = next((p for p in path.absolute().parents if p.exists()), path.parent)
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UserError(f"cannot be written ({error.strerror})", file=path) from error
+
+
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8, atomically."""
     with atomic_path(path) as beside:

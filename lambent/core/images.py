@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lambent.core import exr, rgbe
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, read_bytes
+from lambent.core.files import atomic_path, check_place, read_bytes
 
 Image = NDArray[np.float32]
 MAX_PIXELS = 1 << 26  # 8192 x 8192: 800 MB as float32 RGB
@@ -97,9 +97,10 @@ def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
-    """`UserError` where the suffix of a picture to write is not one of `suffixes`: to ask before long work."""
+    """`UserError` where a picture cannot be written there, or not under this suffix: to ask before long work."""
     if Path(path).suffix.lower() not in suffixes:
         raise UserError("unknown kind of file", file=path, got=Path(path).suffix or None, expected=", ".join(suffixes))
+    check_place(path)
 
 
 def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode, srgb_encode
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, did_you_mean
 from lambent.core.false_colour import ILLUMINANCE, LUMINANCE, NOISE, Quantity, Range
 from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
@@ -131,7 +131,8 @@ class FrameState:
         if self.is_false_coloured:
             self.scale.check()
         if self.show not in SHOW:
-            raise UserError("unknown part of the light", got=self.show, expected=", ".join(SHOW))
+            hint = did_you_mean(self.show, SHOW)
+            raise UserError("unknown part of the light", got=self.show, expected=", ".join(SHOW), hint=hint)
         if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
             size = f"{self.width}x{self.height}"
             raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
@@ -232,6 +233,7 @@ class Renderer:
 
     def display_image(self, state: FrameState) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
+        state.check()  # before a texture of a size that cannot be is made
         picture = self._targets.picture("display", state.width, state.height)
         self.draw(state, picture.create_view())
         return self._read_pixels(picture, state, np.uint8)
@@ -296,7 +298,8 @@ class Renderer:
             return []
         record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
         widest = {
-            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes), default=0.0) for o in record.objects
+            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes), default=0.0)
+            for o in record.objects
         }
         return mirror_views(data, record.reflectors, state.width, state.height, MOST_MIRRORS, widest)
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lambent.core import exr, rgbe
 from lambent.core.errors import UserError
-from lambent.core.images import read_encoded, read_image, write_image
+from lambent.core.images import check_writable, read_encoded, read_image, write_image
 
 RNG = np.random.default_rng(7)
 PICTURE = (RNG.random((20, 37, 3)) ** 4 * 50).astype(np.float32)
@@ -162,3 +162,13 @@ def test_header_of_an_exr_names_its_size(tmp_path: Path) -> None:
 def test_real_environments(shared_data: Path) -> None:
     image = read_image(shared_data / "environments" / "grace_probe_latlong.hdr")
     assert image.shape == (512, 1024, 3) and image.max() > 100 and image.min() >= 0
+
+
+def test_a_place_is_tried_before_long_work(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new/folder/a.png")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.png").mkdir()
+    for place, word in (("file/a.png", "cannot be written"), ("folder.png", "is a folder")):
+        with pytest.raises(UserError, match=word):
+            check_writable(tmp_path / place)
