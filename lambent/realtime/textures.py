@@ -123,7 +123,7 @@ class Pictures:
         if part == "direction":
             return Picture(self._uploaded(_halves(chain(doubled_angle(texels))), "rg16float"))
         if part == "opacity":
-            covered = chain(np.asarray(texels) >= cutoff)
+            covered = chain((np.asarray(texels) >= cutoff).astype(np.float32))
             made = [np.concatenate(both, axis=-1) for both in zip(opacity_levels(texels, cutoff), covered, strict=True)]
             return Picture(self._uploaded(_halves(made), "rg16float"))
         return Picture(self._uploaded(_halves(roughness_levels(texels)), "r16float"))
