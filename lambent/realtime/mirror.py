@@ -21,8 +21,8 @@ from lambent.store.contract import ReflectorRecord
 
 Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
-MOST_MARGIN = 0.2  # of the picture's longer side: what a wide lobe sees beyond is left to the probe
-STEP_PX = 32  # sizes are multiples of this: five MIP levels without remainder
+MOST_MARGIN = 0.1  # of the picture's longer side: what a wide lobe sees beyond is left to the probe
+STEP_PX = 64  # sizes are multiples of this: six MIP levels without remainder
 CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plane is not mirrored
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
 MOST_LEVELS = 7

@@ -18,7 +18,7 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer, Target
 
 FORMAT = "rgba16float"
-CLEANED = ("rgba16float", "rgba16float", "rg16float")
+CLEANED = ("rgba16float", "rgba16float", "r16float")
 MOST_MIRRORS = 4  # reflectors of a frame; those that cover less of it are left to their probes
 _FLAT = {"sample_type": "float", "view_dimension": "2d"}
 _EXACT = {"sample_type": "unfilterable-float", "view_dimension": "2d"}

@@ -29,14 +29,12 @@ override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the mirror picture s
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the mirror picture
 
-// A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre, and
-// how far (0 to 1) the mirror direction leads out of the probe's bounding planes.
+// A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
 struct Place {
     q: vec3f,
     seen: vec4f,
     t: f32,
     x: vec3f,
-    leaves: f32,
 }
 
 // Where a direction meets the scene: q, distance from the pixel, the plane there, texels of the mirror picture, and how
@@ -76,19 +74,32 @@ fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
     let q = v.p_world - mirror.eye.xyz;
     let seen = plane_at(v.position.xy + mirror.offset);
     let t = meet(seen, q, w_mirror, FARTHEST);
-    return Place(q, seen, t, s.x, outside_planes(s.x, w_mirror, t));
+    return Place(q, seen, t, s.x);
 }
 
-// From 0 to 1: whether a hit at distance t lies beyond the probe's bounding planes. The mirror eye sees below walls, which
-// end at the reflector; to it, what is outside looks like a hit to whoever looks at the foot of a wall. Only where the
-// mirror direction itself leads outside, as through a window, such hits are believed.
-fn outside_planes(x: vec3f, w: vec3f, t: f32) -> f32 {
+// Depth of what the picture shows at a point's place, relative to the point's.
+fn seen_depth(q: vec3f, plane: vec4f) -> f32 {
+    return plane.w / min(dot(plane.xyz, q), -1e-6);
+}
+
+// The hit at distance t, or, where a wall is before it, that of the wall. The mirror eye sees below walls, which end at the
+// reflector: to it, what is outside looks like a hit to whoever looks at the foot of a wall. What lies beyond the probe's
+// bounding planes is believed where the picture shows no wall in the plane, as in a window.
+fn hit_within(place: Place, w: vec3f, t: f32, plane: vec4f) -> Hit {
     var nearness = 0.0; // 1 over the distance to the nearest plane, 0 where none is met
     for (var i = 0u; i < PLANES; i++) {
-        let height = dot(planes[i].xyz, x) + planes[i].w;
+        let height = dot(planes[i].xyz, place.x) + planes[i].w;
         nearness = max(nearness, -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > 1e-3));
     }
-    return smoothstep(1.1, 1.5, t * nearness);
+    let q_wall = place.q + w / max(nearness, 1.0 / FARTHEST);
+    let wall = plane_at(project(q_wall).xy);
+    let behind = t * nearness > 1.1 && seen_depth(q_wall, wall) < 1.05;
+    let t_hit = select(t, 1.0 / max(nearness, 1.0 / FARTHEST), behind);
+    let q = place.q + t_hit * w;
+    let projected = project(q);
+    var found = plane;
+    if (behind) { found = wall; }
+    return Hit(q, t_hit, found, projected.xy, inside_picture(projected));
 }
 
 // The three steps: the plane seen in the mirror direction, then the one seen where that is met.
@@ -97,10 +108,7 @@ fn find_hit(place: Place, w: vec3f) -> Hit {
     let first = project(place.q + t_first * w);
     let plane = plane_at(first.xy);
     let t = meet(plane, place.q, w, t_first);
-    let q = place.q + t * w;
-    let projected = project(q);
-    let strays = outside_planes(place.x, w, t) * (1.0 - place.leaves);
-    return Hit(q, t, plane, projected.xy, inside_picture(projected) * (1.0 - strays));
+    return hit_within(place, w, t, plane);
 }
 
 fn mirror_sample(texel: vec2f, level: f32) -> vec3f {
@@ -112,8 +120,7 @@ fn mirror_sample(texel: vec2f, level: f32) -> vec3f {
 
 // How much a hit counts: less where it lies behind what the picture shows there, by 2 to 8 % of its depth.
 fn seen_share(hit: Hit) -> f32 {
-    let plane = plane_at(hit.texel);
-    let deeper = 1.0 - plane.w / min(dot(plane.xyz, hit.q), -1e-6);
+    let deeper = 1.0 - seen_depth(hit.q, plane_at(hit.texel));
     return 1.0 - HIDDEN_DROP * clamp((deeper - 0.02) / 0.06, 0.0, 1.0);
 }
 

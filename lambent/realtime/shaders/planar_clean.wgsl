@@ -8,7 +8,7 @@
 struct Cleaned {
     @location(0) narrow: vec4f, // weighted light of five pixels; a: weights
     @location(1) wide: vec4f,   // of nine
-    @location(2) least: vec4f,  // least distance in the mirror direction: x of five, y of nine
+    @location(2) least: vec4f,  // x: least distance in the mirror direction, of nine
 }
 
 @fragment fn planar_clean_main(screen: Screen) -> Cleaned {
@@ -18,15 +18,14 @@ struct Cleaned {
     if (number == 0.0) { return Cleaned(vec4f(0.0), vec4f(0.0), vec4f(0.0)); }
     var narrow = vec4f(0.0);
     var wide = vec4f(0.0);
-    var least = vec2f(6e4);
+    var least = 6e4;
     for (var i = -4; i <= 4; i++) {
         let there = vec2i(clamp(at.x + i, 0, last.x), at.y);
         let found = textureLoad(planar_rough, there, 0);
         let light = select(vec4f(0.0), vec4f(found.rgb, 1.0), textureLoad(planar_sharp, there, 0).a == number);
         wide += light * select(1.0, 0.5, abs(i) == 4);
         narrow += light * select(select(1.0, 0.5, abs(i) == 2), 0.0, abs(i) > 2);
-        let t = select(6e4, found.a, light.a > 0.0);
-        least = min(least, vec2f(select(6e4, t, abs(i) <= 2), t));
+        least = min(least, select(6e4, found.a, light.a > 0.0));
     }
-    return Cleaned(narrow, wide, vec4f(least, 0.0, 0.0));
+    return Cleaned(narrow, wide, vec4f(least, 0.0, 0.0, 0.0));
 }

@@ -38,8 +38,5 @@ fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
     let plane = plane_at(project(place.q + t_found * w).xy);
     let refined = meet(plane, place.q, w, t_found);
     let t = select(t_found, refined, abs(refined - t_found) < 0.05 * t_found);
-    let q = place.q + t * w;
-    let projected = project(q);
-    let strays = outside_planes(place.x, w, t) * (1.0 - place.leaves);
-    return Hit(q, t, plane, projected.xy, inside_picture(projected) * (1.0 - strays));
+    return hit_within(place, w, t, plane);
 }

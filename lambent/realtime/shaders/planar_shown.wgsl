@@ -10,7 +10,7 @@
 @group(3) @binding(5) var planar_wide: texture_2d<f32>;
 @group(3) @binding(6) var planar_least: texture_2d<f32>;
 
-const WIDE = 3.0; // how much wider a lobe is that stands the mean of 8 x 8 pixels than one of 4 x 4
+const WIDE = 3.0; // half-width in pixels of a lobe from which on 8 x 8 pixels are mixed, not 4 x 4
 
 fn specular_light(wo: vec3f, s: Surface) -> vec3f {
     let at = vec2i(s.pixel);
@@ -29,23 +29,22 @@ fn cleaned(wo: vec3f, s: Surface, at: vec2i, number: f32) -> vec3f {
     let size = textureDimensions(planar_rough);
     var narrow = vec4f(0.0);
     var wide = vec4f(0.0);
-    var least = vec2f(6e4);
+    var least = 6e4;
     for (var i = -4; i <= 4; i++) {
         let there = vec2i(at.x, clamp(at.y + i, 0, i32(size.y) - 1));
         let same = select(0.0, 1.0, textureLoad(planar_sharp, there, 0).a == number);
         wide += same * select(1.0, 0.5, abs(i) == 4) * textureLoad(planar_wide, there, 0);
         narrow += same * select(select(1.0, 0.5, abs(i) == 2), 0.0, abs(i) > 2) * textureLoad(planar_sum, there, 0);
-        let t = select(vec2f(6e4), textureLoad(planar_least, there, 0).xy, same > 0.0);
-        least = min(least, vec2f(select(6e4, t.x, abs(i) <= 2), t.y));
+        least = min(least, select(6e4, textureLoad(planar_least, there, 0).x, same > 0.0));
     }
-    let here = textureLoad(planar_rough, at, 0).rgb;
     let away = length(s.x + object.centre.xyz - frame.eye.xyz);
     let focal_px = 0.5 * f32(size.y) / length(frame.up.xyz);
-    var width_px = vec2f(0.0);
+    var width_px = 0.0;
     for (var i = 0u; i < LOBES; i++) {
         let angle = lobe_half_widths(lobe_here(i, s).lobe, wo).x;
-        width_px = max(width_px, vec2f(pixels_of(angle, focal_px, least.x, away), pixels_of(angle, focal_px, least.y, away)));
+        width_px = max(width_px, pixels_of(angle, focal_px, least, away));
     }
-    let share = clamp(0.5 * (width_px / vec2f(1.0, WIDE) - 1.0), vec2f(0.0), vec2f(1.0));
-    return mix(mix(here, narrow.rgb / max(narrow.a, 0.5), share.x), wide.rgb / max(wide.a, 0.5), share.y);
+    // what is not cleaned at all shows its dither: at contacts, worse than the blur of two pixels
+    let share = clamp(0.5 * (width_px / WIDE - 1.0), 0.0, 1.0);
+    return mix(narrow.rgb / max(narrow.a, 0.5), wide.rgb / max(wide.a, 0.5), share);
 }
