@@ -202,7 +202,7 @@ class Window:
             raise self._failed.error
 
     def _on_event(self, event: dict[str, Any]) -> None:
-        self._extra_frames = SETTLE_FRAMES
+        self._extra_frames, self.state.touched_s = SETTLE_FRAMES, self.state.clock()
         self.canvas.request_draw()
         if event["event_type"] == "pointer_leave":
             self.state.meter.cursor = None

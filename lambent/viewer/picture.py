@@ -42,6 +42,7 @@ CHOICES = Choices(
 REST_FRAMES = 128
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
 SOFTWARE_N = 1
+QUIET_S = 1.5  # at most so long after an event, or as long as a frame at rest takes, none is begun
 
 
 class Picture:
@@ -54,6 +55,7 @@ class Picture:
         self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
         self._pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
         self._refine = True
+        self._rest_s = 0.0  # what the last frame at rest took
         self.view: Any = None
         self.radiance: Any = None  # texture of what `view` shows, linear
         self.drawn: FrameState | None = None  # as it was planned
@@ -93,8 +95,9 @@ class Picture:
             wanted = replace(wanted, integrator=integrator, antialias=antialias)
         now_s, self._refine = state.clock(), state.refine if refine is None else refine
         self._pacer.aim(share * state.target_ms / 1e3)
+        rests = wanted == self._pacer.shown
         plan = self._pacer.plan(wanted, now_s, refine=self._refine, adaptive=state.adaptive_resolution)
-        if plan is None or (plan.accumulate is not None and state.answering):
+        if plan is None or (rests and (state.answering or self._quiet_for_s(state) > 0)):
             return
         frame = self._planned(wanted, plan)
         self._fit(frame.width, frame.height)
@@ -105,13 +108,19 @@ class Picture:
         self._renderer.finish()
         seconds = time.perf_counter() - started
         self._pacer.drawn(plan)
+        self._rest_s = seconds if rests else self._rest_s
         drawn = self._renderer.statistics
         self._pacer.cost(plan, seconds, drawn["mirrors"])
         state.statistics = self._statistics(drawn, seconds, plan)
 
     def wait_s(self, state: ViewerState) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
-        return self._pacer.wait_s(state.clock(), refine=self._refine)
+        due = self._pacer.wait_s(state.clock(), refine=self._refine)
+        return None if due is None else max(due, self._quiet_for_s(state))
+
+    def _quiet_for_s(self, state: ViewerState) -> float:
+        """Seconds that no frame of rest is begun: while one is drawn, which takes long in software, nothing answers."""
+        return max(0.0, state.touched_s + min(self._rest_s, QUIET_S) - state.clock())
 
     def save(self, state: ViewerState) -> str | None:
         """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -185,6 +186,7 @@ class ViewerState:
     path: PathPlay | None = None
     missing: tuple[str, ...] = ()  # what the store lacks
     refine: bool = True  # accumulate while nothing moves
+    touched_s: float = -math.inf  # when the last event came
     answering: bool = False  # an event was just seen: the interface answers before the picture is refined further
     adaptive_resolution: bool = True  # fewer pixels while moving, where the adapter is slow
     target_ms: float = TARGET_MS  # that a frame in motion should take

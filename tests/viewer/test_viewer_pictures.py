@@ -104,6 +104,21 @@ def test_the_meter_sets_the_exposure(renderer, state):
     assert state.scale == state.meter.reading.ranges[0] and not state.meter.fit_wanted
 
 
+def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
+    pictures = Pictures(renderer)
+    drawn(pictures, state, 3)
+    version, pictures._a._rest_s = pictures._a.version, 1.0
+    state.touched_s = state.now_s
+    drawn(pictures, state, 3, dt_s=0.3)
+    assert pictures._a.version == version
+    assert pictures.wait_s(state) == pytest.approx(0.1)
+    state.camera = SIDE
+    drawn(pictures, state, dt_s=0)
+    assert pictures._a.version == version + 1, "motion is drawn at once"
+    drawn(pictures, state, 2)
+    assert pictures._a.version > version + 1
+
+
 def test_what_is_under_the_cursor(renderer, state):
     pictures = Pictures(renderer)
     state.meter.readout_on = True
@@ -189,4 +204,4 @@ def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
     (tmp_path / "b-0003.png").mkdir()
     for _ in range(5):
         drawn(pictures, state)
-    assert state.filming is None and "could not be written" in state.messages[-1].text
+    assert state.filming is None and "is a folder" in state.messages[-1].text
