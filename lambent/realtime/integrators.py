@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError, did_you_mean
 from lambent.materials.document import Lobe
 from lambent.realtime import patterns
+from lambent.realtime.normalised import normalised_rings_table
 from lambent.realtime.split_sum import TABLE_ROWS, albedo_table
 
 Floats = NDArray[np.floating]
@@ -41,7 +42,7 @@ class Integrator:
 
 
 INTEGRATORS: dict[str, Integrator] = {
-    "rings": Integrator("quadrature.wgsl", patterns.rings_table),
+    "rings": Integrator("rings.wgsl", normalised_rings_table),
     "lobe-4.24": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 24}, cube="box"),
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),

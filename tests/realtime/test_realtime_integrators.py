@@ -17,7 +17,7 @@ from lambent.store.contract import CameraRecord
 
 STATE = FrameState(OBLIQUE, 8, 8, antialias=False, show="specular", lookup="plain")
 # m -> mean white-furnace error of rings, n = 7, relative
-FURNACE = {0.1: 0.007, 0.25: 0.037, 0.4: 0.07}
+FURNACE = {0.1: 0.002, 0.25: 0.006, 0.4: 0.01}
 MATERIALS = {
     "metal": (Lobe(mx=0.2, my=0.2, r0=(0.9, 0.7, 0.4)),),
     "along x": (Lobe(mx=0.3, my=0.06, r0=0.8, alpha=0.5),),

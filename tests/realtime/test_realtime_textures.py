@@ -160,7 +160,8 @@ def test_a_roughness_picture_equals_a_material_of_that_roughness(device, integra
     textured = square(Material(name="m", lobes=(lobe,)), pictures, light)
     plain = square(Material(name="m", lobes=(half,)), MaterialTextures(), light)
     got, expected = (Renderer(device, scene).image(state) for scene in (textured, plain))
-    loose = {"split-sum": 0.03, "lobe-4.24": 0.02, "lobe-4.25": 0.02}
+    # rings: normalised for the roughness that the material has without its picture
+    loose = {"rings": 0.01, "split-sum": 0.03, "lobe-4.24": 0.02, "lobe-4.25": 0.02}
     np.testing.assert_allclose(got, expected, rtol=loose.get(integrator, 4e-3))
 
 

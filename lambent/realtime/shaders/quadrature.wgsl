@@ -1,19 +1,8 @@
-// Quadrature at fixed samples: `rings` and `fis`, which differ in the table alone.
-//     L = (1/n) sum w g L_i,  g = F cos_i/((cos_i cos_o)^alpha h_z),  omega = c (wo.h) h_z^3
-// Samples below the horizon count as 0, as the integral has it.
+// Quadrature at fixed samples: L = (1/n) sum w g L_i.
 
 #include "surface.wgsl"
+#include "quadrature_sum.wgsl"
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
-    let here = lobe_here(index, s);
-    let lobe = here.lobe;
-    var sum = vec3f(0.0);
-    for (var k = 0u; k < SAMPLES; k++) {
-        let q = samples[index * SAMPLES + k];
-        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
-        if (!at.seen) { continue; }
-        let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
-        sum += q.w * gain(lobe, at.wi, wo, at.h) * incident(s, on_side(lobe, at.wi), half_log2_omega);
-    }
-    return sum / f32(SAMPLES);
+    return quadrature_sum(lobe_here(index, s), index * SAMPLES, wo, s) / f32(SAMPLES);
 }

@@ -1,0 +1,16 @@
+// Sum of w g L_i over fixed samples, `rings` and `fis` alike: their tables differ.
+//     g = F cos_i/((cos_i cos_o)^alpha h_z),  omega = c (wo.h) h_z^3
+// Samples below the horizon count as 0, as the integral has it.
+
+fn quadrature_sum(here: LobeHere, first: u32, wo: vec3f, s: Surface) -> vec3f {
+    let lobe = here.lobe;
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < SAMPLES; k++) {
+        let q = samples[first + k];
+        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
+        if (!at.seen) { continue; }
+        let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
+        sum += q.w * gain(lobe, at.wi, wo, at.h) * incident(s, on_side(lobe, at.wi), half_log2_omega);
+    }
+    return sum;
+}
