@@ -171,7 +171,8 @@ class _Bake:
             self.store.forget_all()
         geometry = keys.geometry_parts(scene)
         self.geometry_key = keys.key_of("geometry", quality.light_map_texels, *geometry)
-        q = [quality.light_map_samples, quality.light_map_noise, quality.gather_samples, quality.max_depth, seed]
+        q = [quality.light_map_samples, quality.light_map_noise, quality.gather_samples, quality.gather_noise]
+        q += [quality.tile_texels, quality.max_depth, seed]
         if self.integrator == PHOTONS:
             q.append([PHOTONS, quality.photons_per_texel])
         looks = keys.material_parts(scene)
@@ -240,6 +241,12 @@ class _Bake:
         width, height = self.store.artefact("geometry/uv2").meta["light_map_size"]
         return atlases.separated(self.scene, self.merged, width, height)
 
+    @cached_property
+    def _texels(self) -> Any:
+        from lambent.bake.texels import texels_of
+
+        return texels_of(self.merged, self.atlas.width, self.atlas.height)
+
     def environment(self) -> None:
         from lambent.bake.environment import environment_cube
 
@@ -262,9 +269,9 @@ class _Bake:
         with self._timed("light_map"):
             from lambent.bake.light_map import gathered, path_traced
             from lambent.bake.probe import LightMapCache
-            from lambent.bake.texels import chart_labels, texels_of
+            from lambent.bake.texels import chart_labels
 
-            texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
+            texels = self._texels
             labels = chart_labels(self.merged, texels)
             builder = self._builder(diffuse=True, photons=self.integrator == PHOTONS)
             if self.integrator == PHOTONS:
@@ -290,10 +297,10 @@ class _Bake:
             return
         from lambent.bake.noise_map import noise_map, sampled_halves
         from lambent.bake.photon_map import halves_of
-        from lambent.bake.texels import chart_labels, texels_of
+        from lambent.bake.texels import chart_labels
 
         self.progress(0, 1, "noise of the light map")
-        texels = texels_of(self.merged, self.atlas.width, self.atlas.height)
+        texels = self._texels
         labels = chart_labels(self.merged, texels)
         if self.integrator == PHOTONS:
             builder = self._builder(diffuse=True, photons=True)
@@ -340,10 +347,11 @@ class _Bake:
         self, texels: Any, labels: NDArray[np.integer], side: str, builder: Any, stage: str, how: Any
     ) -> tuple[Array, dict[str, float]]:
         """One side's map, denoised, and what to note of it; its raw tiles stay in the store as `light_map/STAGE...`."""
-        from lambent.bake.light_map import TILE, finished, tile_samples
+        from lambent.bake.light_map import finished, tile_samples
 
         name = f"light_map/{stage}" if side == "irradiance" else f"light_map/{stage}_back"
-        shape, chunks = (2, texels.height, texels.width, 4), (2, TILE, TILE, 4)
+        tile = self.quality.tile_texels
+        shape, chunks = (2, texels.height, texels.width, 4), (2, tile, tile, 4)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
         scene = builder.build()
         lit = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder, scene)
@@ -429,7 +437,7 @@ class _Bake:
     def _probe_key(self, name: str) -> str:
         q = self.quality
         centre = self.scene.probe_centres.get(name)
-        parts = [self.irradiance_key, name, centre, q.probe_texels, q.probe_samples, self.seed]
+        parts = [self.irradiance_key, name, centre, q.probe_texels, q.probe_samples, q.probe_noise, self.seed]
         if self.probe_way != CACHED:
             parts += [self.probe_way, q.max_depth]
         return keys.key_of("probe", *parts)

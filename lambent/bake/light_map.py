@@ -24,7 +24,7 @@ from lambent.core.sequences import hammersley, r2
 from lambent.store.contract import HALF_MAX
 
 Array = NDArray[np.floating]
-TILE = 256  # texels per side of a chunk
+GATHER_PASS = 64  # samples of a texel that are stratified among themselves
 SMOOTH = 8  # averaging of what is grown into gutters before denoising: some 4 texels wide
 
 
@@ -64,7 +64,8 @@ def path_traced(quality: Quality) -> Sampling:
 def gathered(quality: Quality, cache: paths.Cache) -> Sampling:
     """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
     count = quality.gather_samples
-    return Sampling((count, count), 0.0, quality.max_depth, max(1, count // 2), cache)
+    per_pass = max(1, min(GATHER_PASS, count // 2))
+    return Sampling((2 * per_pass, count), quality.gather_noise, quality.max_depth, per_pass, cache)
 
 
 def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Array:

@@ -108,7 +108,7 @@ class ProbeSet:
         seen = without if left_out else self._whole
         depth = quality.max_depth if self._cache is None else MIRROR_DEPTH
         around = Surroundings(seen, self._whole, self._cache, depth)
-        probe = bake_probe(around, centre, quality.probe_texels, quality.probe_samples, seed)
+        probe = bake_probe(around, centre, quality.probe_texels, quality.probe_samples, seed, quality.probe_noise)
         given = self._builder.scene.probe_planes.get(name)
         if given is None:
             planes = bounding_planes(probe.distance, probe.normals)

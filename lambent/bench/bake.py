@@ -80,7 +80,8 @@ def _quality(quick: bool) -> Any:
     return replace(
         quality_named("preview"),
         name="bench",
-        light_map_texels=280,  # two tiles, so that there is a middle to stop in
+        light_map_texels=96,
+        tile_texels=64,  # several tiles, so that there is a middle to stop in
         light_map_samples=(8, 8),
         gather_samples=8,
         photons_per_texel=8,
