@@ -329,18 +329,18 @@ class _Bake:
         self, texels: Any, labels: NDArray[np.integer], count: int, builder: Any
     ) -> list[tuple[Array, dict[str, float]]]:
         """Both sides' maps, denoised, and what to note of them; the batches stay as `light_map/photons`."""
-        from lambent.bake.photon_map import finished, shape_of, shoot_batches
+        from lambent.bake.photon_map import Shots, finished, shape_of, shoot_batches
 
         name, quality = "light_map/photons", self.quality
         shape, chunks = shape_of(texels, count)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
-        scene, covered = builder.build(), len(texels.index)
+        scene = builder.build()
+        sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
         if writer.missing:
-            per_texel, bounces = quality.photons_per_texel, quality.max_depth
-            shoot_batches(writer, scene, per_texel, bounces, self.seed, covered, self.progress)
+            how = Shots(quality.photons_per_texel, quality.light_map_noise, quality.max_depth, self.seed)
+            shoot_batches(writer, builder.scene, scene, self.merged, sides, how, self.progress)
         writer.finish()
         self.progress(0, 1, "denoising")
-        sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
         return finished(self.store.read(name), self.merged, sides, labels)
 
     def _sampled_map(

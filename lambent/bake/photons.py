@@ -27,11 +27,14 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE
+from lambent.bake.sky_photons import SkyPhotons, pilot_of_importance
+from lambent.scenes.scene import Scene
 
 Array = NDArray[np.floating]
 PHOTONS_AT_ONCE = 1 << 19
 UNIT = 1 << 20  # whole numbers in a photon of mean power
 PILOT = 1 << 14  # photons that tell the mean power
+LEARNING = 1 << 20  # photons that tell where the light map wants them
 STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal: beyond, at grazing, it is noise
 
 
@@ -44,7 +47,7 @@ class Bins:
     sides: int
 
 
-def shoot(scene: Any, bins: Bins, photons: int, max_bounces: int, seed: int) -> Array:
+def shoot(scene: Any, bins: Bins, photons: int, max_bounces: int, seed: int, sky: SkyPhotons | None = None) -> Array:
     """Flux (sides, H, W, 3) float64 in W that falls on each texel, from so many photons.
 
     Parameters
@@ -53,24 +56,47 @@ def shoot(scene: Any, bins: Bins, photons: int, max_bounces: int, seed: int) -> 
         Its meshes carry light map coordinates.
     max_bounces : int
         Photons are counted up to the surface they meet after so many.
+    sky : SkyPhotons, optional
+        Draws the environment's photons; without, they start on a disc as large as the scene.
     """
     sums = dr.zeros(mi.UInt64, bins.sides * bins.height * bins.width * 3)
     rng = np.random.default_rng(seed)
-    scale = _units_per_watt(scene)
+    scale = _units_per_watt(scene, sky)
     if scale == 0:
         return np.zeros((bins.sides, bins.height, bins.width, 3))
     for first in range(0, photons, PHOTONS_AT_ONCE):
         sampler = _sampler(int(rng.integers(1 << 32)), min(PHOTONS_AT_ONCE, photons - first))
-        ray, power = _emitted(scene, sampler)
+        ray, power = _emitted(scene, sampler, sky)
         count = partial(_count, sums, bins)
         _trace(scene, sampler, ray, power * dr.opaque(mi.Float, scale), count, max_bounces, paths.has_holes(scene))
         dr.eval(sums)
     return np.array(sums).astype(np.float64).reshape(bins.sides, bins.height, bins.width, 3) / (scale * photons)
 
 
-def _units_per_watt(scene: Any) -> float:
+def learnt_sky(scene: Scene, whole: Any, over_area: Array, max_bounces: int) -> SkyPhotons | None:
+    """How the environment's photons are drawn, found by pilots; None without an environment. Deterministic.
+
+    over_area (H, W) is 1 over the area of a light map's texel in m^2, 0 where there is none.
+    """
+    if scene.environment is None:
+        return None
+    sky = SkyPhotons(scene, whole)
+    if not sky.found:
+        return None
+    holes = paths.has_holes(whole)
+    sampler = _sampler(1, LEARNING)
+    pilot_of_importance(
+        sky,
+        lambda ray, power, count: _trace(whole, sampler, ray, power, count, max_bounces, holes),
+        over_area,
+        sampler,
+    )
+    return sky
+
+
+def _units_per_watt(scene: Any, sky: SkyPhotons | None) -> float:
     """Whole numbers per W, 0 where nothing is emitted."""
-    _, power = _emitted(scene, _sampler(0, PILOT))
+    _, power = _emitted(scene, _sampler(0, PILOT), sky)
     mean = float(np.array(power, np.float64).mean())
     return UNIT / mean if mean > 0 else 0.0
 
@@ -81,7 +107,7 @@ def _sampler(seed: int, width: int) -> Any:
     return sampler
 
 
-def _emitted(scene: Any, sampler: Any) -> tuple[Any, Any]:
+def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None) -> tuple[Any, Any]:
     """Rays of photons, and their power (mi.Color3f) in W times their number."""
     u, place, direction = sampler.next_1d(), sampler.next_2d(), sampler.next_2d()
     number, weight, _ = scene.sample_emitter(u)
@@ -89,7 +115,10 @@ def _emitted(scene: Any, sampler: Any) -> tuple[Any, Any]:
     sky = emitter.is_environment()
     ray, power = emitter.sample_ray(0.0, u, place, direction, ~sky)
     if scene.environment() is not None:
-        from_sky, power_of_sky = _from_environment(scene, place, direction)
+        if by_landing is None:
+            from_sky, power_of_sky = _from_environment(scene, place, direction)
+        else:
+            from_sky, power_of_sky, _ = by_landing.emit(sampler.next_1d(), place, direction)
         ray = mi.Ray3f(dr.select(sky, from_sky.o, ray.o), dr.select(sky, from_sky.d, ray.d))
         power = dr.select(sky, power_of_sky, power)
     return ray, dr.select(dr.all(dr.isfinite(power)), power * weight, 0.0)

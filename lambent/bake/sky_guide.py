@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake import paths
-from lambent.bake.sky_bins import BINS, COLUMNS, ROWS, SkyBins, middles
+from lambent.bake.sky_bins import BIN_SR, BINS, COLUMNS, ROWS, SkyBins, middles
 from lambent.bake.work import seed_of
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Scene
@@ -78,11 +78,12 @@ def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
 class SkyGuide:
     """What was learnt: a table of bins for each group that needs one; table 0 is for all that need none.
 
-    table (groups,) int: number of a group's table; shares (tables, BINS) of each table's samples.
+    table (groups,) int: number of a group's table; shares (tables, BINS) of each table's samples; brought (groups,):
+    irradiance, roughly, W/m^2 of luminance.
     """
 
-    def __init__(self, bins: SkyBins, groups: Groups, table: Indices, shares: Array) -> None:
-        self.bins, self.groups, self.shares = bins, groups, shares
+    def __init__(self, bins: SkyBins, groups: Groups, table: Indices, shares: Array, brought: Array) -> None:
+        self.bins, self.groups, self.shares, self.brought = bins, groups, shares, brought
         self._table = mi.UInt32(table.astype(np.uint32))
         cumulative = np.cumsum(shares, axis=1)
         cumulative[:, -1] = 2  # rounding must not lead beyond the last
@@ -146,7 +147,10 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> Sky
     shares = DEFENSIVE * plain + (1 - DEFENSIVE) * shares / shares.sum(axis=1, keepdims=True)
     table = np.zeros(groups.count, int)
     table[pilot.group[wanted]] = 1 + np.arange(len(wanted))
-    return SkyGuide(bins, groups, table, np.concatenate([plain[None], shares]))
+    brought = np.zeros(groups.count)
+    brought[pilot.group] = first[0] @ bins.luminance * BIN_SR
+    brought[pilot.group[wanted]] = more[0] @ bins.luminance * BIN_SR
+    return SkyGuide(bins, groups, table, np.concatenate([plain[None], shares]), brought)
 
 
 class _Pilot:

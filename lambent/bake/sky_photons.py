@@ -1,0 +1,160 @@
+"""Photons of an environment, by where they land first.
+
+Rays from the sky and pairs of (point of a surface, direction in which it sees the sky) are one to one: so a photon is
+drawn by the place where it lands first, and none misses the scene or the window. What leaves the sky towards dA from
+within dw is L cos dA dw, whatever the density that it is drawn with: the weight is exact, and a pair that turns out to
+be in shadow carries nothing.
+
+Directions come from the tables of `sky_guide`, with tables for open surfaces too. Places are patches of all surfaces,
+both their sides, drawn in proportion to area x E x sqrt(I): E is what the guide's pilot found that the sky brings, I
+the sum over all later landings of (share of the power / area of the texel)^2, found by pilot photons. That is the
+density with the least sum of the texels' variances: the outer walls, whose texels are large, give way to the floor
+behind the window.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake import paths
+from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE
+from lambent.bake.sky_guide import CELL_M, learn
+from lambent.scenes.scene import Scene
+
+Array = NDArray[np.floating]
+MOST_PATCHES = 1 << 18
+BLOCK = 4  # groups along each axis that share what their own photons cannot tell
+PRIOR, OWN = 0.5, 64.0  # photons' worth of the mean of all in a block's I, and of the block's in a group's
+LEAST = 0.05  # of a patch's share of the samples goes by area alone
+ABOVE = 4e-4  # metres, and share of the largest coordinate, over the surface, from where a photon falls onto it
+
+
+class SkyPhotons:
+    """Draws photons of a scene's environment; None of them where `found` is false."""
+
+    def __init__(self, scene: Scene, whole: Any) -> None:
+        sky = whole.environment()
+        self._whole, self._holes = whole, paths.has_holes(whole)
+        self._sky = getattr(sky, "sky", sky)
+        guide = learn(scene, whole, self._sky, keep_open=True)
+        self.found = guide is not None
+        if guide is None:
+            return
+        self.guide = guide
+        corners = _patches(scene, max(CELL_M, guide.groups.size_m))
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(cross, axis=1) / 2
+        corners, cross, area = corners[area > 0], cross[area > 0], area[area > 0]
+        self._corners = [mi.Point3f(np.ascontiguousarray(corners[:, k].T, dtype=np.float32)) for k in range(3)]
+        normal = cross / (2 * area[:, None])
+        self._normal = mi.Vector3f(np.ascontiguousarray(normal.T, dtype=np.float32))
+        self._area = np.concatenate([area, area])
+        middle = mi.Point3f(np.ascontiguousarray(corners.mean(axis=1).T, dtype=np.float32))
+        sides = [np.array(guide.groups.of(middle, sign * self._normal)) for sign in (1.0, -1.0)]
+        self._group = np.concatenate(sides)
+        self.importance = np.ones(guide.groups.count)
+        self._draw_by_importance()
+
+    def _draw_by_importance(self) -> None:
+        wanted = self._area * self.guide.brought[self._group] * np.sqrt(self.importance[self._group])
+        share = (1 - LEAST) * wanted / wanted.sum() + LEAST * self._area / self._area.sum()
+        self._places = mi.DiscreteDistribution(mi.Float(share.astype(np.float32)))
+        self._over_density = mi.Float((self._area / share).astype(np.float32))
+
+    def weigh(self, sums: Array, counts: Array) -> None:
+        """Take sums of I and numbers of photons by group for what comes next."""
+        mean = sums.sum() / max(counts.sum(), 1)
+        if mean > 0:
+            block = self._blocks()
+            of_block = np.bincount(block, sums) + PRIOR * mean
+            of_block /= np.bincount(block, counts) + PRIOR
+            self.importance = (sums + OWN * of_block[block]) / (counts + OWN)
+            self._draw_by_importance()
+
+    def _blocks(self) -> NDArray[np.integer]:
+        """(groups,) number of the block of cells, and of the way, that each group belongs to."""
+        *cell, way = np.unravel_index(np.arange(self.guide.groups.count), (*self.guide.groups.shape, 6))
+        across = [-(-n // BLOCK) for n in self.guide.groups.shape]
+        place = ((cell[0] // BLOCK * across[1]) + cell[1] // BLOCK) * across[2] + cell[2] // BLOCK
+        return np.asarray(place * 6 + way)
+
+    def emit(self, u: Any, place: Any, direction: Any) -> tuple[Any, Any, Any]:
+        """Rays that fall onto the first surface, power (mi.Color3f) in W times their number, groups they land in."""
+        number = self._places.sample(u)
+        patches = dr.width(self._normal)
+        second = number >= patches
+        patch = dr.select(second, number - patches, number)
+        a, b, c = (dr.gather(mi.Point3f, corner, patch) for corner in self._corners)
+        weights = mi.warp.square_to_uniform_triangle(place)
+        p = a + (b - a) * weights.x + (c - a) * weights.y
+        n = dr.gather(mi.Vector3f, self._normal, patch)
+        n = dr.select(second, -n, n)
+        group = self.guide.groups.of(p, n)
+        table = self.guide.table_at(p, n)
+        w = self.guide.sample(table, direction)
+        cosine = dr.dot(w, n)
+        lit = cosine > 0
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(u))
+        si.p, si.n = p, mi.Normal3f(n)
+        lit &= ~paths.in_shadow(self._whole, si.spawn_ray(w), lit, self._holes)
+        si.wi = -w
+        density = self.guide.pdf(table, w)
+        power = self._sky.eval(si) * (cosine / density * dr.gather(mi.Float, self._over_density, number))
+        reach = ABOVE * (1 + dr.max(dr.abs(p)))
+        ray = mi.Ray3f(p + w * reach, -w)
+        if self._holes:  # where the surface itself has a hole the photon lands elsewhere: that is another's
+            met = paths.intersect(self._whole, ray, lit, True)
+            lit &= met.is_valid() & (dr.norm(met.p - p) < reach)
+        return ray, dr.select(lit, power, 0.0), group
+
+
+def pilot_of_importance(photons: SkyPhotons, trace: Any, over_area: Array, sampler: Any) -> None:
+    """Find I with one run of photons.
+
+    Parameters
+    ----------
+    trace : callable
+        trace(ray, power, count) follows photons and calls count(si, power, far_side, active) at each landing.
+    over_area : (H, W)
+        1 over the area of a texel of the light map in m^2, 0 where there is none.
+    """
+    height, width = over_area.shape
+    table = mi.Float(over_area.astype(np.float32).ravel())
+    ray, power, group = photons.emit(sampler.next_1d(), sampler.next_2d(), sampler.next_2d())
+    started = dr.mean(power)
+    sums = dr.zeros(mi.Float64, photons.guide.groups.count)
+    counts = dr.zeros(mi.Float64, photons.guide.groups.count)
+
+    def count(si: Any, arriving: Any, far_side: Any, active: Any) -> None:
+        uv2 = si.shape.eval_attribute_3(UV2_ATTRIBUTE, si, active)
+        column = dr.clip(mi.Int32(dr.floor(uv2.x * width)), 0, width - 1)
+        row = dr.clip(mi.Int32(dr.floor(uv2.y * height)), 0, height - 1)
+        density = dr.gather(mi.Float, table, mi.UInt32(row * width + column), active)
+        density *= dr.mean(arriving) / dr.maximum(started, 1e-30)
+        dr.scatter_add(sums, mi.Float64(density * density), group, active & (started > 0))
+
+    trace(ray, power, count)
+    dr.scatter_add(counts, mi.Float64(1.0), group, started > 0)
+    dr.eval(sums, counts)
+    photons.weigh(np.array(sums), np.array(counts))
+
+
+def _patches(scene: Scene, size_m: float) -> Array:
+    """Triangles (P, 3, 3) of all surfaces, halved along their longest edges until none is longer than `size_m`."""
+    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    while True:
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)  # of corners k and k + 1
+        long = edges.max(axis=1) > size_m
+        if not long.any() or len(corners) + long.sum() > MOST_PATCHES:
+            return corners
+        t = corners[long]
+        turn = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        t = np.take_along_axis(t, turn[..., None], axis=1)  # the longest edge first
+        middle = (t[:, 0] + t[:, 1]) / 2
+        halves = [np.stack([t[:, 0], middle, t[:, 2]], axis=1), np.stack([middle, t[:, 1], t[:, 2]], axis=1)]
+        corners = np.concatenate([corners[~long], *halves])
