@@ -18,8 +18,9 @@ Floats = NDArray[np.floating]
 TILE = 64  # pixels that sample a lobe in turns
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 # Of the filter, against one that covers the lobe: found by experiment. The narrower the better where each sample finds
-# its own hit; where it is a guess, width hides the error.
-FIXED_BIAS, INTERLEAVED_BIAS, MARCHED_BIAS = 0.4, 0.12, 0.03
+# its own hit; where it is a guess, far from the mirror direction, width hides the error.
+FIXED_BIAS, MARCHED_BIAS = 0.4, 0.03
+GUESSED_BIAS, GUESSED_BIAS_PER_M = 0.12, 1.2  # the most, and by sqrt(mx my)
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
 
@@ -46,12 +47,14 @@ def fixed_table(lobe: Lobe, n: int) -> Floats:
     return rows
 
 
-def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Floats:
+def interleaved_table(lobe: Lobe, n: int, bias: float | None = None) -> Floats:
     """`fixed_table`, then 64 spirals of n samples, one for each pixel of a tile of 8 x 8: (65 n, 4).
 
     Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/64 and
     beta = fract(TURN o): all 64 together cover the lobe's mass evenly, and so do every fourth of them.
     """
+    if bias is None:
+        bias = min(max(GUESSED_BIAS_PER_M * float(np.sqrt(lobe.mx * lobe.my)), MARCHED_BIAS), GUESSED_BIAS)
     ggx = lobe.distribution == "ggx"
     k, blocks = np.arange(n), [fixed_table(lobe, n)]
     for o in range(TILE):
@@ -69,8 +72,8 @@ def marched_table(lobe: Lobe, n: int) -> Floats:
 
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
-        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, THREE_STEPS),
         "marched": Integrator("planar_interleaved.wgsl", marched_table, {"MARCH_STEPS": 12, "HIDDEN_DROP": 0.8}),
+        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, THREE_STEPS),
         "fixed": Integrator("planar_quadrature.wgsl", fixed_table, THREE_STEPS),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},
