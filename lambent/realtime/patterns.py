@@ -40,7 +40,7 @@ N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # of the roughnesses, at n = 7: where rings turn into a line, and how softly
 CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, against 1 on the mean; below 7 samples the latter
 STRETCH = {3: 0.89, 5: 0.89, 7: 0.92}  # of the rings' radii; .93 otherwise, .97 of many samples
-BIAS = {3: 0.5, 5: 0.6, 7: 0.75}  # of the rings' filters, against filters that cover the lobe; .9 otherwise
+BIAS = {3: 0.5, 5: 0.6, 7: 0.75, 11: 0.75}  # of the rings' filters, against filters that cover the lobe; .9 otherwise
 MANY = 30  # samples: from here on filters hardly blur
 LINE_TEMPER = 1.16  # tau sqrt(n), see `line_pattern`
 BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
