@@ -28,7 +28,7 @@ Indices = NDArray[np.integer]
 CELL_M, MOST_CELLS, MOST_TABLES = 0.5, 1 << 16, 4096
 SURFACE_POINTS = 1 << 18
 POINTS = 128  # of a group, that rays start from
-FIRST = 1  # ray per bin to see which groups need a table
+FIRST, KEPT = 1, 16  # rays per bin to see which groups need a table, and which are lit at all
 RAYS, LEAST = 4096, 16  # for a table: shared out by the light of the bins, and at least for each bin
 OPEN = 0.9  # share of the light of its hemisphere that a group sees: from here on it needs no table
 FEW = 0.2  # of the groups that see any sky: where fewer need a table, there is no guide
@@ -134,7 +134,7 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> Sky
         if len(pilot.group) <= 4 * MOST_TABLES:
             break
         size_m = groups.size_m * 1.5
-    first = pilot.brought(np.arange(len(pilot.group)), np.full(BINS, FIRST), "first")
+    first = pilot.brought(np.arange(len(pilot.group)), np.full(BINS, KEPT if keep_open else FIRST), "first")
     lit = (first[0] > 0).any(axis=1)
     wanted = np.flatnonzero(lit & (keep_open | ~pilot.sees_most(first[0])))[:MOST_TABLES]
     if len(wanted) <= FEW * lit.sum():

@@ -30,7 +30,7 @@ Array = NDArray[np.floating]
 MOST_PATCHES = 1 << 18
 BLOCK = 4  # groups along each axis that share what their own photons cannot tell
 PRIOR, OWN = 0.5, 64.0  # photons' worth of the mean of all in a block's I, and of the block's in a group's
-LEAST = 0.05  # of a patch's share of the samples goes by area alone
+LEAST = 0.2  # of the photons land without regard to E: where the pilot saw no sky there may be some
 ABOVE = 4e-4  # metres, and share of the largest coordinate, over the surface, from where a photon falls onto it
 
 
@@ -62,7 +62,8 @@ class SkyPhotons:
 
     def _draw_by_importance(self) -> None:
         wanted = self._area * self.guide.brought[self._group] * np.sqrt(self.importance[self._group])
-        share = (1 - LEAST) * wanted / wanted.sum() + LEAST * self._area / self._area.sum()
+        anyhow = self._area * np.sqrt(self.importance[self._group])
+        share = (1 - LEAST) * wanted / wanted.sum() + LEAST * anyhow / anyhow.sum()
         self._places = mi.DiscreteDistribution(mi.Float(share.astype(np.float32)))
         self._over_density = mi.Float((self._area / share).astype(np.float32))
 
