@@ -487,6 +487,7 @@ def _reflector_record(r: Reflector) -> ReflectorRecord:
         outline=tuple((float(x), float(y), float(z)) for x, y, z in r.outline),
         deviation_m=r.deviation_m,
         two_sided=r.two_sided,
+        walled=r.walled,
         parts=tuple(
             ReflectorPart(object=part.object, faces=tuple(map(int, part.faces)), area_m2=part.area_m2)
             for part in r.parts

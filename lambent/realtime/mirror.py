@@ -27,12 +27,14 @@ CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plan
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
 
+MOST_WALLS = 8  # of a reflector, the longest: array in frame.wgsl and planar.wgsl
+
 MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar.wgsl
     [
         ("eye", "f4", 4), ("row_x", "f4", 4), ("row_y", "f4", 4), ("row_w", "f4", 4), ("plane", "f4", 4),
         ("across", "f4", 4), ("up", "f4", 4), ("forward", "f4", 4),
         ("size", "f4", 2), ("offset", "f4", 2), ("tolerance", "f4"), ("focal_px", "f4"), ("levels", "f4"),
-        ("number", "f4"),
+        ("number", "f4"), ("walls", "f4", (MOST_WALLS, 4)),
     ]
 )  # fmt: skip
 
@@ -151,17 +153,38 @@ def _view(
         seen[name][:3] = vector
     seen["across"][3], seen["up"][3], seen["forward"][3] = n
     seen["show"] = (1, 1, 1, 0)
+    seen["walls"] = 0 if n @ reflector.plane[:3] < 0 else _walls(reflector, eye)
     uniform = np.zeros((), MIRROR_DTYPE)
     uniform["eye"][:3] = eye
     for row, name in ((0, "row_x"), (1, "row_y"), (3, "row_w")):
         uniform[name][:3] = clip[row, :3]
     for name in ("across", "up", "forward"):
         uniform[name][:3] = seen[name][:3]
+    uniform["walls"] = seen["walls"]
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
     uniform["tolerance"] = reflector.deviation_m + 2 * CLEARANCE_M
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)
     uniform["levels"], uniform["number"] = levels_of((int(wide[0]), int(wide[1]))), number
     return MirrorView(reflector, plane, seen, uniform, (int(wide[0]), int(wide[1])), share)
+
+
+def _walls(reflector: ReflectorRecord, eye: Floats) -> Floats:
+    """(MOST_WALLS, 4): q . wall < 0 where the line from the mirror eye to eye + q passes the reflector's plane behind one.
+
+    Each is the plane through the eye and an edge of the outline that a wall stands on, its normal inwards; unused ones
+    are 0.
+    """
+    plane, outline = np.asarray(reflector.plane, float), np.asarray(reflector.outline, float)
+    edges = np.roll(outline, -1, axis=0) - outline
+    length = np.linalg.norm(edges, axis=1)
+    walled = [i for i in np.argsort(-length, kind="stable") if i < len(reflector.walled) and reflector.walled[i]]
+    below = -(plane[:3] @ eye + plane[3])
+    walls = np.zeros((MOST_WALLS, 4))
+    for row, i in zip(walls, walled, strict=False):
+        inwards = np.cross(plane[:3], edges[i] / length[i])
+        wall = below * inwards + inwards @ (eye - outline[i]) * plane[:3]
+        row[:3] = wall / np.linalg.norm(wall)
+    return walls
 
 
 def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[Floats, Floats]:

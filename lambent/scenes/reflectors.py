@@ -13,7 +13,7 @@ need not be whole objects: the top of a table is found, its edge and its legs ar
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -23,6 +23,7 @@ from lambent.core.frames import basis
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import areas
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
+from lambent.scenes.walls import walled_edges
 
 Floats = NDArray[np.floating]
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
@@ -47,7 +48,7 @@ class Reflector:
     """A plane (n, d), n.x + d = 0, n outwards; `outline` (P, 3) is the convex hull of its parts, in the plane.
 
     `deviation_m` is the largest distance of a vertex of its parts from the plane; `two_sided` is whether it is a sheet
-    that may be seen from behind, too.
+    that may be seen from behind, too. `walled` says which edges of the outline walls stand on (see walls.py).
     """
 
     plane: tuple[float, float, float, float]
@@ -55,6 +56,7 @@ class Reflector:
     deviation_m: float
     two_sided: bool
     parts: tuple[ReflectorPart, ...]
+    walled: tuple[bool, ...] = ()
 
     @property
     def area_m2(self) -> float:
@@ -89,7 +91,9 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         mine &= np.isin(faces.owner, parts)
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
-    return tuple(sorted(large, key=lambda r: -r.area_m2))
+    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    walled = (replace(r, walled=walled_edges(r.outline, np.array(r.plane[:3]), corners)) for r in large)
+    return tuple(sorted(walled, key=lambda r: -r.area_m2))
 
 
 def is_glossy(material: Material) -> bool:

@@ -91,12 +91,16 @@ class ReflectorPart(_Record):
 
 
 class ReflectorRecord(_Record):
-    """A planar reflector, see scenes.reflectors.Reflector: plane (n, d) with n.x + d = 0, convex outline in it."""
+    """A planar reflector, see scenes.reflectors.Reflector: plane (n, d) with n.x + d = 0, convex outline in it.
+
+    `walled` are the edges of the outline that walls stand on; without it, none.
+    """
 
     plane: tuple[float, float, float, float]
     outline: tuple[Triple, ...]
     deviation_m: float = 0.0
     two_sided: bool = False
+    walled: tuple[bool, ...] = ()
     parts: tuple[ReflectorPart, ...]
 
 

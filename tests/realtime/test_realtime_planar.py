@@ -132,6 +132,42 @@ def test_uniform_light_stays_uniform(device: Any) -> None:
         np.testing.assert_allclose(image[HEIGHT // 2 :], 1.0, rtol=0.03)
 
 
+@pytest.mark.parametrize("integrator", ["rings", "qmc"])
+def test_no_light_comes_in_below_the_walls(device: Any, integrator: str) -> None:
+    """A closed room of radiance 1 under a sky of 1000: its floor of albedo 1 shows 1, up to the foot of every wall."""
+    walls = {
+        "back": patch((-2, 0, -2), (4, 0, 0), (0, 2, 0)),
+        "front": patch((2, 0, 2), (-4, 0, 0), (0, 2, 0)),
+        "left": patch((-2, 0, 2), (0, 0, -4), (0, 2, 0)),
+        "right": patch((2, 0, -2), (0, 0, 4), (0, 2, 0)),
+        "ceiling": patch((-2, 2, -2), (4, 0, 0), (0, 0, 4)),
+    }
+    scene = unbaked_scene(
+        walls | {"floor": patch((-2, 0, 2), (4, 0, 0), (0, 0, -4))},
+        Material(name="paint", kd=0.0),
+        np.full((6, 4, 4, 3), 1000.0, np.float32),
+    )
+    floor = scene.record.objects[-1].model_copy(update={"material": "floor"})
+    lit = tuple(o.model_copy(update={"emission": (1, 1, 1)}) for o in scene.record.objects[:-1])
+    outline = ((-2, 0, -2), (-2, 0, 2), (2, 0, 2), (2, 0, -2))
+    one = Probe((0.0, 1.0, 0.0), np.ones((6, 4, 4, 3), np.float32))
+    camera = CameraRecord(name="low", position=(0.5, 0.6, 1.6), target=(-0.2, 0.2, -2.0), fov_y_deg=50)
+
+    def seen(walled: tuple[bool, ...]) -> np.ndarray:
+        reflector = FLOOR.model_copy(update={"outline": outline, "walled": walled})
+        materials = scene.record.materials | {"floor": mirror(0.15)}
+        update = {"objects": (*lit, floor), "materials": materials, "reflectors": (reflector,)}
+        made = replace(scene, record=scene.record.model_copy(update=update), probes={"floor": one})
+        drawn = replace(state(integrator=integrator), camera=camera)
+        renderer = Renderer(device, made)
+        return (renderer.converged(drawn, 64) if integrator == "qmc" else renderer.image(drawn))[HEIGHT // 2 :]
+
+    closed = seen((True,) * 4)
+    assert closed.max() < 1.1
+    assert closed.min() > 0.6  # towards grazing a single lobe returns less
+    assert seen(()).max() > 10
+
+
 def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
     renderer = Renderer(device, scene_of(mirror(0.05)))
     for target, mirrors in (((0.1, 0.4, 0.0), 1), ((0.4, 2.9, 3.05), 0)):

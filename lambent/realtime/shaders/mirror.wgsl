@@ -2,7 +2,7 @@
 // of shade.wgsl; `frame` is the mirrored one, the w of across, up and forward the reflector's normal.
 
 struct MirrorTexel {
-    @location(0) light: vec4f, // a: 1 where the reflector faces what is seen
+    @location(0) light: vec4f, // a: 1 where the reflector may face what is seen
     @location(1) plane: vec4f, // N towards the mirror eye e, and N.(p - e)
 }
 
@@ -10,5 +10,6 @@ struct MirrorTexel {
     let to_eye = frame.eye.xyz - v.p_world;
     let given = select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12);
     let n = normalize(given) * select(-1.0, 1.0, dot(given, to_eye) > 0.0);
-    return MirrorTexel(vec4f(surface_light(v, front), 1.0), vec4f(n, -dot(n, to_eye)));
+    let light = vec4f(surface_light(v, front), 1.0);
+    return MirrorTexel(select(light, vec4f(0.0), past_walls(-to_eye)), vec4f(n, -dot(n, to_eye)));
 }

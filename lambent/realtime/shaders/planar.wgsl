@@ -18,6 +18,7 @@ struct Mirror { // MIRROR_DTYPE in mirror.py
     focal_px: f32,
     levels: f32,
     number: f32, // of the reflector in this frame
+    walls: array<vec4f, 8>, // as in Frame, of this mirror picture
 }
 
 @group(3) @binding(0) var<uniform> mirror: Mirror;
