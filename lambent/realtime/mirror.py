@@ -169,7 +169,7 @@ def _view(
 
 
 def _walls(reflector: ReflectorRecord, eye: Floats) -> Floats:
-    """(MOST_WALLS, 4): q . wall < 0 where the line from the mirror eye to eye + q passes the reflector's plane behind one.
+    """(MOST_WALLS, 4): q . wall < 0 where the line from the mirror eye to eye + q meets the reflector's plane past one.
 
     Each is the plane through the eye and an edge of the outline that a wall stands on, its normal inwards; unused ones
     are 0.

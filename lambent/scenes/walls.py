@@ -20,8 +20,8 @@ SHARE = 0.6  # of the points and heights, behind which something stands
 def walled_edges(outline: Floats, normal: Floats, corners: Floats) -> tuple[bool, ...]:
     """Which edges of a convex outline (P, 3), counter-clockwise about its normal (3,), something closes.
 
-    Edge i leads from outline[i] to the next; `corners` (F, 3, 3) are the triangles of the scene. The size of a reflector
-    is the root of its outline's area.
+    Edge i leads from outline[i] to the next; `corners` (F, 3, 3) are the triangles of the scene. The size of a
+    reflector is the root of its outline's area.
     """
     edges = np.roll(outline, -1, axis=0) - outline
     fan = np.cross(outline[1:-1] - outline[0], outline[2:] - outline[0])

@@ -9,7 +9,7 @@
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before they were denoised; may be absent
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
-    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], OBJECT left out where
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], OBJECT left out if
                                            meta["object_left_out"]; meta["seen_irradiance"], may be absent: luminance of
                                            the irradiance it would give, as a sum over 1, x, y, z, xy, yz, 3zz - 1, xz,
                                            xx - yy of the normal; its light is to be scaled by the share of that
