@@ -94,10 +94,17 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
     return raw.reshape(2, height, width, 4)
 
 
-def relative_noise(halves: Array) -> float:
-    """Root mean square error of the mean of two estimates (2, ..., 3), over its mean; 0 for black."""
-    half, mean = luminance(halves[0] - halves[1]) / 2, luminance(halves).mean()
-    return float(np.sqrt(np.mean(half**2)) / mean) if mean > 0 else 0.0
+def relative_noise(halves: Array, share: Array | None = None) -> float:
+    """Root mean square error of the mean of two estimates (2, ..., 3), over its mean; 0 for black.
+
+    Every one counts the same, or by its share (...), such as its area.
+    """
+    squares, light = (luminance(halves[0] - halves[1]) / 2) ** 2, luminance(halves)
+    if share is not None and share.any():
+        mean_square, mean = np.average(squares, weights=share), np.average(light.mean(axis=0), weights=share)
+    else:
+        mean_square, mean = np.mean(squares), light.mean()
+    return float(np.sqrt(mean_square) / mean) if mean > 0 else 0.0
 
 
 class _Points:

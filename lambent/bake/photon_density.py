@@ -7,6 +7,8 @@ is narrow, because noise that neighbours share is what the denoiser cannot tell 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,10 @@ Array = NDArray[np.floating]
 KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface, and that of texels that are mostly off it
 LIFT = 0.3  # texels: standard deviation off the surface
 NEIGHBOURS = 21
-SMALLEST = 0.05  # texels: what gathers photons from a smaller area takes its neighbours' light
+NEIGHBOURS_OF_FINE = 192  # where the kernel is wider than WIDE texels
+NEGLIGIBLE = 1e-4  # weight
+ROUNDS, BALANCED = 200, 1e-6
+SMALLEST = 0.05  # share of the texels that lies on the surface: what gathers from less takes its neighbours' light
 TEXELS_AT_ONCE = 1 << 18
 
 
@@ -73,6 +78,9 @@ def _integral(y: Array) -> Array:
 class Kernel:
     """Averages over the texels around each texel, on the same surface.
 
+    What texels give and take is balanced (`_balanced`): the energy on the map is that of the photons, and uniform light
+    stays uniform.
+
     Parameters
     ----------
     areas : (H, W)
@@ -85,12 +93,13 @@ class Kernel:
         self._shape = areas.shape
         lit = open_share > 0
         self._index = texels.index[lit]
-        self._area = (areas.reshape(-1)[texels.index] * open_share)[lit]
-        small = self._area < 0.5 * texels.spacing[lit] ** 2
-        self._weights = _weights(texels, lit, np.where(small, WIDE, KERNEL))
-        gathered = self._weights @ self._area
-        self._gathered = gathered
-        self._enough = gathered > SMALLEST * texels.spacing[lit] ** 2 * np.asarray(self._weights.sum(axis=1)).ravel()
+        self.area = (areas.reshape(-1)[texels.index] * open_share)[lit]
+        usual = usual_spacing(texels)
+        small = self.area < 0.5 * np.maximum(texels.spacing[lit], usual) ** 2
+        reach = np.where(small, WIDE * np.maximum(texels.spacing[lit], usual), KERNEL * texels.spacing[lit])
+        weights = _weights(texels, lit, reach)
+        self._enough = weights @ self.area > SMALLEST * (weights @ texels.spacing[lit].astype(float) ** 2)
+        self._weights, self._factor = weights, _balanced(weights, self.area)
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -101,31 +110,69 @@ class Kernel:
 
     def irradiance(self, flux: Array) -> Array:
         """(H, W, 3) in W/m^2 from flux (H, W, 3) in W per texel; 0 where nothing is known."""
-        gathered = self._weights @ flux.reshape(-1, 3)[self._index].astype(float)
+        factor = self._factor[:, None]
+        found = factor * (self._weights @ (factor * flux.reshape(-1, 3)[self._index].astype(float)))
         result = np.zeros((self._shape[0] * self._shape[1], 3))
-        mine = self._enough
-        result[self._index[mine]] = gathered[mine] / self._gathered[mine, None]
+        result[self._index[self._enough]] = found[self._enough]
         return result.reshape(*self._shape, 3)
 
 
-def _weights(texels: Texels, lit: NDArray[np.bool_], width: Array):  # type: ignore[no-untyped-def]
-    """Sparse (K, K) weights of the lit texels for each other; `width` (K,) in texels is the kernel's."""
+def shares(areas: Array, texels: Texels) -> Array:
+    """(H, W) how much each texel counts in the noise of a whole map: by its area, at most that of a usual texel.
+
+    A sliver of a texel has few photons whatever is done, and nobody sees it; an outer wall's large ones are not to
+    decide instead.
+    """
+    return np.asarray(np.minimum(areas, usual_spacing(texels) ** 2))
+
+
+def usual_spacing(texels: Texels) -> float:
+    """Metres per texel, of which half of the texels have less."""
+    return float(np.median(texels.spacing)) if len(texels.spacing) else 0.0
+
+
+def _balanced(weights: Any, area: Array) -> Array:
+    """(K,) factors d with which d_i weights_ij d_j area_j adds up to 1 over j, for every i (Sinkhorn, symmetric)."""
+    with np.errstate(divide="ignore"):
+        d = np.where(weights @ area > 0, 1 / np.sqrt(weights @ area), 0.0)
+    for _ in range(ROUNDS):
+        total = d * (weights @ (d * area))
+        if np.abs(total[d > 0] - 1).max(initial=0.0) < BALANCED:
+            break
+        d = np.divide(d, np.sqrt(total), out=np.zeros(len(d)), where=total > 0)
+    return d
+
+
+def _weights(texels: Texels, lit: NDArray[np.bool_], reach: Array) -> Any:
+    """Sparse symmetric (K, K) weights of the lit texels for each other.
+
+    `reach` (K,) in metres is the kernel's standard deviation along the surface.
+    """
     from scipy.sparse import csr_matrix
     from scipy.spatial import cKDTree
 
     position = texels.positions[lit].mean(axis=1).astype(float)
     normal = normalize(texels.normals[lit].mean(axis=1).astype(float))
     spacing = np.maximum(texels.spacing[lit], 1e-12)
+    reach = np.maximum(reach, 1e-12)
     n = len(position)
-    k = min(NEIGHBOURS, n)
-    values, columns = np.zeros((n, k), np.float32), np.zeros((n, k), np.int64)
+    found = []
     tree = cKDTree(position) if n else None
-    for start in range(0, n, TEXELS_AT_ONCE):
-        mine = slice(start, start + TEXELS_AT_ONCE)
-        others = tree.query(position[mine], k=[*range(1, k + 1)])[1]
-        offset = position[others] - position[mine, None]
-        lift = np.einsum("nkx,nx->nk", offset, normal[mine]) / (LIFT * spacing[mine, None])
-        along = np.linalg.norm(offset, axis=2) / (width * spacing)[mine, None]
-        facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[mine]), 0) ** 8
-        values[mine], columns[mine] = np.exp(-(lift**2 + along**2) / 2) * facing, others
-    return csr_matrix((values.ravel(), columns.ravel(), np.arange(0, n * k + 1, max(k, 1))), shape=(n, n))
+    fine = reach > 1.001 * WIDE * spacing
+    for mine, neighbours in ((np.flatnonzero(~fine), NEIGHBOURS), (np.flatnonzero(fine), NEIGHBOURS_OF_FINE)):
+        k = min(neighbours, n)
+        step = TEXELS_AT_ONCE * NEIGHBOURS // neighbours
+        for start in range(0, len(mine), step):
+            row = mine[start : start + step, None]
+            other = tree.query(position[row[:, 0]], k=[*range(1, k + 1)])[1]
+            offset = position[other] - position[row]
+            distance2 = np.einsum("nkx,nkx->nk", offset, offset)
+            lift = [np.abs(np.einsum("nkx,nkx->nk", offset, normal[at])) / (LIFT * spacing[at]) for at in (row, other)]
+            along = [np.exp(-distance2 / (2 * reach[at] ** 2)) for at in (row, other)]
+            facing = np.maximum(np.einsum("nkx,nkx->nk", normal[other], normal[row]), 0) ** 8
+            weight = np.exp(-(np.maximum(*lift) ** 2) / 2) * facing * (along[0] + along[1]) / 2
+            keep = (weight > NEGLIGIBLE) | (other == row)
+            found.append([np.broadcast_to(row, other.shape)[keep], other[keep], weight[keep].astype(np.float32)])
+    row, column, weight = (np.concatenate(part) for part in zip(*found, strict=True)) if found else [np.zeros(0)] * 3
+    weights = csr_matrix((weight, (row, column)), shape=(n, n))
+    return weights.maximum(weights.T)

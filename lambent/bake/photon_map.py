@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light_map import Sides, cleaned, relative_noise
-from lambent.bake.photon_density import Kernel, texel_areas
+from lambent.bake.photon_density import Kernel, shares, texel_areas
 from lambent.bake.photons import Bins, learnt_sky, shoot
 from lambent.bake.texels import Texels
 from lambent.bake.work import run_tiles
@@ -80,12 +80,13 @@ def shoot_batches(
 
 
 class _Gauge:
-    """The noise of the batches so far, taken in order, in both halves of equal number."""
+    """The noise of the batches so far by area (`shares`), taken in order, in both halves of equal number."""
 
     def __init__(self, geometry: Mapping[str, Array], sides: list[Sides], noise: float) -> None:
         texels = sides[0].texels
         areas = texel_areas(dict(geometry), texels.width, texels.height)
         self._kernels = [Kernel(areas, texels, side.valid.mean(axis=1)) for side in sides]
+        self._shares = shares(areas, texels)
         self._noise, self._count, self.reached = noise, 0, False
         self._sums = np.zeros((2, len(sides), texels.height, texels.width, 3))
 
@@ -101,20 +102,22 @@ class _Gauge:
             for number, kernel in enumerate(self._kernels):
                 if kernel.known.any():
                     irradiance = np.stack([kernel.irradiance(half[number]) for half in halves])
-                    found.append(relative_noise(irradiance[:, kernel.known]))
+                    found.append(relative_noise(irradiance[:, kernel.known], self._shares[kernel.known]))
             self.reached = max(found, default=0.0) <= self._noise
 
 
 def finished(
     batches: Array, geometry: Mapping[str, Array], sides: list[Sides], labels: NDArray[np.integer]
 ) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
-    """Per side the light map (H, W, 3) and what to note: the noise before denoising."""
+    """Per side the light map (H, W, 3) and what to note: the noise before denoising, all texels alike and by area."""
     texels = sides[0].texels
+    share = shares(texel_areas(dict(geometry), texels.width, texels.height), texels)
     maps = []
     for halves, known in halves_of(batches, geometry, sides):
         noise = relative_noise(halves[:, known]) if known.any() else 0.0
+        by_area = relative_noise(halves[:, known], share[known]) if known.any() else 0.0
         clean = cleaned(halves.mean(axis=0), known, texels, labels) if known.any() else _black(texels)
-        maps.append((clean, {"noise": noise}))
+        maps.append((clean, {"noise": noise, "noise_by_area": by_area}))
     return maps
 
 
