@@ -14,7 +14,8 @@ from lambent.bake.texels import texels_of
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Material
-from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, Scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, Scene, SceneObject
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, constant_picture, furnace, plane
 
@@ -87,6 +88,31 @@ def test_plane_under_lamps_receives_the_inverse_square(tmp_path: Path) -> None:
     z = (means.mean(axis=0) - wanted[whole]) / (means.std(axis=0, ddof=1) / np.sqrt(len(means)))
     assert np.abs(z).mean() < 1.2 and abs(z.mean()) < 0.2, "over the whole square"
     assert means.mean() == pytest.approx(wanted[whole].mean(), rel=0.01)
+
+
+def test_low_lamp_far_from_the_origin_lights_the_floor_before_it(tmp_path: Path) -> None:
+    """Mitsuba's offset of rays is 9 mm there, a third of the lamp's height: as if the lamp stood so much nearer."""
+    high, far = 0.03, 100.0
+    objects = (
+        SceneObject("floor", patch((far, 0, 1), (0.25, 0, 0), (0, 0, -2)), "black"),
+        SceneObject("strip", patch((far, 0, -1), (0, high, 0), (0, 0, 2)), "black", emission=(1, 1, 1)),
+    )
+    scene = Scene("low lamp", objects, {"black": Material()})
+    store = bake(scene, tmp_path / "s", quality=replace(SMALL, light_map_texels=96), light_map="photons")
+    flux, area = store.read("light_map/photons")[:, 0, ..., 0].astype(float), areas(store)
+    texels = texels_of(geometry_of(store), area.shape[1], area.shape[0])
+    near, wanted = np.zeros(area.size, bool), np.zeros(area.size)
+    x, y, z = np.moveaxis(texels.positions.astype(float) - (far, 0, 0), -1, 0)
+    near[texels.index] = (
+        (np.abs(y) < 1e-4).all(axis=1) & (np.abs(z) < 0.5).all(axis=1) & (np.abs(x - 0.065) < 0.035).all(axis=1)
+    )
+    wanted[texels.index] = np.pi / 2 * (1 - x / np.hypot(x, high)).mean(axis=1)  # of a strip without end
+    near &= area.reshape(-1) > 0.9 * np.median(texels.spacing) ** 2
+    assert near.sum() > 50
+    ratio = flux.reshape(len(flux), -1)[:, near].sum(axis=1) / (wanted * area.reshape(-1))[near].sum()
+    error = ratio.std(ddof=1) / np.sqrt(len(ratio))
+
+    assert error < 0.01 and abs(ratio.mean() - 1) < 0.06 + 3 * error
 
 
 def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) -> None:
