@@ -20,6 +20,18 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def adapter() -> None:
+    """A graphics adapter, be it software; tests that draw skip where there is none."""
+    from lambent.core.errors import UserError
+    from lambent.realtime.device import choose_adapter
+
+    try:
+        choose_adapter()
+    except UserError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
 def mi() -> Any:
     """Mitsuba, its variant chosen, our BSDFs known to it; tests that need it skip where no variant works."""
     from lambent.bake.engine import engine

@@ -5,17 +5,9 @@ from __future__ import annotations
 import pytest
 
 from lambent.bench import accumulate
-from lambent.core.errors import UserError
-from lambent.realtime.device import choose_adapter
 from lambent.scenes.environments import dusk
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _adapter() -> None:
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("adapter")
 
 
 def test_frames_add_up_without_bias(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,17 +16,10 @@ from lambent.core.errors import UserError
 from lambent.core.frames import normalize
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.device import choose_adapter
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.scenes.geometry import sphere
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _adapter() -> None:
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("adapter")
 
 
 def check_form(report: dict) -> None:

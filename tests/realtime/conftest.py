@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from lambent.bench.specular_scene import baked_scene, wall
 from lambent.core.cubemap import face_directions
-from lambent.core.errors import UserError
 from lambent.core.frames import normalize
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.camera import image_plane
-from lambent.realtime.device import choose_adapter, open_device
+from lambent.realtime.device import open_device
 from lambent.store.contract import CameraRecord
 
 Floats = NDArray[np.floating]
@@ -23,11 +22,7 @@ OBLIQUE = CameraRecord(name="oblique", position=(1.5, 0.8, 2.0), target=(0.2, 0.
 
 
 @pytest.fixture(scope="session")
-def device() -> Any:
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
+def device(adapter: None) -> Any:
     return open_device()
 
 

@@ -2,9 +2,7 @@
 
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.materials.document import load_material
-from lambent.realtime.device import choose_adapter
 from tests.viewer.measured_specimens import BRASS, write_measurement
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
@@ -13,13 +11,9 @@ SIZE = (900, 700)
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory):
+def session(adapter, tmp_path_factory):
     if missing_tools():
         pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
     folder = tmp_path_factory.mktemp("editor")
     BRASS.save(folder / "brass.json")
     write_measurement(folder / "brass.txt", BRASS)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.errors import UserError
 from lambent.core.false_colour import Range, false_colour, photometric
 from lambent.core.images import read_encoded, read_image
-from lambent.realtime.device import choose_adapter, open_device
+from lambent.realtime.device import open_device
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.store.contract import PathRecord
 from lambent.store.store import Store
@@ -24,11 +23,7 @@ PLACE = Rect(0, 0, 96, 64)
 
 
 @pytest.fixture(scope="module")
-def renderer(tmp_path_factory):
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
+def renderer(adapter, tmp_path_factory):
     return Renderer(open_device(), Store.open(write_small_store(tmp_path_factory.mktemp("pictures") / "small")))
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
-from lambent.realtime.device import choose_adapter
 from lambent.store.views import read_views
 from tests.viewer.small_store import FRONT, write_small_store
 from tests.viewer.window_session import ROOT, VirtualScreen, WindowSession, missing_tools
@@ -18,13 +17,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def screen():
+def screen(adapter):
     if missing_tools():
         pytest.skip(f"not installed: {', '.join(missing_tools())}")
-    try:
-        choose_adapter()
-    except UserError as error:
-        pytest.skip(str(error))
     screen = VirtualScreen()
     yield screen
     screen.close()
