@@ -56,7 +56,7 @@ def balance_emitters(builder: SceneBuilder) -> None:
 def _surface_points(scene: Scene, count: int) -> tuple[Array, Array]:
     """Points (count, 3) and normals, spread over all surfaces as the light map's texels are."""
     rng = np.random.default_rng(0)
-    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    corners = scene.corners
     scale = np.concatenate([np.full(len(o.mesh.faces), o.light_map_scale) for o in scene.objects])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1) * scale**2

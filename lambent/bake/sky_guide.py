@@ -211,7 +211,7 @@ class _Pilot:
 def surface_points(scene: Scene, count: int) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Points (count, 3) on a scene's surfaces, normals of their triangles, and whether light crosses there."""
     rng = np.random.default_rng(0)
-    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    corners = scene.corners
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     share = np.sqrt(area / area.sum())  # between area and number: small things are not forgotten

@@ -147,7 +147,7 @@ def pilot_of_importance(photons: SkyPhotons, trace: Any, over_area: Array, sampl
 
 def _patches(scene: Scene, size_m: float) -> Array:
     """Triangles (P, 3, 3) of all surfaces, halved along their longest edges until none is longer than `size_m`."""
-    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    corners = scene.corners
     while True:
         edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)  # of corners k and k + 1
         long = edges.max(axis=1) > size_m

@@ -91,7 +91,7 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         mine &= np.isin(faces.owner, parts)
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
-    corners = np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects]).astype(float)
+    corners = scene.corners
     walled = (replace(r, walled=walled_edges(r.outline, np.array(r.plane[:3]), corners)) for r in large)
     return tuple(sorted(walled, key=lambda r: -r.area_m2))
 

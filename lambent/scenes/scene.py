@@ -193,5 +193,10 @@ class Scene:
         lows, highs = zip(*(o.mesh.bounds for o in self.objects), strict=True)
         return np.min(lows, axis=0), np.max(highs, axis=0)
 
+    @property
+    def corners(self) -> Array:
+        """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
+        return np.concatenate([o.mesh.positions[o.mesh.faces] for o in self.objects]).astype(float)
+
     def object(self, name: str) -> SceneObject:
         return next(o for o in self.objects if o.name == name)
