@@ -82,7 +82,7 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
 }
 AUTO, OFF = "auto", "off"
-CHOICES = (AUTO, OFF, *(name for ways in PLANAR.values() for name in ways if name != "qmc"))
+CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for ways in PLANAR.values() for name in ways if name != "qmc")]))
 
 
 def planar_integrator(integrator: str, way: str) -> Integrator | None:
