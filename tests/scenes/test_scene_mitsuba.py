@@ -15,7 +15,6 @@ from lambent.core.frames import normalize
 from lambent.core.images import write_image
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, validate
-from lambent.scenes.loaders.mitsuba.metals import R0
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, Scene, SunSky
 
 BALL = '<shape type="sphere" id="ball"/>'
@@ -221,67 +220,6 @@ def test_old_scales_and_a_checkerboard(tmp_path: Path) -> None:
     assert np.allclose(texture.texels[[0, -1, 0, -1], [0, -1, -1, 0], 0], [2, 2, 0, 0])
 
 
-BSDFS = {
-    "diffuse": ('<bsdf type="diffuse" id="m"><rgb name="reflectance" value="0.6 0.4 0.2"/></bsdf>', 0.002),
-    "plastic": ('<bsdf type="plastic" id="m"><rgb name="diffuse_reflectance" value="0.6 0.4 0.2"/></bsdf>', 0.03),
-    "nonlinear": (
-        '<bsdf type="roughplastic" id="m"><float name="alpha" value="0.15"/><boolean name="nonlinear" value="true"/>'
-        '<string name="distribution" value="ggx"/><rgb name="diffuse_reflectance" value="0.8 0.5 0.1"/></bsdf>', 0.03),
-    "gold": (
-        '<bsdf type="roughconductor" id="m"><string name="material" value="Au"/>'
-        '<float name="alpha" value="0.1"/></bsdf>', 0.03),
-    "eta": (
-        '<bsdf type="roughconductor" id="m"><float name="alpha" value="0.2"/><rgb name="eta" value="1.66 0.88 0.52"/>'
-        '<rgb name="k" value="9.2 6.3 4.8"/></bsdf>', 0.03),
-    "mirror": ('<bsdf type="conductor" id="m"><string name="material" value="none"/></bsdf>', 0.01),
-    "principled": (
-        '<bsdf type="principled" id="m"><rgb name="base_color" value="0.7 0.4 0.1"/>'
-        '<float name="roughness" value="0.5"/><float name="metallic" value="1"/></bsdf>', 0.04),
-    "blend": (
-        '<bsdf type="blendbsdf" id="m"><float name="weight" value="0.25"/><bsdf type="diffuse"><rgb name="reflectance"'
-        ' value="0.8"/></bsdf><bsdf type="roughconductor"><string name="material" value="none"/></bsdf></bsdf>', 0.02),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", BSDFS)
-def test_bsdfs_return_as_much_light(tmp_path: Path, name: str) -> None:
-    """Directional albedos at three angles, against samples of Mitsuba's own BSDF, two-sided as ours are."""
-    text, tolerance = BSDFS[name]
-    twosided = text.replace(' id="m"', "").replace('<bsdf type="', '<bsdf type="twosided"><bsdf type="', 1) + "</bsdf>"
-    theirs, scene = both(tmp_path, f'<shape type="rectangle">{text}</shape>')
-    import drjit as dr
-    import mitsuba as mi
-
-    bsdf = (
-        mi.load_string(f'<scene version="3.0.0"><shape type="rectangle">{twosided}</shape></scene>').shapes()[0].bsdf()
-    )
-    count = 20000
-    for theta_deg in (0, 30, 60):
-        wo = np.array([np.sin(np.radians(theta_deg)), 0.0, np.cos(np.radians(theta_deg))])
-        si = dr.zeros(mi.SurfaceInteraction3f, count)
-        si.wi = mi.Vector3f(*map(float, wo))
-        random = np.random.default_rng(0).random((3, count)).astype(np.float32)
-        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(random[0]), mi.Point2f(random[1:]))
-        wanted = np.array(weight).mean(axis=1)
-        ours = MaterialBSDF(scene.materials["m"]).albedo(wo)
-        assert np.allclose(ours, wanted, atol=tolerance), (name, theta_deg, ours, wanted)
-    assert theirs is not None
-
-
-def test_metals_are_mitsubas(tmp_path: Path) -> None:
-    """Every metal of the table: Mitsuba's mirror of that name, seen from above, in RGB."""
-    engine()
-    import drjit as dr
-    import mitsuba as mi
-
-    si = dr.zeros(mi.SurfaceInteraction3f, 1)
-    si.wi = mi.Vector3f(0, 0, 1)
-    for name in ("Ag", "Al", "Au", "Cu", "Cr", "W"):
-        bsdf = mi.load_dict({"type": "conductor", "material": name})
-        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(0.5), mi.Point2f(0.5, 0.5))
-        assert np.allclose(np.array(weight).ravel(), R0[name], atol=0.06), name
-
-
 def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     _png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 0, 0, 0]]])
     body = """
@@ -301,8 +239,7 @@ def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path, body))
     m, said = scene.materials, "\n".join(scene.warnings)
     glass, pane = m["glass"], m["pane"]
-    assert glass.lobes[0].r0[0] == pytest.approx((0.5046 / 2.5046) ** 2, rel=2e-3) and glass.transmits
-    assert pane.lobes[0].r0[0] == pytest.approx(2 * glass.lobes[0].r0[0] / (1 + glass.lobes[0].r0[0]))
+    assert 0.04 < glass.lobes[0].r0[0] < 0.05 and glass.transmits and 0.07 < pane.lobes[0].r0[0] < 0.1
     assert MaterialBSDF(glass).albedo(np.array([0.0, 0, 1]))[0] == pytest.approx(1, abs=0.01)
     leaf = scene.textures["leaf"]
     assert leaf.opacity is not None and leaf.opacity.texels.ravel().tolist() == [1, 0]

@@ -58,6 +58,11 @@ def constant(values: ArrayLike) -> Varying:
     return Varying(np.atleast_1d(np.asarray(values, float)))
 
 
+def scaled(v: Varying, factor: float | Floats) -> Varying:
+    """`v` times a number, or one per channel."""
+    return Varying(v.values * np.asarray(factor, v.values.dtype), v.uv_transform)
+
+
 def combined(function: Callable[..., Any], *inputs: Varying, said: list[str], what: str = "textures") -> Varying:
     """`function` of the inputs' values, texel by texel.
 

@@ -3,11 +3,13 @@
 A dielectric coat over a diffuse base (`plastic`, `roughplastic`) becomes a lobe and a coupled diffuse term with the
 albedo that Mitsuba's has at normal incidence: T(1) T rho / (eta^2 (1 - rho' R)), T(1) and T what the coat lets through
 from above and of diffuse light, R what it reflects of diffuse light inside, rho' = rho where `nonlinear`, else 1.
+
+Fresnel's terms become the nearest of Schlick's form. A facet of slope s turns what passes a face of a solid by about
+(eta - 1) s, where our sheets turn it by 2 s: their roughness is that of the solid times (eta - 1)/2.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,16 +17,26 @@ import numpy as np
 
 from lambent.core.errors import did_you_mean
 from lambent.core.frames import Floats
-from lambent.scenes.loaders.metallic import metallic_roughness
-from lambent.scenes.loaders.mitsuba.interfaces import mean_reflectance, reflectance
-from lambent.scenes.loaders.mitsuba.metals import IOR, R0
+from lambent.scenes.loaders.mitsuba.interfaces import (
+    COS,
+    fresnel,
+    mean_reflectance,
+    mean_transmittance,
+    nearest_fresnel,
+    nearest_passage,
+    normal_reflectance,
+    transmittance,
+)
+from lambent.scenes.loaders.mitsuba.metals import IOR, METALS
+from lambent.scenes.loaders.mitsuba.principled import principled, principled_thin
 from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_picture
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surface import BLACK, ROUGHNESS_MIN, Gloss, Surface, blended, seen_through
-from lambent.scenes.loaders.varying import Varying, absolute, combined, constant
+from lambent.scenes.loaders.surface import BLACK, ROUGHNESS_MIN, Distribution, Gloss, Surface, blended, seen_through
+from lambent.scenes.loaders.varying import Varying, absolute, combined, constant, scaled
 
 GREY = 0.5
 GLOSSES_MAX = 16
+OREN_NAYAR_MEAN = 0.21396  # mean over both hemispheres of max(0, cos phi) sin alpha tan beta
 WHITE = np.ones(3)
 NOTHING = ("null",)  # surfaces that are not there
 
@@ -51,11 +63,6 @@ def _unknown(plugin: Plugin) -> Surface:
     return surface_of(inner[0]) if inner else grey()
 
 
-def normal_reflectance(eta: float) -> float:
-    """Reflectance of a dielectric at normal incidence."""
-    return ((eta - 1) / (eta + 1)) ** 2
-
-
 def grey() -> Surface:
     return Surface(kd=constant(np.full(3, GREY)))
 
@@ -73,10 +80,13 @@ def _diffuse(plugin: Plugin) -> Surface:
 
 
 def _rough_diffuse(plugin: Plugin) -> Surface:
-    if plugin.number("alpha", 0.2) > 0:
-        plugin.say("is Lambertian here, without Oren and Nayar's roughness")
+    """Lambertian with the mean albedo of Oren and Nayar's (1994, eq. 30, without interreflections)."""
+    variance = max(plugin.number("alpha", 0.2), 0.0) ** 2 / 2  # of the facets' angles
+    if variance > 0:
+        plugin.say("is Lambertian here, of the mean albedo of Oren and Nayar's roughness")
     plugin.ignore("use_fast_approx")
-    return _diffuse(plugin)
+    share = 1 - 0.5 * variance / (variance + 0.33) + 0.45 * variance / (variance + 0.09) * OREN_NAYAR_MEAN
+    return Surface(kd=scaled(_diffuse(plugin).kd, share))
 
 
 def _diffuse_transmitter(plugin: Plugin) -> Surface:
@@ -85,11 +95,11 @@ def _diffuse_transmitter(plugin: Plugin) -> Surface:
 
 def _plastic(plugin: Plugin, rough: bool = True) -> Surface:
     eta = _eta(plugin, "polypropylene")
-    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
+    distribution, m, aspect = _facets(plugin, rough)
     slope = float(np.clip(m.mean[0], 1e-3, 1)) if rough else 0.0
     inside = mean_reflectance(1 / eta, slope, distribution)
-    through = (1 - mean_reflectance(eta, slope, distribution)) / eta**2
-    through *= 1 - float(reflectance(np.ones(1), eta, slope, distribution)[0])
+    through = mean_transmittance(eta, slope, distribution) / eta**2
+    through *= float(transmittance(np.ones(1), eta, slope, distribution)[0])
     nonlinear = plugin.flag("nonlinear", False)
 
     def below(rho: Floats) -> Floats:
@@ -98,9 +108,9 @@ def _plastic(plugin: Plugin, rough: bool = True) -> Surface:
         return albedo
 
     kd = combined(below, colour(plugin, "diffuse_reflectance", GREY), said=[])
-    r0 = np.full(3, normal_reflectance(eta))
-    gloss = Gloss(m, colour(plugin, "specular_reflectance", 1.0), r0, aspect, distribution=distribution)
-    return Surface(kd=kd, coupled=True, glosses=(gloss,))
+    r0, rise = nearest_fresnel(fresnel(COS, eta))
+    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
+    return Surface(kd=kd, coupled=True, glosses=(Gloss(m, k, np.full(3, r0), aspect, distribution=distribution),))
 
 
 def _smooth_plastic(plugin: Plugin) -> Surface:
@@ -108,9 +118,10 @@ def _smooth_plastic(plugin: Plugin) -> Surface:
 
 
 def _conductor(plugin: Plugin, rough: bool = False) -> Surface:
-    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
-    k = colour(plugin, "specular_reflectance", 1.0)
-    return Surface(glosses=(Gloss(m, k, _metal(plugin), aspect, distribution=distribution),))
+    distribution, m, aspect = _facets(plugin, rough)
+    r0, rise = _metal(plugin)
+    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
+    return Surface(glosses=(Gloss(m, k, r0, aspect, distribution=distribution),))
 
 
 def _rough_conductor(plugin: Plugin) -> Surface:
@@ -118,8 +129,12 @@ def _rough_conductor(plugin: Plugin) -> Surface:
 
 
 def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
-    plugin.say("is a thin sheet here: light is not bent")
-    return _sheet(plugin, normal_reflectance(_eta(plugin, "bk7")), rough)
+    eta = _eta(plugin, "bk7")
+    if rough:
+        plugin.say("is a thin sheet here: light is not bent, only spread as far as by a solid's face")
+    else:
+        plugin.say("is a thin sheet here: light is not bent")
+    return _sheet(plugin, fresnel(COS, eta), (eta - 1) / 2, rough)
 
 
 def _rough_dielectric(plugin: Plugin) -> Surface:
@@ -127,62 +142,40 @@ def _rough_dielectric(plugin: Plugin) -> Surface:
 
 
 def _thin_dielectric(plugin: Plugin) -> Surface:
-    r0 = normal_reflectance(_eta(plugin, "bk7"))
-    return _sheet(plugin, 2 * r0 / (1 + r0), rough=False)  # light that goes to and fro inside counts
+    once = fresnel(COS, _eta(plugin, "bk7"))
+    return _sheet(plugin, 2 * once / (1 + once), 1.0, rough=False)  # light that goes to and fro inside counts
 
 
-def _sheet(plugin: Plugin, r0: float, rough: bool) -> Surface:
-    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
-    back = Gloss(m, colour(plugin, "specular_reflectance", 1.0), np.full(3, r0), aspect, distribution=distribution)
-    through = replace(back, k=colour(plugin, "specular_transmittance", 1.0), side="transmission")
+def _sheet(plugin: Plugin, reflected: Floats, bend: float, rough: bool) -> Surface:
+    """A sheet of a reflectance (at `COS`); what passes is spread by `bend` times the facets' slopes."""
+    distribution, m, aspect = _facets(plugin, rough)
+    r0, rise = nearest_fresnel(reflected)
+    drawn = rise * (r0 + (1 - r0) * (1 - COS) ** 5)
+    share, falloff = nearest_passage(1 - np.maximum(reflected, drawn))  # both together never return more than arrives
+    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
+    back = Gloss(m, k, np.full(3, r0), aspect, distribution=distribution)
+    k = scaled(colour(plugin, "specular_transmittance", 1.0), share)
+    spread = scaled(m, bend) if rough else m
+    through = replace(back, m=spread, k=k, r0=BLACK, side="transmission", falloff=falloff)
     return Surface(glosses=(back, through))
 
 
 def _phong(plugin: Plugin) -> Surface:
+    """(n + 2)/(2 pi) cos^n about the mirror direction: as wide as Beckmann's of m^2 = 1/(2n), and as high."""
     exponent = number(plugin, "exponent", 30.0)
-    m = combined(lambda n: np.sqrt(2 / (np.maximum(n, 0) + 2)), exponent, said=[])
+    m = combined(lambda n: np.sqrt(0.5 / np.maximum(n, 0.5)), exponent, said=[])
     kd, ks = colour(plugin, "diffuse_reflectance", GREY), colour(plugin, "specular_reflectance", 0.2)
-    return Surface(kd=kd, glosses=(Gloss(m, ks, WHITE, distribution="beckmann"),))
+    return Surface(kd=kd, glosses=(Gloss(m, ks, WHITE, distribution="beckmann", masked=False, falloff=1.0),))
 
 
 def _ward(plugin: Plugin) -> Surface:
-    plugin.ignore("variant")
+    """Ward's own form darkens as the cosine at grazing incidence, Duer's and the balanced one do not."""
+    variant = plugin.text("variant", "balanced").lower()
     kd, ks = colour(plugin, "diffuse_reflectance", GREY), colour(plugin, "specular_reflectance", 0.2)
     _, m, aspect = _roughness(plugin)
-    return Surface(kd=kd, glosses=(Gloss(m, ks, WHITE, aspect, distribution="beckmann"),))
-
-
-def _principled(plugin: Plugin, thin: bool = False) -> Surface:
-    said: list[str] = []
-    base = colour(plugin, "base_color", GREY)
-    metallic = number(plugin, "metallic", 0.0)
-    roughness = number(plugin, "roughness", 0.5)
-    anisotropic = min(max(float(number(plugin, "anisotropic", 0.0).mean[0]), 0.0), 1.0)
-    aspect = math.sqrt(1 - 0.9 * anisotropic)
-    m = combined(lambda r: np.clip(r, 0, 1) ** 2 / aspect, roughness, said=said)
-    eta = plugin.number("eta", 0.0)
-    specular = plugin.number("specular", 0.5)
-    r0 = normal_reflectance(eta) if eta > 0 else 0.08 * min(max(specular, 0.0), 1.0)
-    through = min(max(float(number(plugin, "spec_trans", 0.0).mean[0]), 0.0), 1.0)
-    surface = metallic_roughness(base, metallic, m, np.full(3, r0), said, aspect=aspect**2, through=through)
-    if through and not thin:
-        plugin.say("is a thin sheet here: light is not bent")
-    if thin:
-        passed = min(max(float(number(plugin, "diff_trans", 0.0).mean[0]), 0.0), 2.0) / 2
-        kd, kt_d = (Varying(surface.kd.values * share, surface.kd.uv_transform) for share in (1 - passed, passed))
-        surface = replace(surface, kd=kd, kt_d=kt_d)
-    coat = plugin.number("clearcoat", 0.0)
-    if coat > 0:
-        gloss = min(max(plugin.number("clearcoat_gloss", 0.0), 0.0), 1.0)
-        lobe = Gloss(constant(0.1 + (0.001 - 0.1) * gloss), constant(np.full(3, 0.25 * coat)), np.full(3, 0.04))
-        surface = replace(surface, glosses=(*surface.glosses, lobe))
-    for text in dict.fromkeys(said):
-        plugin.say(text)
-    return surface
-
-
-def _principled_thin(plugin: Plugin) -> Surface:
-    return _principled(plugin, thin=True)
+    falloff = 1.0 if variant == "ward" else 0.0
+    gloss = Gloss(m, ks, WHITE, aspect, distribution="beckmann", masked=False, falloff=falloff)
+    return Surface(kd=kd, glosses=(gloss,))
 
 
 def _nested(plugin: Plugin) -> Surface:
@@ -198,11 +191,12 @@ def _nested(plugin: Plugin) -> Surface:
 def _coating(plugin: Plugin) -> Surface:
     """A clear coat: what is below loses what the coat reflects, once on the way in and once on the way out."""
     below = _nested(plugin)
-    r0 = normal_reflectance(_eta(plugin, "bk7"))
+    eta = _eta(plugin, "bk7")
+    r0, rise = nearest_fresnel(fresnel(COS, eta))
     rough = plugin.type == "roughcoating"
-    distribution, m, aspect = _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
-    under = blended([(below, (1 - r0) ** 2)], [])
-    k = colour(plugin, "specular_reflectance", 1.0)
+    distribution, m, aspect = _facets(plugin, rough)
+    under = blended([(below, (1 - normal_reflectance(eta)) ** 2)], [])
+    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
     gloss = Gloss(m, k, np.full(3, r0), aspect, distribution=distribution)
     return replace(under, coupled=True, glosses=(*under.glosses, gloss))
 
@@ -278,8 +272,8 @@ KINDS: dict[str, Callable[[Plugin], Surface]] = {
     "diffuse": _diffuse, "roughdiffuse": _rough_diffuse, "difftrans": _diffuse_transmitter,
     "plastic": _smooth_plastic, "roughplastic": _plastic, "conductor": _conductor,
     "roughconductor": _rough_conductor, "dielectric": _dielectric, "thindielectric": _thin_dielectric,
-    "roughdielectric": _rough_dielectric, "phong": _phong, "ward": _ward, "principled": _principled,
-    "principledthin": _principled_thin, "twosided": _nested, "coating": _coating, "roughcoating": _coating,
+    "roughdielectric": _rough_dielectric, "phong": _phong, "ward": _ward, "principled": principled,
+    "principledthin": principled_thin, "twosided": _nested, "coating": _coating, "roughcoating": _coating,
     "mask": _mask, "normalmap": _normal_map, "bumpmap": _bump_map, "blendbsdf": _blend, "mixturebsdf": _mixture,
     "null": _nothing,
 }  # fmt: skip
@@ -290,7 +284,11 @@ def _smooth(plugin: Plugin) -> Varying:
     return constant(ROUGHNESS_MIN)
 
 
-def _roughness(plugin: Plugin) -> tuple[str, Varying, float]:  # type: ignore[no-untyped-def]
+def _facets(plugin: Plugin, rough: bool) -> tuple[Distribution, Varying, float]:
+    return _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
+
+
+def _roughness(plugin: Plugin) -> tuple[Distribution, Varying, float]:
     """Distribution, roughness along t, and roughness across by that along."""
     distribution = plugin.text("distribution", "beckmann").lower()
     if distribution not in ("beckmann", "ggx", "phong", "as"):
@@ -325,8 +323,8 @@ def _index(plugin: Plugin, name: str, default: str) -> float:
     return value
 
 
-def _metal(plugin: Plugin) -> Floats:
-    """Reflectance (3,) at normal incidence of a conductor."""
+def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
+    """r0 and k, (3,) each, of a conductor."""
     outside = plugin.transform_element("ext_eta")
     around = 1.0
     if outside is not None:
@@ -335,18 +333,20 @@ def _metal(plugin: Plugin) -> Floats:
     if plugin.has("eta", "k"):
         plugin.ignore("material")
         eta, k = colour(plugin, "eta", 0.0).mean / around, colour(plugin, "k", 1.0).mean / around
-        r0: Floats = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
-        return r0
+        fits = [nearest_fresnel(fresnel(COS, complex(n, -x))) for n, x in zip(eta, k, strict=True)]
+        r0, rise = np.array(fits).T
+        return r0, rise
     name = plugin.text("material", "Cu")
     if name.lower() == "none":
-        return WHITE
-    known = {**R0, **{f"{n}_palik": r for n, r in R0.items()}}
+        return WHITE, WHITE
+    known = {**METALS, **{f"{n}_palik": metal for n, metal in METALS.items()}}
     if name not in known:
         plugin.say(f"unknown metal {name}, it is aluminium{_guess(name)}")
         name = "Al"
-    return np.array(known[name])
+    straight, grazing = (np.array(v) for v in known[name])
+    return straight / grazing, grazing
 
 
 def _guess(name: str) -> str:
-    hint = did_you_mean(name, R0)
+    hint = did_you_mean(name, METALS)
     return f" ({hint})" if hint else ""

@@ -1,7 +1,7 @@
-"""How much light the surface of a dielectric reflects, smooth or rough: what lies under a coat loses that.
+"""How much light a surface reflects and lets through, smooth or rough, and the nearest to it that lobes have.
 
 Rough ones as Mitsuba has them: one bounce on microfacets, Smith's masking (Walter et al. 2007, "Microfacet models for
-refraction", eqs 19-28, 34); light that would bounce twice is lost.
+refraction", eqs 19-28, 34); light that would bounce twice is lost, so that reflected and passed do not sum to 1.
 """
 
 from __future__ import annotations
@@ -10,38 +10,106 @@ import numpy as np
 
 from lambent.core.frames import Floats
 
-COSINES, FACETS = 32, 48  # Gauss-Legendre points over cos theta_i; quadrature over facets, each way
+COSINES, FACETS = 128, 48  # Gauss-Legendre points over cos theta_i; quadrature over facets, each way
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(COSINES)
+COS = (GAUSS_POINTS + 1) / 2  # where Fresnel's terms are compared
 
 
-def fresnel(cos_i: Floats, eta: float) -> Floats:
-    """Reflectance of unpolarised light at a dielectric; eta, inside by outside, may be below 1 (total reflection)."""
-    sin2_t = (1 - cos_i**2) / eta**2
-    cos_t = np.sqrt(np.maximum(1 - sin2_t, 0))
-    parallel = (eta * cos_i - cos_t) / np.maximum(eta * cos_i + cos_t, 1e-12)
-    across = (cos_i - eta * cos_t) / np.maximum(cos_i + eta * cos_t, 1e-12)
-    return np.where(sin2_t >= 1, 1.0, (parallel**2 + across**2) / 2)
+def fresnel(cos_i: Floats, eta: float | complex) -> Floats:
+    """Reflectance of unpolarised light; eta - ik, inside by outside, of metals; below 1 there is total reflection."""
+    inside = np.conj(complex(eta))
+    cos_t = np.sqrt(1 - (1 - cos_i**2) / inside**2 + 0j)
+    across = (cos_i - inside * cos_t) / (cos_i + inside * cos_t)
+    parallel = (inside * cos_i - cos_t) / (inside * cos_i + cos_t)
+    return np.asarray((np.abs(across) ** 2 + np.abs(parallel) ** 2) / 2)
+
+
+def normal_reflectance(eta: float) -> float:
+    """Reflectance of a dielectric at normal incidence."""
+    return ((eta - 1) / (eta + 1)) ** 2
 
 
 def reflectance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
     """Share of light from one direction that is reflected, at each of cos_i (N,); m is the slope roughness."""
     if m == 0:
         return fresnel(cos_i, eta)
-    u = (np.arange(FACETS) + 0.5) / FACETS
-    r = np.sqrt(u / (1 - u)) if distribution == "ggx" else np.sqrt(-np.log(1 - u))
-    x = (m * r[:, None] * np.cos(2 * np.pi * u)).ravel()
-    z = np.repeat(1 / np.sqrt(1 + (m * r) ** 2), FACETS)  # of facets drawn with density D cos
-    ci = cos_i[:, None]
-    cos_d = np.maximum((np.sqrt(1 - ci**2) * x + ci) * z, 0)
-    cos_o = 2 * cos_d * z - ci
-    held = fresnel(cos_d, eta) * _unmasked(ci, m, distribution) * _unmasked(np.maximum(cos_o, 1e-6), m, distribution)
-    return np.where(cos_o > 0, held * cos_d / (ci * z), 0.0).mean(axis=1)
+    ci, z, cos_d = _facets(cos_i, m, distribution)
+    return _returned(fresnel(cos_d, eta), 2 * cos_d * z - ci, ci, z, cos_d, m, distribution)
+
+
+def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
+    """Share of light from one direction that passes, at each of cos_i (N,)."""
+    if m == 0:
+        return 1 - fresnel(cos_i, eta)
+    ci, z, cos_d = _facets(cos_i, m, distribution)
+    cos_t = np.sqrt(np.maximum(1 - (1 - cos_d**2) / eta**2, 0))
+    cos_o = ci / eta - (cos_d / eta - cos_t) * z  # on the far side
+    return _returned(1 - fresnel(cos_d, eta), cos_o, ci, z, cos_d, m, distribution)
 
 
 def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
-    """Share of diffuse light that is reflected."""
-    points, weights = np.polynomial.legendre.leggauss(COSINES)
-    cos_i = (points + 1) / 2
-    return float(np.sum(weights * cos_i * reflectance(cos_i, eta, m, distribution)))
+    """Share of diffuse light that is reflected. Of a smooth surface seen from inside it follows from outside."""
+    if m == 0 and eta < 1:
+        return 1 - (1 - mean_reflectance(1 / eta)) * eta**2
+    return _mean(reflectance(COS, eta, m, distribution))
+
+
+def mean_transmittance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
+    """Share of diffuse light that passes."""
+    return _mean(transmittance(COS, eta, m, distribution))
+
+
+def nearest_fresnel(exact: Floats) -> tuple[float, float]:
+    """r0 and k of the k (r0 + (1 - r0)(1 - cos)^5) nearest to a reflectance at `COS`, k at most 1.
+
+    Weighed by the cosine and relative to what is reflected: metals, whose reflectance dips before it rises, come out
+    nearly flat; a dielectric gains a little at normal incidence for what Schlick's curve lacks at 60 degrees.
+    """
+    rise = (1 - COS) ** 5
+    weight = GAUSS_WEIGHTS * COS / np.maximum(exact, 1e-3)
+    basis = np.stack([np.ones_like(COS), rise]) * np.sqrt(weight)
+    a, b = np.linalg.lstsq(basis.T, exact * np.sqrt(weight), rcond=None)[0]
+    if b < 0:
+        a, b = float(np.sum(weight * exact) / np.sum(weight)), 0.0
+    elif a + b > 1:
+        a = float(np.sum(weight * (exact - rise) * (1 - rise)) / np.sum(weight * (1 - rise) ** 2))
+        b = 1 - a
+    a = max(float(a), 0.0)
+    return a / max(a + float(b), 1e-9), min(a + float(b), 1.0)
+
+
+def nearest_passage(exact: Floats) -> tuple[float, float]:
+    """k and x of the k (1 - (1 - cos)^5) cos^x nearest to a transmittance at `COS`."""
+    under = 1 - (1 - COS) ** 5
+    powers = np.linspace(0, 0.5, 51)
+    shapes = under * COS ** powers[:, None]
+    weight = GAUSS_WEIGHTS * COS
+    k = (weight * shapes * exact).sum(axis=1) / (weight * shapes**2).sum(axis=1)
+    off = (weight * (k[:, None] * shapes - exact) ** 2).sum(axis=1)
+    best = int(np.argmin(off))
+    return float(k[best]), float(powers[best])
+
+
+def _mean(values: Floats) -> float:
+    return float(np.sum(GAUSS_WEIGHTS * COS * values))
+
+
+def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats, Floats]:
+    """cos_i (N, 1), and of facets drawn with density D cos their own cosine and that between them and the light."""
+    u = (np.arange(FACETS) + 0.5) / FACETS
+    r = np.sqrt(u / (1 - u)) if distribution == "ggx" else np.sqrt(-np.log(1 - u))
+    x = (m * r[:, None] * np.cos(2 * np.pi * u)).ravel()
+    z = np.repeat(1 / np.sqrt(1 + (m * r) ** 2), FACETS)
+    ci = cos_i[:, None]
+    return ci, z, np.maximum((np.sqrt(1 - ci**2) * x + ci) * z, 0)
+
+
+def _returned(
+    share: Floats, cos_o: Floats, ci: Floats, z: Floats, cos_d: Floats, m: float, distribution: str
+) -> Floats:
+    """Mean over facets of what leaves at cos_o without meeting another one."""
+    held = share * _unmasked(ci, m, distribution) * _unmasked(np.maximum(cos_o, 1e-6), m, distribution)
+    return np.asarray(np.where(cos_o > 0, held * cos_d / (ci * z), 0.0).mean(axis=1))
 
 
 def _unmasked(cosine: Floats, m: float, distribution: str) -> Floats:
