@@ -149,7 +149,7 @@ class FrameState:
 
     def samples(self, material: Material, roughness: float = 1.0) -> int:
         """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
-        return self.n or (QMC_N if self.integrator == "qmc" else automatic_n(material, roughness))
+        return self.n or (QMC_N if integrator(self.integrator).progressive else automatic_n(material, roughness))
 
 
 class Renderer:

@@ -80,6 +80,7 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "lobe-4.25": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 25})},
     "fis": {"fis": Integrator("planar_quadrature.wgsl", patterns.fis_table, THREE_STEPS)},
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
+    "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
 }
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for ways in PLANAR.values() for name in ways if name != "qmc")]))

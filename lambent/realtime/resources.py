@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
+from lambent.realtime.aim import aim_table
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 from lambent.realtime.device import WEBGPU_LIMITS
@@ -49,7 +50,7 @@ class Layouts:
         self._device = device
         self.frame = self._make(_BOTH, _UNIFORM, _SAMPLER)
         self.material = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _STORAGE, _SAMPLER, *[_FLAT] * len(PARTS))
-        self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE)
+        self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE, _STORAGE)
         self.light = self._make(_FRAGMENT, _FLAT, _FLAT)
         self.cube = self._make(_FRAGMENT, _CUBE)
         self.shown = self._make(_FRAGMENT, _FLAT, _SAMPLER)
@@ -120,6 +121,7 @@ class Light:
         self._device, self._sampler = device, sampler
         self._radiance = np.zeros((6, 1, 1, 3), np.float32) if probe is None else probe.radiance
         self._cubes: dict[Cube, Any] = {}
+        self._aim: Any = None
         self.version = 0
         distance = None if probe is None else probe.distance
         self.centre = (0.0, 0.0, 0.0) if probe is None else probe.centre
@@ -136,11 +138,19 @@ class Light:
 
     def replace_radiance(self, cube: Floats) -> None:
         """Show other light, (6, N, N, 3)."""
-        self._radiance, self._cubes = cube, {}
+        self._radiance, self._cubes, self._aim = cube, {}, None
         self.version += 1
 
     def view(self, cube: Cube) -> Any:
         return self._texture(cube).create_view(dimension="cube")
+
+    @property
+    def aim(self) -> Any:
+        """The table that samples are aimed at lamps by."""
+        if self._aim is None:
+            table = aim_table(finite(self._radiance)[0])
+            self._aim = self._device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
+        return self._aim
 
     def half_log2_texels(self, cube: Cube) -> float:
         """Half the log2 of texels per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17), of which a look-up blurs one."""
@@ -215,7 +225,7 @@ class ObjectResources:
             data["irradiance"][0, : len(light.irradiance)] = light.irradiance
             uniform = self._device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
             self._groups[cube] = self._layouts.group(
-                self._layouts.object, uniform, light.planes, light.view(cube), light.depth_view
+                self._layouts.object, uniform, light.planes, light.view(cube), light.depth_view, light.aim
             )
         return self._groups[cube]
 

@@ -7,7 +7,7 @@
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     let lobe = lobe_here(index, s).lobe;
-    let offset = pixel_hash(s.pixel, index);
+    let offset = pixel_hash(s.pixel, index).xy;
     var sum = vec3f(0.0);
     var beyond = Beyond(vec3f(0.0), vec3f(0.0), 0.0);
     for (var k = 0u; k < SAMPLES; k++) {

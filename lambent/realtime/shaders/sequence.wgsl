@@ -1,13 +1,13 @@
 // Samples of the progressive mode: an additive sequence (Roberts 2018), rotated per pixel and lobe (Cranley & Patterson
 // 1976).
 
-// Two well mixed words of a pixel (Jarzynski & Olano 2020, pcg3d).
-fn pixel_hash(pixel: vec2u, lobe: u32) -> vec2u {
+// Three well mixed words of a pixel (Jarzynski & Olano 2020, pcg3d).
+fn pixel_hash(pixel: vec2u, lobe: u32) -> vec3u {
     var v = vec3u(pixel, lobe) * 1664525u + 1013904223u;
     v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
     v ^= v >> vec3u(16u);
     v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
-    return v.xy;
+    return v;
 }
 
 // Sample k in [0, 1)^2. Whole numbers modulo 2^32: exact for any k, where floats would lose the sequence after thousands.

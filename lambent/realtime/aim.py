@@ -1,0 +1,73 @@
+"""Where the progressive mode aims samples: a table of a probe's lamps, which shaders/aim.wgsl draws directions from.
+
+Lamps are what is brighter than the mean of all directions: the rest is left to samples of the lobe, which find it at
+least as well (the density that is best beside another technique; Karlik et al. 2019, "MIS compensation"). Over a
+texel the density is constant in the face's own coordinates, so its solid angle enters exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.realtime.cube_mips import blurred, exact_solid_angles
+
+Floats = NDArray[np.floating]
+LEVELS = 6  # at most: 64 texels along a face
+HEAD_ROWS = 3
+INTERPOLATED = (1 / 8, 6 / 8, 1 / 8)  # mean over a texel of what bilinear look-ups show there
+
+
+def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
+    """Probabilities (6, m, m) of a cube map's texels, and the variance of its light that is the lamps'.
+
+    Parameters
+    ----------
+    cube : (6, N, N, 3) radiance, finite and not negative
+
+    Returns
+    -------
+    probabilities : (6, m, m) float64, sum 1; m is a power of two, at least 2, at most N or 64
+    variance : 4 pi C^2/omega, relative to the squared mean, of lamps that hold the share C of all light and fill omega
+        sr: 20 to 100 in rooms and at night, .2 under a sky without a sun; 0, and even probabilities, of uniform light
+    """
+    n = cube.shape[1]
+    m = 1 << min(LEVELS, max(1, n.bit_length() - 1))
+    omega = exact_solid_angles(n)
+    light = blurred(cube.mean(axis=-1, keepdims=True), INTERPOLATED)[..., 0] * omega
+    edges, texel = np.linspace(0, n, m + 1), np.arange(n)
+    part = np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1)
+    coarse = part @ light @ part.T
+    solid = part @ omega @ part.T
+    total = coarse.sum()
+    lamps = np.maximum(coarse - solid * (total / (4 * np.pi)), 0)
+    if lamps.sum() <= 1e-6 * total:
+        return np.broadcast_to(solid / (4 * np.pi), coarse.shape), 0.0
+    return lamps / lamps.sum(), float(4 * np.pi * (lamps**2 / solid).sum() / total**2)
+
+
+def prominence(variance: float) -> float:
+    """How far samples are worth aiming, 0 to 1: not below a variance of 1, as far as the lobe says above 4."""
+    return float(np.clip(np.log2(max(variance, 1e-9)) / 2, 0, 1))
+
+
+def aim_table(cube: Floats) -> NDArray[np.float32]:
+    """(rows, 4): the head, then the probabilities of the quarters of every quarter, level by level (see aim.wgsl)."""
+    probabilities, variance = lamp_probabilities(cube)
+    levels = probabilities.shape[1].bit_length() - 1
+    pyramid = [probabilities]
+    while pyramid[-1].shape[1] > 1:
+        m = pyramid[-1].shape[1] // 2
+        pyramid.append(pyramid[-1].reshape(6, m, 2, m, 2).sum(axis=(2, 4)))
+    head = np.zeros((HEAD_ROWS, 4))
+    head[0, :2] = levels, prominence(variance)
+    head[1:].flat[:6] = pyramid[-1].ravel()
+    return np.concatenate([head, *(_in_morton_order(level) for level in pyramid[-2::-1])]).astype(np.float32)
+
+
+def _in_morton_order(level: Floats) -> Floats:
+    """(6 m m/4, 4) of (6, m, m): a row's four are left above, right above, left below, right below."""
+    bits = level.shape[1].bit_length() - 1
+    split = level.reshape(6, *[2] * (2 * bits))
+    order = [0] + [axis for bit in range(bits) for axis in (1 + bit, 1 + bits + bit)]
+    return split.transpose(order).reshape(-1, 4)
