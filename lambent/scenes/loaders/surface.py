@@ -73,6 +73,9 @@ def finished(name: str, surface: Surface, said: list[str]) -> tuple[Material, Ma
     """
     kd, diffuse = relative(surface.kd, surface.opacity)
     kt_d, through = relative(surface.kt_d, surface.opacity)
+    if max(*kd, *kt_d) > 1:
+        said.append(f"reflects more than arrives ({max(*kd, *kt_d):.3g}): all of it")
+        kd, kt_d = np.minimum(kd, 1), np.minimum(kt_d, 1)
     if diffuse is not None and through is not None and not _same(diffuse, through):
         said.append("its diffuse transmission varies as its diffuse reflection does")
     lobes, shades, slopes = [], [], []

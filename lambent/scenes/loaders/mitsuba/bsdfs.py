@@ -270,7 +270,7 @@ def _nothing(plugin: Plugin) -> Surface:
 
 KINDS: dict[str, Callable[[Plugin], Surface]] = {
     "diffuse": _diffuse, "roughdiffuse": _rough_diffuse, "difftrans": _diffuse_transmitter,
-    "plastic": _smooth_plastic, "roughplastic": _plastic, "conductor": _conductor,
+    "plastic": _smooth_plastic, "roughplastic": _plastic, "pplastic": _plastic, "conductor": _conductor,
     "roughconductor": _rough_conductor, "dielectric": _dielectric, "thindielectric": _thin_dielectric,
     "roughdielectric": _rough_dielectric, "phong": _phong, "ward": _ward, "principled": principled,
     "principledthin": principled_thin, "twosided": _nested, "coating": _coating, "roughcoating": _coating,

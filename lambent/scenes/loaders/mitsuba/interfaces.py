@@ -17,7 +17,7 @@ COS = (GAUSS_POINTS + 1) / 2  # where Fresnel's terms are compared
 
 def fresnel(cos_i: Floats, eta: float | complex) -> Floats:
     """Reflectance of unpolarised light; eta - ik, inside by outside, of metals; below 1 there is total reflection."""
-    inside = np.conj(complex(eta))
+    inside = np.conj(complex(eta)) if abs(eta) > 1e-3 else 1e-3 + 0j
     cos_t = np.sqrt(1 - (1 - cos_i**2) / inside**2 + 0j)
     across = (cos_i - inside * cos_t) / (cos_i + inside * cos_t)
     parallel = (inside * cos_i - cos_t) / (inside * cos_i + cos_t)
@@ -81,10 +81,11 @@ def nearest_fresnel(exact: Floats) -> tuple[float, float]:
 def nearest_passage(exact: Floats) -> tuple[float, float]:
     """k and x of the k (1 - (1 - cos)^5) cos^x nearest to a transmittance at `COS`."""
     under = 1 - (1 - COS) ** 5
-    powers = np.linspace(0, 0.5, 51)
+    powers = np.linspace(-0.04, 0.5, 55)
     shapes = under * COS ** powers[:, None]
     weight = GAUSS_WEIGHTS * COS
     k = (weight * shapes * exact).sum(axis=1) / (weight * shapes**2).sum(axis=1)
+    k = np.minimum(k, exact.max())  # so that glass which is hardly there does not return more than arrives
     off = (weight * (k[:, None] * shapes - exact) ** 2).sum(axis=1)
     best = int(np.argmin(off))
     return float(k[best]), float(powers[best])

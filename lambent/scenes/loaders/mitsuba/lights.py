@@ -33,7 +33,7 @@ def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
     matrix = world @ plugin.transform()
     made: Environment | None
     if plugin.type == "constant":
-        made = ConstantEnvironment(triple(colour(plugin, "radiance", 1.0).mean))
+        made = ConstantEnvironment(triple(colour(plugin, "radiance", 1.0, emitted=True).mean))
     elif plugin.type == "envmap":
         made = _picture(plugin, matrix)
     else:
@@ -98,19 +98,21 @@ def light_of(plugin: Plugin, world: Floats) -> Light | None:
     if plugin.type == "point":
         position = plugin.vector("position")
         at = matrix[:3, 3] if position is None else _point(matrix, position)
-        made = PointLight(triple(at), triple(scale * colour(plugin, "intensity", 1.0).mean))
+        made = PointLight(triple(at), triple(scale * colour(plugin, "intensity", 1.0, emitted=True).mean))
     elif plugin.type == "spot":
         outer = min(max(plugin.number("cutoff_angle", 20.0), 0.01), 90.0)
         inner = min(max(plugin.number("beam_width", outer * 0.75), 0.0), outer)
         direction = triple(normalize(matrix[:3, 2]))
-        intensity = triple(scale * colour(plugin, "intensity", 1.0).mean)
+        intensity = triple(scale * colour(plugin, "intensity", 1.0, emitted=True).mean)
         made = PointLight(triple(matrix[:3, 3]), intensity, direction, inner, outer)
     elif plugin.type == "directional":
         given = plugin.vector("direction")
         way = matrix[:3, 2] if given is None else matrix[:3, :3] @ given
         if not way.any():
             raise plugin.element.error("direction is zero")
-        made = DirectionalLight(triple(normalize(way)), triple(scale * colour(plugin, "irradiance", 1.0).mean))
+        made = DirectionalLight(
+            triple(normalize(way)), triple(scale * colour(plugin, "irradiance", 1.0, emitted=True).mean)
+        )
     else:
         plugin.say("left out, an emitter of an unknown kind")
         return None
@@ -127,7 +129,7 @@ def emission_of(shape: Plugin) -> Triple:
     if plugin.type != "area":
         plugin.say("left out, only area emitters are read on shapes")
         return 0.0, 0.0, 0.0
-    radiance = colour(plugin, "radiance", 1.0)
+    radiance = colour(plugin, "radiance", 1.0, emitted=True)
     if radiance.is_picture:
         plugin.say("its radiance is averaged over its picture")
     scale = plugin.number("scale", 1.0)

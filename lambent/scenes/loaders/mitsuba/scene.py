@@ -17,8 +17,9 @@ from lambent.materials.document import Material
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
 from lambent.scenes.loaders.mitsuba.document import load
+from lambent.scenes.loaders.mitsuba.numbers import floats_of
 from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
-from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of, floats_of
+from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.parts import Parts, unique_name
 from lambent.scenes.loaders.surface import finished
 from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject

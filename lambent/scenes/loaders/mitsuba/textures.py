@@ -19,9 +19,9 @@ _TURNED = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 # What an exporter leaves of a picture's name that says it holds numbers, not colours, is `raw`; 0.6 says gamma = 1.
 
 
-def colour(plugin: Plugin, name: str, default: float | Floats) -> Varying:
-    """Linear RGB of a plugin's parameter."""
-    fixed = plugin.constant(name)
+def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool = False) -> Varying:
+    """Linear RGB of a plugin's parameter, which may be of light that is `emitted`."""
+    fixed = plugin.constant(name, emitted=emitted)
     if fixed is not None:
         return constant(fixed)
     texture = plugin.texture(name)

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.colour import srgb_decode
 from lambent.core.errors import did_you_mean
 from lambent.core.frames import Floats, normalize
+from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
+from lambent.scenes.loaders.mitsuba.numbers import floats_of, triple_of
 from lambent.scenes.loaders.pictures import Pictures
 from lambent.scenes.loaders.place import named
 from lambent.scenes.loaders.surface import Surface
@@ -22,13 +23,12 @@ OBJECTS = {
 }  # fmt: skip
 PLUGINS_MAX = 400_000
 NESTING_MAX = 32
-ABSURD, FAR = 1e30, 1e9
+FAR = 1e9
 # Filters, caches, samplers: how Mitsuba works, not what the scene is.
 MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
     "component_format", "shutter_open", "shutter_close", "near_clip", "far_clip",
 }  # fmt: skip
-Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
 
 
 class Reading:
@@ -159,13 +159,14 @@ class Plugin:
     def transform_element(self, name: str = "to_world") -> Element | None:
         return self._values.get(name)
 
-    def constant(self, name: str) -> Floats | None:
+    def constant(self, name: str, *, emitted: bool = False) -> Floats | None:
         """Linear RGB (3,) of a parameter that is the same everywhere; None where it is not given, or is a texture."""
         element = self._values.get(name)
         if element is None:
             return None
         self._asked.add(name)
-        return colour_of(element)
+        document = self.reading.document
+        return colour_of(element, document.root, emitted=emitted, old=document.version.startswith("0."))
 
     def texture(self, name: str) -> Plugin | None:
         return next(iter(self.objects("texture", name)), None)
@@ -175,90 +176,6 @@ class Plugin:
         written = self.text(name)
         root = self.reading.document.root
         return named(written, self.element.file, root, f"line {self.element.line} <{self.element.tag}> {name}")
-
-
-def floats_of(element: Element, count: int | None = None, attribute: str = "value") -> list[float]:
-    """Finite numbers of an attribute, separated by blanks or commas."""
-    text = element.attributes.get(attribute, "")
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise element.error("not a number", got=text) from error
-    if not all(abs(v) < ABSURD for v in values):
-        raise element.error("not a finite number", got=text)
-    if count is not None and len(values) != count:
-        raise element.error("wrong count of numbers", got=text or "nothing", expected=count)
-    return values
-
-
-def triple_of(element: Element, default: float = 0.0) -> Floats:
-    """(3,) of x, y, z or of a value; one number counts for all three."""
-    if "value" in element.attributes:
-        values = floats_of(element)
-        if len(values) not in (1, 3):
-            raise element.error("wrong count of numbers", got=len(values), expected="1 or 3")
-        return np.array(values * 3 if len(values) == 1 else values)
-    return np.array([floats_of(element, 1, c)[0] if c in element.attributes else default for c in "xyz"])
-
-
-def colour_of(element: Element) -> Floats:
-    """Linear RGB (3,) of a float, rgb, srgb, spectrum or blackbody element; not negative.
-
-    A spectrum of wavelengths is a reflectance, seen under D65. Blackbodies are in W/(sr m^2 nm), weighed as by Mitsuba.
-    """
-    text = element.attributes.get("value", "").strip()
-    if element.tag == "blackbody":
-        return _blackbody(element)
-    if element.tag not in ("float", "rgb", "srgb", "spectrum", "integer", "color"):
-        raise element.error("is no colour", expected="float, rgb, srgb or spectrum")
-    if text.startswith("#"):
-        digits = text[1:]
-        if len(digits) != 6 or any(c not in "0123456789abcdefABCDEF" for c in digits):
-            raise element.error("not a colour", got=text, expected="#rrggbb")
-        return srgb_decode(np.array([int(digits[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0)
-    if ":" in text or "filename" in element.attributes:
-        return _spectrum(element, text)
-    values = floats_of(element)
-    if len(values) not in (1, 3):
-        raise element.error("wrong count of numbers", got=len(values), expected="1 or 3")
-    rgb = np.maximum(np.array(values * 3 if len(values) == 1 else values), 0.0)
-    return srgb_decode(rgb) if element.tag == "srgb" else rgb
-
-
-def _spectrum(element: Element, text: str) -> Floats:
-    from lambent.materials.measured.spectral import rgb_of_spectra
-
-    if "filename" in element.attributes:
-        raise element.error("spectra in files are not read", hint="write it as wavelength:value pairs or as <rgb>")
-    try:
-        pairs = np.array([[float(v) for v in pair.split(":")] for pair in text.replace(",", " ").split()])
-        nm, values = pairs.T
-    except ValueError as error:
-        raise element.error("not a spectrum", got=text, expected="wavelength:value pairs") from error
-    if not np.isfinite(pairs).all() or (np.diff(nm) <= 0).any() or len(nm) > 4096:
-        raise element.error("not a spectrum", got=text, expected="finite values at increasing wavelengths")
-    return np.maximum(rgb_of_spectra(nm) @ values, 0)
-
-
-def _blackbody(element: Element) -> Floats:
-    from colour import MSDS_CMFS
-
-    from lambent.core.colour import XYZ_TO_RGB
-
-    text = element.attributes.get("temperature", element.attributes.get("value", "")).strip().rstrip("kK")
-    try:
-        kelvin, scale = float(text), float(element.attributes.get("scale", 1))
-    except ValueError as error:
-        raise element.error("not a temperature", got=text) from error
-    if not (100 <= kelvin <= 1e6 and 0 <= scale < 1e12):
-        raise element.error("not a temperature", got=text, expected="100 to 1e6 K")
-    observer = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    metres = observer.wavelengths * 1e-9
-    h, c, k = 6.62607015e-34, 2.99792458e8, 1.380649e-23
-    radiance_nm = 2 * h * c**2 / metres**5 / np.expm1(h * c / (metres * k * kelvin)) * 1e-9
-    step_nm = observer.wavelengths[1] - observer.wavelengths[0]
-    xyz = radiance_nm @ observer.values * step_nm / Y_INTEGRAL_NM
-    return np.maximum(XYZ_TO_RGB @ xyz, 0) * scale
 
 
 def transform_of(element: Element) -> Floats:

@@ -1,0 +1,137 @@
+"""Colours and spectra of Mitsuba's elements as linear RGB.
+
+A spectrum of wavelengths that is reflected is seen under D65; one that is emitted is what the eye makes of it, so that
+an even one is not white but of equal energy. Mitsuba 3 takes a single emitted number for such a spectrum, version 0.6
+for white.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.colour import XYZ_TO_RGB, srgb_decode
+from lambent.core.errors import UserError
+from lambent.core.files import read_bytes
+from lambent.core.frames import Floats
+from lambent.scenes.loaders.mitsuba.document import Element
+from lambent.scenes.loaders.mitsuba.numbers import floats_of
+from lambent.scenes.loaders.place import named
+
+Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
+LIMIT_BYTES = 1 << 20
+WAVELENGTHS_MAX = 4096
+
+
+def colour_of(element: Element, root: Path, *, emitted: bool = False, old: bool = False) -> Floats:
+    """Linear RGB (3,) of a float, rgb, srgb, spectrum or blackbody element; not negative.
+
+    Blackbodies are in W/(sr m^2 nm), weighed as by Mitsuba. Files lie below `root`; `old` is version 0.6.
+    """
+    text = element.attributes.get("value", "").strip()
+    if element.tag == "blackbody" or element.type == "blackbody":
+        return _blackbody(element)
+    if element.tag not in ("float", "rgb", "srgb", "spectrum", "integer", "color"):
+        raise element.error("is no colour", expected="float, rgb, srgb or spectrum")
+    if element.tag == "spectrum" and element.type:
+        return _plugin(element, root, emitted)
+    if text.startswith("#"):
+        digits = text[1:]
+        if len(digits) != 6 or any(c not in "0123456789abcdefABCDEF" for c in digits):
+            raise element.error("not a colour", got=text, expected="#rrggbb")
+        return srgb_decode(np.array([int(digits[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0)
+    if ":" in text:
+        return _spectrum(element, text, [pair.split(":") for pair in text.replace(",", " ").split()], emitted)
+    if "filename" in element.attributes:
+        return _file(element, root, emitted)
+    values = floats_of(element)
+    if len(values) not in (1, 3):
+        raise element.error("wrong count of numbers", got=len(values), expected="1 or 3")
+    rgb = np.maximum(np.array(values * 3 if len(values) == 1 else values), 0.0)
+    if emitted and not old and element.tag == "spectrum" and len(values) == 1:
+        rgb = rgb * XYZ_TO_RGB.sum(axis=1)
+    return srgb_decode(rgb) if element.tag == "srgb" else rgb
+
+
+def _plugin(element: Element, root: Path, emitted: bool) -> Floats:
+    """A spectrum that is a plugin of version 3, its parameters below it."""
+    said = {child.name: child for child in element.children}
+
+    def number(name: str, default: float) -> float:
+        return floats_of(said[name], 1)[0] if name in said else default
+
+    def numbers(name: str) -> list[float]:
+        return floats_of(said[name]) if name in said else []
+
+    if element.type in ("uniform", "d65"):
+        tint = colour_of(said["color"], root) if "color" in said else np.ones(3)
+        return np.maximum(number("scale", 1) * number("value", 1) * tint, 0)
+    if element.type == "irregular":
+        nm, values = numbers("wavelengths"), numbers("values")
+    elif element.type == "regular":
+        values = numbers("values")
+        nm = np.linspace(number("wavelength_min", 360), number("wavelength_max", 830), len(values)).tolist()
+    else:
+        raise element.error(
+            "unknown spectrum", got=element.type, expected="uniform, d65, regular, irregular or blackbody"
+        )
+    if len(nm) != len(values):
+        raise element.error("not a spectrum", got=f"{len(nm)} wavelengths, {len(values)} values")
+    return _spectrum(element, element.type, list(zip(nm, values, strict=True)), emitted)
+
+
+def _file(element: Element, root: Path, emitted: bool) -> Floats:
+    """A text file of a wavelength and a value a line."""
+    written = element.attributes["filename"]
+    path = named(written, element.file, root, f"line {element.line} <{element.tag}> filename")
+    if not path.is_file():
+        raise element.error("file not found", got=written)
+    lines = read_bytes(path, LIMIT_BYTES).decode("utf-8", "replace").splitlines()
+    rows = [line.replace(",", " ").split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    try:
+        return _spectrum(element, written, [row[:2] for row in rows], emitted)
+    except UserError as error:
+        raise UserError(error.message, file=path, expected="a wavelength in nm and a value on each line") from error
+
+
+def _spectrum(element: Element, text: str, pairs: list, emitted: bool) -> Floats:  # type: ignore[type-arg]
+    from lambent.materials.measured.spectral import rgb_of_spectra
+
+    try:
+        table = np.array([[float(v) for v in pair] for pair in pairs])
+        nm, values = table.T
+    except ValueError as error:
+        raise element.error("not a spectrum", got=text, expected="wavelength:value pairs") from error
+    if not np.isfinite(table).all() or (np.diff(nm) <= 0).any() or len(nm) > WAVELENGTHS_MAX:
+        raise element.error("not a spectrum", got=text, expected="finite values at increasing wavelengths")
+    if not emitted:
+        return np.asarray(np.maximum(rgb_of_spectra(nm) @ values, 0))
+    observer_nm, matching = _observer()
+    radiance = np.interp(observer_nm, nm, values, left=0, right=0)
+    return np.asarray(np.maximum(XYZ_TO_RGB @ (radiance @ matching), 0))
+
+
+def _observer() -> tuple[Floats, Floats]:
+    """Wavelengths (K,) in nm, and what a value at each adds to XYZ, (K, 3)."""
+    from colour import MSDS_CMFS
+
+    observer = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    nm = np.asarray(observer.wavelengths, float)
+    return nm, np.asarray(observer.values) * (nm[1] - nm[0]) / Y_INTEGRAL_NM
+
+
+def _blackbody(element: Element) -> Floats:
+    said = {child.name: child.attributes.get("value", "") for child in element.children} | element.attributes
+    text = said.get("temperature", said.get("value", "")).strip().rstrip("kK")
+    try:
+        kelvin, scale = float(text), float(said.get("scale", 1))
+    except ValueError as error:
+        raise element.error("not a temperature", got=text) from error
+    if not (100 <= kelvin <= 1e6 and 0 <= scale < 1e12):
+        raise element.error("not a temperature", got=text, expected="100 to 1e6 K")
+    nm, matching = _observer()
+    metres = nm * 1e-9
+    h, c, k = 6.62607015e-34, 2.99792458e8, 1.380649e-23
+    radiance_nm = 2 * h * c**2 / metres**5 / np.expm1(h * c / (metres * k * kelvin)) * 1e-9
+    return np.asarray(np.maximum(XYZ_TO_RGB @ (radiance_nm @ matching), 0) * scale)
