@@ -45,6 +45,7 @@ from lambent.store.contract import (
     probe_name,
     write_scene_record,
 )
+from lambent.store.plans import plan_record
 from lambent.store.store import Store
 from lambent.store.textures import texture_records, write_textures
 
@@ -164,8 +165,6 @@ class _Bake:
         self.store = Store.create(path, inputs_of(scene))
         self.store.set_document(WAYS, {"light_map": self.integrator, "probes": self.probe_way})
         scene = self.scene = self._in_parts(scene)
-        self._sides: dict[float, Any] = {}
-        self._views: dict[float, Any] = {}
         self.store.set_document("changes", changes)
         if not resume:
             self.store.forget_all()
@@ -242,10 +241,10 @@ class _Bake:
         return atlases.separated(self.scene, self.merged, width, height)
 
     @cached_property
-    def _texels(self) -> Any:
-        from lambent.bake.texels import texels_of
+    def ground(self) -> Any:
+        from lambent.bake.groundwork import Groundwork
 
-        return texels_of(self.merged, self.atlas.width, self.atlas.height)
+        return Groundwork(self.atlas, self.merged, self._two_sided, self.progress)
 
     def environment(self) -> None:
         from lambent.bake.environment import environment_cube
@@ -269,21 +268,17 @@ class _Bake:
         with self._timed("light_map"):
             from lambent.bake.light_map import gathered, path_traced
             from lambent.bake.probe import LightMapCache
-            from lambent.bake.texels import chart_labels
 
-            texels = self._texels
-            labels = chart_labels(self.merged, texels)
-            builder = self._builder(diffuse=True, photons=self.integrator == PHOTONS)
             if self.integrator == PHOTONS:
-                maps = dict(zip(sides, self._photon_maps(texels, labels, len(sides), builder), strict=True))
+                maps = dict(zip(sides, self._photon_maps(len(sides)), strict=True))
             else:
                 how = path_traced(self.quality)
-                maps = {side: self._sampled_map(texels, labels, side, builder, "traced", how) for side in sides}
+                maps = {side: self._sampled_map(side, "traced", how) for side in sides}
             if self.quality.gather_samples and self.integrator != PHOTONS:
-                builder = self._builder(diffuse=False)
                 back = maps["irradiance_back"][0] if len(sides) > 1 else None
-                how = gathered(self.quality, LightMapCache(builder, maps["irradiance"][0], back))
-                maps = {side: self._sampled_map(texels, labels, side, builder, "gathered", how) for side in sides}
+                cache = LightMapCache(self.ground.builder(diffuse=False), maps["irradiance"][0], back)
+                how = gathered(self.quality, cache)
+                maps = {side: self._sampled_map(side, "gathered", how) for side in sides}
             for side, (clean, meta) in maps.items():
                 name = f"light_map/{side}"
                 meta = self._meta(integrator=self.integrator, **meta)
@@ -297,65 +292,45 @@ class _Bake:
             return
         from lambent.bake.noise_map import noise_map, sampled_halves
         from lambent.bake.photon_map import halves_of
-        from lambent.bake.texels import chart_labels
 
         self.progress(0, 1, "noise of the light map")
-        texels = self._texels
-        labels = chart_labels(self.merged, texels)
         if self.integrator == PHOTONS:
-            builder = self._builder(diffuse=True, photons=True)
-            scene = builder.build()
-            sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
+            sides = [self.ground.lit_sides(sign) for sign in (1.0, -1.0)[:count]]
             found = halves_of(self.store.read("light_map/photons"), self.merged, sides)
         else:
             stage = "gathered" if self.quality.gather_samples else "traced"
             raw = (f"light_map/{stage}", f"light_map/{stage}_back")[:count]
             found = (sampled_halves(self.store.read(name)) for name in raw)
         for name, (halves, known) in zip(names, found, strict=True):
-            noise = noise_map(halves, known, labels)
+            noise = noise_map(halves, known, self.ground.labels)
             self.store.put(name, "light_map", noise, key=self.irradiance_key, meta=self._meta())
 
-    def _builder(self, diffuse: bool, photons: bool = False) -> Any:
-        from lambent.bake.emitters import balance_emitters
-        from lambent.bake.measured_materials import lookups_of
-        from lambent.bake.mitsuba_scene import SceneBuilder
-
-        tables = lookups_of(self.scene, photons=photons, progress=self.progress)
-        builder = SceneBuilder(self.atlas.scene, self.atlas.uv2, diffuse=diffuse, measured=tables)
-        balance_emitters(builder)
-        return builder
-
-    def _photon_maps(
-        self, texels: Any, labels: NDArray[np.integer], count: int, builder: Any
-    ) -> list[tuple[Array, dict[str, float]]]:
+    def _photon_maps(self, count: int) -> list[tuple[Array, dict[str, float]]]:
         """Both sides' maps, denoised, and what to note of them; the batches stay as `light_map/photons`."""
         from lambent.bake.photon_map import Shots, finished, shape_of, shoot_batches
 
-        name, quality = "light_map/photons", self.quality
-        shape, chunks = shape_of(texels, count)
+        name, quality, ground = "light_map/photons", self.quality, self.ground
+        shape, chunks = shape_of(ground.texels, count)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
-        scene = builder.build()
-        sides = [self._lit_sides(texels, sign, builder, scene) for sign in (1.0, -1.0)[:count]]
+        scene = ground.whole(diffuse=True, photons=True)
+        sides = [ground.lit_sides(sign) for sign in (1.0, -1.0)[:count]]
         if writer.missing:
             how = Shots(quality.photons_per_texel, quality.light_map_noise, quality.max_depth, self.seed)
-            shoot_batches(writer, builder.scene, scene, self.merged, sides, how, self.progress)
+            shoot_batches(writer, ground.scene, scene, self.merged, sides, how, self.progress)
         writer.finish()
         self.progress(0, 1, "denoising")
-        return finished(self.store.read(name), self.merged, sides, labels)
+        return finished(self.store.read(name), self.merged, sides, ground.labels)
 
-    def _sampled_map(
-        self, texels: Any, labels: NDArray[np.integer], side: str, builder: Any, stage: str, how: Any
-    ) -> tuple[Array, dict[str, float]]:
+    def _sampled_map(self, side: str, stage: str, how: Any) -> tuple[Array, dict[str, float]]:
         """One side's map, denoised, and what to note of it; its raw tiles stay in the store as `light_map/STAGE...`."""
         from lambent.bake.light_map import finished, tile_samples
 
         name = f"light_map/{stage}" if side == "irradiance" else f"light_map/{stage}_back"
-        tile = self.quality.tile_texels
+        tile, texels = self.quality.tile_texels, self.ground.texels
         shape, chunks = (2, texels.height, texels.width, 4), (2, tile, tile, 4)
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
-        scene = builder.build()
-        lit = self._lit_sides(texels, 1.0 if side == "irradiance" else -1.0, builder, scene)
-        sides, labels = self._in_view(lit, labels, scene)
+        scene = self.ground.whole(diffuse=how.cache is None)
+        sides, labels = self.ground.in_view(1.0 if side == "irradiance" else -1.0)
         if writer.missing:
             covered = np.zeros(texels.width * texels.height, bool)
             covered[texels.index[sides.valid.any(axis=1)]] = True
@@ -372,41 +347,9 @@ class _Bake:
         self.progress(0, 1, "denoising")
         return finished(self.store.read(name), texels, labels)
 
-    def _lit_sides(self, texels: Any, sign: float, builder: Any, scene: Any) -> Any:
-        """Which points are lit on the side of this sign: the same in every stage, so they are tested once."""
-        from lambent.bake.light_map import Sides
-        from lambent.bake.solids import SolidTest
-
-        if sign in self._sides:
-            return self._sides[sign]
-        points, flat = texels.positions.reshape(-1, 3), sign * texels.flat.reshape(-1, 3)
-        ours = np.ones(len(points), bool)
-        if sign < 0:
-            ours = self._two_sided_faces()[texels.face].reshape(-1)
-        valid = ours.copy()
-        valid[ours] = ~SolidTest(builder, scene).embedded(points[ours], flat[ours])
-        self._sides[sign] = Sides(texels, sign, valid.reshape(texels.face.shape))
-        return self._sides[sign]
-
-    def _in_view(self, sides: Any, labels: NDArray[np.integer], scene: Any) -> tuple[Any, NDArray[np.integer]]:
-        """The sides without points that viewers do not see, where a texel has others, and labels that say so."""
-        from lambent.bake.viewers import seen, viewing_places, without_hidden
-
-        if sides.sign not in self._views:
-            self.progress(0, 1, "what viewers see")
-            texels = sides.texels
-            points, flat = texels.positions.reshape(-1, 3), sides.sign * texels.flat.reshape(-1, 3)
-            in_view = seen(scene, viewing_places(self.atlas.scene, scene), points, flat).reshape(sides.valid.shape)
-            valid, labels = without_hidden(texels, sides.valid, in_view, labels)
-            self._views[sides.sign] = replace(sides, valid=valid), labels
-        return self._views[sides.sign]
-
-    def _two_sided_faces(self) -> NDArray[np.bool_]:
-        return np.repeat(self._two_sided, [len(o.mesh.faces) for o in self.scene.objects])
-
     @cached_property
     def _two_sided(self) -> list[bool]:
-        """By object."""
+        """By object, whether light crosses it, so that its far side has a map too."""
         masked = {name for name, textures in self.scene.textures.items() if textures.opacity}
         materials = self.scene.materials
         return [is_two_sided(materials[o.material], masked=o.material in masked) for o in self.scene.objects]
@@ -424,7 +367,7 @@ class _Bake:
             front, back = self.store.read("light_map/irradiance"), None
             if "light_map/irradiance_back" in self.store:
                 back = self.store.read("light_map/irradiance_back")
-            probes = ProbeSet(self.atlas, front if self.probe_way == CACHED else None, back)
+            probes = ProbeSet(self.ground, front if self.probe_way == CACHED else None, back)
             for i, name in enumerate(missing):
                 self.progress(i, len(missing), f"probe of {name}")
                 result, meta = probes.bake(name, self.quality, seed_of(self.seed, "probe", name))
@@ -487,7 +430,7 @@ def _reflector_record(r: Reflector) -> ReflectorRecord:
         outline=tuple((float(x), float(y), float(z)) for x, y, z in r.outline),
         deviation_m=r.deviation_m,
         two_sided=r.two_sided,
-        walled=r.walled,
+        plan=None if r.plan is None else plan_record(r.plan),
         parts=tuple(
             ReflectorPart(object=part.object, faces=tuple(map(int, part.faces)), area_m2=part.area_m2)
             for part in r.parts

@@ -37,10 +37,10 @@ def fill(values: Array, known: Mask, labels: NDArray[np.integer], *, smooth: int
     h, w, channels = values.shape
     chart = np.pad(labels, 1, constant_values=-1).reshape(-1)
     grown = _Grown(np.pad(np.where(known[..., None], values, 0.0), ((1, 1), (1, 1), (0, 0))), np.pad(known, 1))
-    for _ in range(smooth):
-        grown.smooth(chart)
+    grown.smooth(chart, smooth)
     while grown.ring(chart):
         pass
+    grown.start()
     for _ in range(RINGS):
         grown.ring(None)
     filled = grown.values.reshape(h + 2, w + 2, channels)[1:-1, 1:-1]
@@ -59,21 +59,38 @@ class _Grown:
         self.inner = np.zeros((height, width), bool)
         self.inner[1:-1, 1:-1] = True
         self.inner = self.inner.reshape(-1)
+        self.start()
 
-    def smooth(self, chart: NDArray[np.integer]) -> None:
+    def start(self) -> None:
+        """Grow from all that is known, after the charts in `ring` have changed."""
+        self._front = np.flatnonzero(self.known)
+
+    def smooth(self, chart: NDArray[np.integer], times: int) -> None:
         """Every known texel takes the mean of itself and the known texels of its chart around it."""
+        from scipy.sparse import csr_matrix
+
         target = np.flatnonzero(self.known)
-        total, count = self.values[target], np.ones(len(target))
-        for step in self.steps:
-            near = target + step
-            same = self.known[near] & (chart[near] == chart[target])
-            total += self.values[near] * same[:, None]
-            count += same
-        self.values[target] = total / count[:, None]
+        if not times or not len(target):
+            return
+        near = target[:, None] + np.append(self.steps, 0)
+        same = self.known[near] & (chart[near] == chart[target][:, None])
+        place = np.zeros(len(self.known), np.int32)
+        place[target] = np.arange(len(target))
+        count = same.sum(axis=1)
+        around = csr_matrix(
+            (np.ones(count.sum(), self.values.dtype), place[near[same]], np.append(0, np.cumsum(count))),
+            shape=(len(target), len(target)),
+        )
+        mean = self.values[target]
+        for _ in range(times):
+            mean = (around @ mean) / count[:, None].astype(mean.dtype)
+        self.values[target] = mean
 
     def ring(self, chart: NDArray[np.integer] | None) -> bool:
         """Unknown texels next to known ones (of their own chart, where charts are given) take the mean of those."""
-        target = np.flatnonzero(self.inner & ~self.known & (True if chart is None else chart >= 0))
+        reached = np.zeros(len(self.known), bool)
+        reached[self._front[:, None] + self.steps] = True
+        target = np.flatnonzero(reached & self.inner & ~self.known & (True if chart is None else chart >= 0))
         near = target[:, None] + self.steps
         counts = self.known[near]
         if chart is not None:
@@ -83,6 +100,7 @@ class _Grown:
         total = (self.values[near] * counts[..., None]).sum(axis=1)
         self.values[target] = total / counts.sum(axis=1)[:, None]
         self.known[target] = True
+        self._front = target
         return bool(len(target))
 
 

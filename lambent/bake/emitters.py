@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.vectors import array_of, vectors
 from lambent.core.colour import luminance
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Scene
@@ -39,11 +40,11 @@ def balance_emitters(builder: SceneBuilder) -> None:
     sampler.seed(0, width)
     at = dr.arange(mi.UInt32, width) // SAMPLES
     si = dr.zeros(mi.SurfaceInteraction3f, width)
-    si.p = dr.gather(mi.Point3f, mi.Point3f(position.T.astype(np.float32)), at)
-    si.n = mi.Normal3f(dr.gather(mi.Vector3f, mi.Vector3f(normal.T.astype(np.float32)), at))
+    si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, position), at)
+    si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normal), at))
     ds, value = paths.sample_emitter(scene, si, sampler.next_2d(), mi.Bool(True), paths.has_holes(scene))
     value *= dr.maximum(dr.dot(ds.d, si.n), 0.0)
-    brought = luminance(np.nan_to_num(np.array(value).T, posinf=0.0))
+    brought = luminance(np.nan_to_num(array_of(value), posinf=0.0))
     chosen = np.array(dr.reinterpret_array(mi.UInt32, ds.emitter))
     numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
     squares = np.bincount(chosen, brought**2, minlength=max(numbers) + 1)[numbers]

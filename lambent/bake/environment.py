@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lambent.bake.engine import engine
 from lambent.bake.mitsuba_scene import environment_dict
 from lambent.bake.sky import SUN_RADIUS_RAD
+from lambent.bake.vectors import array_of, vectors
 from lambent.core.cubemap import directions_at, face_directions
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Environment, SunSky
@@ -45,9 +46,9 @@ def _means(emitter: object, texels: NDArray[np.integer], n: int, grid: int) -> A
     s, t = np.broadcast_arrays(s, t)
     w = normalize(directions_at(np.broadcast_to(face[:, None, None], s.shape), s, t)).reshape(-1, 3)
     si = dr.zeros(mi.SurfaceInteraction3f, len(w))
-    si.wi = mi.Vector3f(np.ascontiguousarray(-w.T, dtype=np.float32))
-    radiance = np.array(emitter.eval(si))  # type: ignore[attr-defined]
-    return np.asarray(radiance.T.reshape(len(texels), -1, 3).mean(axis=1))
+    si.wi = vectors(mi.Vector3f, -w)
+    radiance = array_of(emitter.eval(si))  # type: ignore[attr-defined]
+    return np.asarray(radiance.reshape(len(texels), -1, 3).mean(axis=1))
 
 
 def _near(sun: Array, n: int) -> NDArray[np.integer]:

@@ -119,11 +119,13 @@ def _evaluator(bsdf: Any) -> Evaluate:
     import drjit as dr
     import mitsuba as mi
 
+    from lambent.bake.vectors import array_of, vectors
+
     def evaluate(wi: Floats, wo: Floats) -> Floats:
         si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-        si.wi = mi.Vector3f(np.ascontiguousarray(wo.T, dtype=np.float32))
-        value = bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(np.ascontiguousarray(wi.T, dtype=np.float32)))
+        si.wi = vectors(mi.Vector3f, wo)
+        value = array_of(bsdf.eval(mi.BSDFContext(), si, vectors(mi.Vector3f, wi))).astype(float)
         cos_i = np.abs(wi[:, 2:])
-        return np.divide(np.array(value, dtype=float).T, cos_i, out=np.zeros((len(wi), 3)), where=cos_i > 1e-6)
+        return np.divide(value, cos_i, out=np.zeros((len(wi), 3)), where=cos_i > 1e-6)
 
     return evaluate

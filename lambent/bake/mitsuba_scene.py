@@ -6,6 +6,7 @@ Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mits
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,17 @@ Array = NDArray[np.floating]
 UV2_ATTRIBUTE = "vertex_uv2"
 
 
+@dataclass(frozen=True)
+class EmitterSampling:
+    """What pilots found of a scene's emitters: its environment (mi.Emitter), guided or not, and how often each counts.
+
+    weights : (n,), by `SceneBuilder.emitters()`.
+    """
+
+    environment: Any
+    weights: Array
+
+
 class SceneBuilder:
     """Makes Mitsuba scenes of one scene: whole, or with objects left out; meshes are shared between them.
 
@@ -44,6 +56,8 @@ class SceneBuilder:
         False takes the diffuse terms out of all materials (for tracing with a light map).
     measured : mapping, optional
         Tables by material name that surfaces scatter by instead of their material; they stay whole without `diffuse`.
+    sampling : EmitterSampling, optional
+        Of another builder of the same scene: emitters are sampled as its own are.
     """
 
     def __init__(
@@ -53,6 +67,7 @@ class SceneBuilder:
         *,
         diffuse: bool = True,
         measured: Mapping[str, Lookup] | None = None,
+        sampling: EmitterSampling | None = None,
     ) -> None:
         import mitsuba as mi
 
@@ -72,7 +87,12 @@ class SceneBuilder:
                 bsdfs[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse))
             self.meshes[o.name] = mesh_of(o, bsdfs[look], (uv2 or {}).get(o.name))
         self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
-        self._environment = mi.load_dict(environment_dict(scene.environment)) if scene.environment else None
+        self._environment: Any = None
+        if sampling is not None:
+            self._environment = sampling.environment
+            self.weigh_emitters(sampling.weights)
+        elif scene.environment:
+            self._environment = mi.load_dict(environment_dict(scene.environment))
 
     def build(self, leave_out: Collection[str] = ()) -> Any:
         """mi.Scene without the named objects (their emission goes with them)."""
@@ -90,6 +110,13 @@ class SceneBuilder:
         """All mi.Emitter: of objects, lights, environment."""
         found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._lights
         return [*found, self._environment] if self._environment is not None else found
+
+    def sampling(self) -> EmitterSampling:
+        """How emitters are sampled, for another builder of the same scene."""
+        import mitsuba as mi
+
+        weights = np.array([float(mi.traverse(emitter)["sampling_weight"]) for emitter in self.emitters()])
+        return EmitterSampling(self._environment, weights)
 
     def guide_sky(self) -> None:
         """Have the environment sampled by where it is seen, in scenes built from now on, unless that is of no use."""
@@ -111,12 +138,18 @@ class SceneBuilder:
             parameters["sampling_weight"] = float(weight)
             parameters.update()
 
-    def object_numbers(self) -> Any:
-        """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's place in the scene."""
+    def shape_number(self, name: str) -> int:
+        """Mitsuba's number of an object's shape: what `si.shape` is, reinterpreted."""
         import drjit as dr
         import mitsuba as mi
 
-        ids = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh))[0]) for mesh in self.meshes.values()]
+        return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(self.meshes[name]))[0])
+
+    def object_numbers(self) -> Any:
+        """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's place in the scene."""
+        import mitsuba as mi
+
+        ids = [self.shape_number(name) for name in self.meshes]
         table = np.zeros(max(ids) + 1, np.uint32)
         table[ids] = np.arange(len(ids))
         return mi.UInt32(table)

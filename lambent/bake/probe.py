@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lambent.bake import paths
 from lambent.bake.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
+from lambent.bake.vectors import array_of, vectors
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
@@ -197,10 +198,9 @@ def _direction(face: Any, s: Any, t: Any) -> Any:
 
 def _geometry(scene: Any, centre: Array, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Distance and normal at the texels' centres."""
-    w = normalize(face_directions(n)).reshape(-1, 3).T.astype(np.float32)
-    direction = mi.Vector3f(np.ascontiguousarray(w))
+    direction = vectors(mi.Vector3f, normalize(face_directions(n)))
     distance, si = _distance(scene, mi.Ray3f(_origin(centre), direction))
     normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
     normal = dr.select(si.is_valid(), normal, -direction)
     dr.eval(distance, normal)
-    return np.array(distance).reshape(6, n, n), np.array(mi.Vector3f(normal)).T.reshape(6, n, n, 3).astype(np.float32)
+    return np.array(distance).reshape(6, n, n), array_of(normal).reshape(6, n, n, 3)

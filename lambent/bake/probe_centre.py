@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.solids import SolidTest
+from lambent.bake.vectors import array_of, rays_from
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Mesh
@@ -80,8 +82,7 @@ def _moved_out(centre: Array, solids: SolidTest, without: Any) -> Array:
 
 
 def _distances(scene: Any, origin: Array, directions: Array) -> Array:
-    ray = mi.Ray3f(mi.Point3f(*map(float, origin)), mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32)))
-    return np.asarray(np.array(scene.ray_intersect_preliminary(ray).t), float)
+    return np.asarray(np.array(scene.ray_intersect_preliminary(rays_from(origin, directions)).t), float)
 
 
 def encloses(builder: SceneBuilder, name: str, centre: Array, whole: Any) -> bool:
@@ -92,8 +93,7 @@ def encloses(builder: SceneBuilder, name: str, centre: Array, whole: Any) -> boo
     if not others or np.mean(within) < ENCLOSING_SHARE:
         return False
     w = normalize(face_directions(8).reshape(-1, 3))
-    ray = mi.Ray3f(mi.Point3f(*map(float, centre)), mi.Vector3f(np.ascontiguousarray(w.T, dtype=np.float32)))
-    si = whole.ray_intersect(ray, mi.RayFlags.Minimal, True)
-    facing = (np.array(si.n).T * w).sum(axis=1) < 0
-    own = np.array(si.shape == mi.ShapePtr(builder.meshes[name]))
+    si = whole.ray_intersect(rays_from(centre, w), mi.RayFlags.Minimal, True)
+    facing = (array_of(si.n) * w).sum(axis=1) < 0
+    own = np.array(dr.reinterpret_array(mi.UInt32, si.shape)) == builder.shape_number(name)
     return bool((facing & own).mean() > ENCLOSING_SHARE)

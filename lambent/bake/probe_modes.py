@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from lambent.bake import paths
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe import LightMapCache, Probe
+from lambent.bake.vectors import array_of, rays_from
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
 from lambent.core.frames import normalize
@@ -66,12 +67,12 @@ class Mirrored:
 
 def mirrored(
     points: Array, normals: Array, places: Array, material: Material, scene: Any, cache: LightMapCache, depth: int,
-    family: list[Any], seed: int,
+    family: list[int], seed: int,
 ) -> Mirrored | None:  # fmt: skip
     """What viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3): each in one point.
 
     Of what transmits light they see what is behind: rays go straight on. None where too few points are in view.
-    `family` are the Mitsuba meshes of the object and of its other parts.
+    `family` are the numbers of the Mitsuba shapes of the object and of its other parts.
     """
     rng = np.random.default_rng(seed)
     found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
@@ -90,29 +91,25 @@ def mirrored(
     directions = -view if material.transmits else 2 * cosine * n - view
     if material.transmits:
         at = at - 2 * LIFT_M * n  # beyond the sheet
-    ray = mi.Ray3f(mi.Point3f(_columns(at)), mi.Vector3f(_columns(directions)))
+    ray = rays_from(at, directions)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed & 0xFFFFFFFF, len(at))
     value = paths.radiance(scene, sampler, paths.camera_start(ray), depth, cache)
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     met = scene.ray_intersect_preliminary(ray).shape
-    own = np.any([np.array(met == mi.ShapePtr(mesh)) for mesh in family], axis=0)
-    below = scene.ray_intersect(mi.Ray3f(mi.Point3f(_columns(points[found])), mi.Vector3f(_columns(-n))))
-    irradiance = np.array(cache.irradiance(below, below.is_valid())).T.astype(float)
+    own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
+    below = scene.ray_intersect(rays_from(points[found], -n))
+    irradiance = array_of(cache.irradiance(below, below.is_valid())).astype(float)
     r0 = max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
     share = r0 + (1 - r0) * (1 - np.abs(cosine[:, 0])) ** 5
-    return Mirrored(at, directions, n, np.array(value).T.astype(float), luminance(irradiance), share, own)
-
-
-def _columns(array: Array) -> Array:
-    return np.ascontiguousarray(array.T, dtype=np.float32)
+    return Mirrored(at, directions, n, array_of(value).astype(float), luminance(irradiance), share, own)
 
 
 def _free(scene: Any, points: Array, normals: Array, eyes: Array) -> NDArray[np.bool_]:
     """Whether nothing stands between points and eyes, on the side of the normals."""
     offset = eyes - points
-    ray = mi.Ray3f(mi.Point3f(_columns(points)), mi.Vector3f(_columns(offset)))
-    ray.maxt = mi.Float(1 - 1e-3)
+    ray = rays_from(points, offset)
+    ray.maxt = dr.opaque(mi.Float, 1 - 1e-3)
     in_front = (offset * normals).sum(axis=1) > GRAZING * np.linalg.norm(offset, axis=1)
     return in_front & ~np.array(scene.ray_test(ray))
 

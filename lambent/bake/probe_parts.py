@@ -15,13 +15,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.probe_centre import centre_of, flat_axis
 from lambent.bake.solids import SolidTest
+from lambent.bake.vectors import rays_from
 from lambent.core.frames import normalize
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere, r2
@@ -200,5 +200,4 @@ def spread(mesh: Mesh, count: int) -> tuple[Array, Array]:
 
 def _distances(scene: Any, origins: Array, directions: Array) -> Array:
     """To the first hit, infinite where there is none."""
-    o, d = (np.ascontiguousarray(a.T, dtype=np.float32) for a in (origins, directions))
-    return np.asarray(np.array(scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(o), mi.Vector3f(d))).t), float)
+    return np.asarray(np.array(scene.ray_intersect_preliminary(rays_from(origins, directions)).t), float)

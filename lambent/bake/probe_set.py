@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.atlas import Atlas
-from lambent.bake.emitters import balance_emitters
-from lambent.bake.measured_materials import lookups_of
-from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.groundwork import Groundwork
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe import MIRROR_DEPTH, LightMapCache, Surroundings, bake_probe
 from lambent.bake.probe_centre import encloses, probe_centre
@@ -29,21 +26,20 @@ from lambent.bake.probe_modes import (
 from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from, spread
 from lambent.bake.quality import Quality
 from lambent.bake.solids import SolidTest
-from lambent.bake.viewers import viewing_places
 
 Array = NDArray[np.floating]
 
 
 class ProbeSet:
-    """Bakes the probes of an atlas' scene from its light map (H, W, 3), or, where that is None, path traced whole.
+    """Bakes the probes of a scene from its light map (H, W, 3), or, where that is None, path traced whole.
 
     With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way.
     """
 
-    def __init__(self, atlas: Atlas, irradiance: Array | None, irradiance_back: Array | None) -> None:
+    def __init__(self, ground: Groundwork, irradiance: Array | None, irradiance_back: Array | None) -> None:
         traced = irradiance is None
-        self._builder = SceneBuilder(atlas.scene, atlas.uv2, diffuse=traced, measured=lookups_of(atlas.scene))
-        balance_emitters(self._builder)
+        self._builder, self._whole = ground.builder(diffuse=traced), ground.whole(diffuse=traced)
+        self._ground = ground
         self._left_out: tuple[frozenset[str], Any] | None = None
         self._cache = None if traced else LightMapCache(self._builder, irradiance, irradiance_back)
 
@@ -51,20 +47,12 @@ class ProbeSet:
     def _solids(self) -> SolidTest:
         return SolidTest(self._builder, self._whole)
 
-    @cached_property
-    def _whole(self) -> Any:
-        return self._builder.build()
-
     def _without(self, names: frozenset[str]) -> Any:
         """The scene without these objects; kept until others are asked for, as parts of one object share it."""
         if self._left_out is None or self._left_out[0] != names:
             self._left_out = None
             self._left_out = names, self._builder.build(leave_out=names)
         return self._left_out[1]
-
-    @cached_property
-    def _places(self) -> Array:
-        return viewing_places(self._builder.scene, self._whole)
 
     def _mirrored(self, name: str, seed: int) -> Mirrored | None:
         """What viewers see mirrored in an object, or through it; None where that is too little."""
@@ -75,8 +63,10 @@ class ProbeSet:
             return None
         points, normals = spread(o.mesh, RAYS)
         lifted = points + normals * (CLOSE * float(np.ptp(o.mesh.positions, axis=0).max()))
-        own = [self._builder.meshes[part] for part in family(scene.parts, name)]
-        return mirrored(lifted, normals, self._places, material, self._whole, self._cache, MIRROR_DEPTH, own, seed)
+        own = [self._builder.shape_number(part) for part in family(scene.parts, name)]
+        return mirrored(
+            lifted, normals, self._ground.places, material, self._whole, self._cache, MIRROR_DEPTH, own, seed
+        )
 
     def _transmits(self, name: str) -> bool:
         scene = self._builder.scene

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.vectors import array_of, vectors
 from lambent.core.frames import normalize
 from lambent.scenes.scene import SunSky
 
@@ -42,8 +43,8 @@ def sunsky_radiance(sky: SunSky, w: Array, *, sun: bool = True) -> Array:
     emitter = mi.load_dict(sunsky_dict(sky, sun))
     emitter.set_scene(mi.load_dict({"type": "scene", "environment": emitter}))
     si = dr.zeros(mi.SurfaceInteraction3f, len(w))
-    si.wi = mi.Vector3f(np.ascontiguousarray(-w.T, dtype=np.float32))
-    return np.asarray(np.array(emitter.eval(si)).T)
+    si.wi = vectors(mi.Vector3f, -w)
+    return array_of(emitter.eval(si))
 
 
 @lru_cache(maxsize=1)

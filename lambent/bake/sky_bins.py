@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.vectors import array_of, vectors
 from lambent.core.colour import luminance
 
 Array = NDArray[np.floating]
@@ -150,8 +151,8 @@ def _moments_of_parts(emitter: Any, bins: NDArray[np.integer], side: int) -> tup
         for c in offsets:
             w = _directions(bins, side, r, c).reshape(-1, 3)
             si = dr.zeros(mi.SurfaceInteraction3f, len(w))
-            si.wi = mi.Vector3f(np.ascontiguousarray(-w.T, dtype=np.float32))
-            found = luminance(np.array(emitter.eval(si)).T.astype(float)).reshape(mean.shape)
+            si.wi = vectors(mi.Vector3f, -w)
+            found = luminance(array_of(emitter.eval(si)).astype(float)).reshape(mean.shape)
             mean, square = mean + found, square + found**2
     return mean / SUPERSAMPLES**2, square / SUPERSAMPLES**2
 

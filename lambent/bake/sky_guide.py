@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.sky_bins import BIN_SR, BINS, COLUMNS, ROWS, SkyBins, middles
+from lambent.bake.vectors import vectors
 from lambent.bake.work import seed_of
 from lambent.core.frames import normalize
 from lambent.scenes.scene import Scene
@@ -161,7 +162,7 @@ class _Pilot:
     ) -> None:
         self._whole, self._bins, self._holes = whole, bins, paths.has_holes(whole)
         position, normal, crossed = points
-        number = np.array(groups.of(_vector(mi.Point3f, position), _vector(mi.Vector3f, normal)))
+        number = np.array(groups.of(vectors(mi.Point3f, position), vectors(mi.Vector3f, normal)))
         order = np.argsort(number, kind="stable")
         self.group, start, count = np.unique(number[order], return_index=True, return_counts=True)
         which = start[:, None] + np.arange(POINTS) * count[:, None] // POINTS
@@ -193,8 +194,8 @@ class _Pilot:
         bins = dr.gather(mi.UInt32, mi.UInt32(number.astype(np.uint32)), thread % rays)
         w = self._bins.direction(bins, sampler.next_2d())
         si = dr.zeros(mi.SurfaceInteraction3f, width)
-        si.p = dr.gather(mi.Point3f, _vector(mi.Point3f, self._position[which].reshape(-1, 3)), place)
-        si.n = mi.Normal3f(dr.gather(mi.Vector3f, _vector(mi.Vector3f, self._normal[which].reshape(-1, 3)), place))
+        si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, self._position[which]), place)
+        si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, self._normal[which]), place))
         dark = paths.in_shadow(self._whole, si.spawn_ray(w), mi.Bool(True), self._holes)
         crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
         cosine = dr.dot(w, si.n)
@@ -227,7 +228,7 @@ def _both_sides(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """The points, and those again, turned round, whose other side is not within a solid: what lies there faces them."""
     si = dr.zeros(mi.SurfaceInteraction3f, len(position))
-    si.p, si.n = _vector(mi.Point3f, position), _vector(mi.Normal3f, normal)
+    si.p, si.n = vectors(mi.Point3f, position), vectors(mi.Normal3f, normal)
     behind = whole.ray_intersect(si.spawn_ray(-si.n))
     inside = behind.is_valid() & (dr.dot(behind.n, si.n) < 0)
     sheet = np.flatnonzero(~np.array(inside))
@@ -241,7 +242,3 @@ def _spread(brought: Array) -> Array:
     grid = np.concatenate([grid[..., -1:], grid, grid[..., :1]], axis=2)
     around = sum(grid[:, r : r + ROWS, c : c + COLUMNS] for r in range(3) for c in range(3) if (r, c) != (1, 1))
     return (1 - SPREAD) * brought + SPREAD / 8 * np.asarray(around).reshape(len(brought), BINS)
-
-
-def _vector(kind: Any, array: Array) -> Any:
-    return kind(np.ascontiguousarray(array.T, dtype=np.float32))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.vectors import vectors
 from lambent.core.sequences import cosine_hemisphere, hammersley
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 
@@ -82,9 +83,9 @@ class SolidTest:
         thread = dr.arange(mi.UInt32, n * RAYS)
         at, k = thread // RAYS, thread % RAYS
         si = dr.zeros(mi.SurfaceInteraction3f, n * RAYS)
-        si.p = dr.gather(mi.Point3f, mi.Point3f(positions.T.astype(np.float32)), at)
-        si.n = mi.Normal3f(dr.gather(mi.Vector3f, mi.Vector3f(normals.T.astype(np.float32)), at))
-        local = mi.Vector3f(cosine_hemisphere(hammersley(RAYS)).T.astype(np.float32))
+        si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, positions), at)
+        si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normals), at))
+        local = vectors(mi.Vector3f, cosine_hemisphere(hammersley(RAYS)))
         direction = mi.Frame3f(si.n).to_world(dr.gather(mi.Vector3f, local, k))
         hit = self._scene.ray_intersect(si.spawn_ray(direction), mi.RayFlags.Minimal, True)
         number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, hit.shape), hit.is_valid())

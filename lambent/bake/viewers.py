@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.texels import BEYOND, POINTS, Texels
+from lambent.bake.vectors import array_of, rays_from, vectors
 from lambent.core.frames import basis
 from lambent.core.sequences import cosine_hemisphere, r2
 from lambent.scenes.scene import Scene
@@ -22,7 +23,7 @@ from lambent.scenes.scene import Scene
 Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 PLACES = 256
-FEW = 16  # places that are tried first; most points are seen from one of them
+FEW = (8, 32, 96)  # places that are tried before all are; most points are seen from one of the first
 RAYS_AT_ONCE = 1 << 21
 SHORT = 1e-4  # of a ray's length, and metres, by which it begins and ends beside surfaces
 
@@ -54,22 +55,19 @@ def viewing_places(scene: Scene, traced: Any) -> Array:
 
 def _hits(traced: Any, origins: Array, directions: Array) -> tuple[NDArray[np.integer], Array, Array]:
     """Which rays hit the front or back of something, where (n, 3), and the unit normals on the rays' side (n, 3)."""
-    si = traced.ray_intersect(mi.Ray3f(mi.Point3f(_columns(origins)), mi.Vector3f(_columns(directions))))
+    si = traced.ray_intersect(rays_from(origins, directions))
     hit = np.flatnonzero(np.array(si.is_valid()))
-    normals = np.array(si.n).T[hit].astype(float)
+    normals = array_of(si.n)[hit].astype(float)
     normals *= -np.sign((normals * directions[hit]).sum(axis=1, keepdims=True))
-    return hit, np.array(si.p).T[hit].astype(float), normals
-
-
-def _columns(array: Array) -> Array:
-    return np.ascontiguousarray(array.T, dtype=np.float32)
+    return hit, array_of(si.p)[hit].astype(float), normals
 
 
 def seen(traced: Any, places: Array, positions: Array, normals: Array) -> Mask:
     """(n,) bool: whether points (n, 3) are seen from a place, on the side of their normals (n, 3)."""
-    found = _seen_from(traced, places[:FEW], positions, normals)
-    left = np.flatnonzero(~found)
-    found[left] = _seen_from(traced, places[FEW:], positions[left], normals[left])
+    found = np.zeros(len(positions), bool)
+    for some in np.split(places, FEW):
+        left = np.flatnonzero(~found)
+        found[left] = _seen_from(traced, some, positions[left], normals[left])
     return found
 
 
@@ -78,15 +76,15 @@ def _seen_from(traced: Any, places: Array, positions: Array, normals: Array) -> 
     if not len(places):
         return found
     at_once = max(1, RAYS_AT_ONCE // len(places))
-    eyes = mi.Point3f(_columns(places))
+    eyes, count = vectors(mi.Point3f, places), dr.opaque(mi.UInt32, len(places))
     for first in range(0, len(positions), at_once):
         mine = slice(first, first + at_once)
-        count = len(positions[mine])
-        thread = dr.arange(mi.UInt32, count * len(places))
+        thread = dr.arange(mi.UInt32, len(positions[mine]) * len(places))
+        point = thread // count
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(thread))
-        si.p = dr.gather(mi.Point3f, mi.Point3f(_columns(positions[mine])), thread // len(places))
-        si.n = mi.Normal3f(dr.gather(mi.Vector3f, mi.Vector3f(_columns(normals[mine])), thread // len(places)))
-        eye = dr.gather(mi.Point3f, eyes, thread % len(places))
+        si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, positions[mine]), point)
+        si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normals[mine]), point))
+        eye = dr.gather(mi.Point3f, eyes, thread - point * count)
         front = dr.dot(eye - si.p, si.n) > 0
         free = front & ~traced.ray_test(si.spawn_ray_to(eye), front)
         found[mine] = np.array(dr.block_sum(dr.select(free, 1.0, 0.0), len(places))) > 0
