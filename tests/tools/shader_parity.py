@@ -29,7 +29,13 @@ def gpu_device() -> Any:
 
 
 def run_wgsl(
-    source: str, expression: str, inputs: Mapping[str, np.ndarray], *, components: int = 1, declarations: str = ""
+    source: str,
+    expression: str,
+    inputs: Mapping[str, np.ndarray],
+    *,
+    components: int = 1,
+    declarations: str = "",
+    tables: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Value of a WGSL expression for every row of the inputs.
 
@@ -43,6 +49,8 @@ def run_wgsl(
         Sent as float32.
     declarations : str
         More WGSL at module scope, such as constants.
+    tables : mapping of name to (rows, 4) array
+        Storage buffers `array<vec4f>` of that name, the same for every row of the inputs.
 
     Returns
     -------
@@ -56,7 +64,12 @@ def run_wgsl(
         parts = ", ".join(f"in_{name}[row * {width}u + {c}u]" for c in range(width))
         bindings.append(f"@group(0) @binding({slot}) var<storage, read> in_{name}: array<f32>;")
         reads.append(f"let {name} = {TYPES[width]}({parts});")
-    out = len(arrays)
+    rows = {name: np.ascontiguousarray(value, np.float32) for name, value in (tables or {}).items()}
+    bindings += [
+        f"@group(0) @binding({len(arrays) + slot}) var<storage, read> {name}: array<vec4f>;"
+        for slot, name in enumerate(rows)
+    ]
+    out = len(arrays) + len(rows)
     stores = [
         f"out[row * {components}u + {c}u] = value{f'[{c}]' if components > 1 else ''};" for c in range(components)
     ]
@@ -72,7 +85,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {{
     let value: {TYPES[components]} = {expression};
     {chr(10).join(stores)}
 }}"""
-    values = _dispatch(shader, list(arrays.values()), count * components, -(-count // GROUP))
+    values = _dispatch(shader, [*arrays.values(), *rows.values()], count * components, -(-count // GROUP))
     return values if components == 1 else values.reshape(count, components)
 
 
