@@ -7,7 +7,7 @@ picture = renderer.display_image(FrameState(camera, 1680, 1050))
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,10 +24,12 @@ from lambent.core.sequences import hammersley, radical_inverse
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.camera import clip_from_world, image_plane
+from lambent.realtime.clusters import Clusters
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.integrators import INTEGRATORS, integrator
 from lambent.realtime.mirror import MirrorView, mirror_views
 from lambent.realtime.mirror_integrators import AUTO, TILE, planar_integrator
+from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.planar import MOST_MIRRORS, PlanarPass
@@ -169,6 +171,7 @@ class Renderer:
         self.missing = self.scene.missing
         self._layouts = beside._layouts if beside else Layouts(device)
         self.resources = beside.resources if beside else SceneResources(device, self.scene, self._layouts)
+        self._clusters = beside._clusters if beside else _clusters(self.scene)
         self._depth = DepthPass(device, self._layouts)
         self._planar = PlanarPass(device, self._layouts, self.resources, self._depth)
         self._shade = ShadePass(device, self._layouts, planar_layout=self._planar.shown_layout)
@@ -184,6 +187,8 @@ class Renderer:
         self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
         self._few: Any = None  # radiance of the last displayed frame of few samples
         self._counts: dict[str, Any] = {}
+        self._gpu_ms: dict[str, float] | None = None  # of a frame in parts
+        self._frames = 0  # that were begun
 
     def draw(self, state: FrameState, target_view: Any = None) -> Any:
         """Draw a frame; returns the texture of linear radiance that it left.
@@ -191,37 +196,48 @@ class Renderer:
         With `target_view` (of a texture of the state's size and of `DISPLAY_FORMAT`) the frame is also shown there,
         encoded and smoothed. Returns before the GPU is done: see `finish`.
         """
-        state.check()
         started = time.perf_counter()
-        draws = self._draws(state)
-        data = self._frame_data(state)
-        self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
-        views = self._mirror_views(state, data)
-        passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
-        target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
-        encoder = self.device.create_command_encoder()
-        calls = self._encode_light(encoder, draws, views, state, target, passing and state.is_smoothed)
-        radiance = target.radiance
-        if passing:
-            self._few = radiance
-        if state.accumulate is not None:
-            stamps = self._timer.writes("accumulate")
-            radiance = self._accumulate.encode(encoder, radiance, state.accumulate, stamps)
-        if target_view is not None:
-            self._encode_display(encoder, state, radiance, target_view)
-        self._timer.resolve(encoder)
-        self.device.queue.submit([encoder.finish()])
-        self._counts = {
-            "integrator": state.integrator,
-            "width": state.width,
-            "height": state.height,
-            "draw_calls": calls,
-            "mirrors": len(views),
-            "triangles": len(self.scene.faces),
-            "samples_per_pixel": max((d.n * d.lobes for d in draws if d.integrator.specular), default=0),
-            "encode_ms": (time.perf_counter() - started) * 1e3,
-        }
+        part, self._gpu_ms = Whole(self.device.create_command_encoder()), None
+        steps = self._steps(part, state, target_view)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as done:
+                radiance = done.value
+                break
+        self._timer.resolve(part.encoder)
+        self.device.queue.submit([part.encoder.finish()])
+        self._counts["encode_ms"] = (time.perf_counter() - started) * 1e3
         return radiance
+
+    def parts(self, state: FrameState, target_view: Any, cut: Cut) -> Generator[None, None, Any]:
+        """The same frame to the bit, in parts of about `parts.PART_S` seconds, each of which is waited for.
+
+        Generator that yields between parts and returns the texture of radiance. It can be dropped at any time; another
+        frame of this renderer ends it with a `RuntimeError`. Until the end `target_view` holds nothing that is to be
+        seen, and what `draw` returned before is drawn over where it has this size.
+        """
+        cut.encoder, times, encode_s = self.device.create_command_encoder(), {}, 0.0
+        steps = self._steps(cut, state, target_view)
+        frame = self._frames + 1
+        while True:
+            started = time.perf_counter()
+            try:
+                next(steps)
+            except StopIteration as done:
+                self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
+                return done.value
+            self._timer.resolve(cut.encoder)
+            self.device.queue.submit([cut.encoder.finish()])
+            encode_s += time.perf_counter() - started
+            self.finish()
+            cut.took(time.perf_counter() - started)
+            for name, ms in self._timer.read().items():
+                times[name] = times.get(name, 0.0) + ms
+            cut.encoder = self.device.create_command_encoder()
+            yield
+            if self._frames != frame:
+                raise RuntimeError("another frame was begun by the same renderer")
 
     def finish(self) -> None:
         """Return when the GPU is done with all frames."""
@@ -271,7 +287,38 @@ class Renderer:
 
         Waits for the GPU.
         """
-        return {**self._counts, "gpu_ms": self._timer.read()}
+        return {**self._counts, "gpu_ms": self._timer.read() if self._gpu_ms is None else self._gpu_ms}
+
+    def _steps(self, part: Whole | Cut, state: FrameState, target_view: Any) -> Generator[None, None, Any]:
+        """Encode a frame, part by part; returns the texture of its radiance."""
+        state.check()
+        self._frames += 1
+        draws = self._draws(state)
+        data = self._frame_data(state)
+        self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        views = self._mirror_views(state, data)
+        passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
+        target = self._targets.fit(state.width, state.height, "rgba16float" if passing else "rgba32float")
+        calls = yield from self._encode_light(part, draws, views, data, state, target, passing)
+        radiance = target.radiance
+        if passing:
+            self._few = radiance
+        if state.accumulate is not None:
+            stamps = self._timer.writes("accumulate")
+            radiance = self._accumulate.encode(part.encoder, radiance, state.accumulate, stamps)
+            yield
+        if target_view is not None:
+            yield from self._encode_display(part, state, radiance, target_view)
+        self._counts = {
+            "integrator": state.integrator,
+            "width": state.width,
+            "height": state.height,
+            "draw_calls": calls,
+            "mirrors": len(views),
+            "triangles": len(self.scene.faces),
+            "samples_per_pixel": max((d.n * d.lobes for d in draws if d.integrator.specular), default=0),
+        }
+        return radiance
 
     def _draws(self, state: FrameState) -> list[Draw]:
         """What to draw, with every material's buffers up to date."""
@@ -327,49 +374,62 @@ class Renderer:
 
     def _encode_light(
         self,
-        encoder: Any,
+        part: Whole | Cut,
         draws: list[Draw],
         views: list[MirrorView],
+        data: NDArray[np.void],
         state: FrameState,
         target: Any,
-        smoothed: bool,
-    ) -> int:
-        """Encode the passes up to linear radiance; `smoothed` blends the edges of masked surfaces."""
-        planar = planar_integrator(state.integrator, state.planar)
+        passing: bool,
+    ) -> Steps:
+        """Encode the passes up to linear radiance; of a `passing` frame the edges of masked surfaces are blended."""
+        planar, clip_from_world = planar_integrator(state.integrator, state.planar), data["clip_from_world"].T
         light_group = self.resources.noise_group if state.show == LIGHT_MAP_NOISE else None
-        cut_out = {record.name for record in self.resources.cut_out} if smoothed else set()
-        fringes = [draw for draw in draws if draw.item.record.name in cut_out]
+        cut_out = {record.name for record in self.resources.cut_out} if passing and state.is_smoothed else set()
         depth = {"view": target.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
         with_depth = {"depth_stencil_attachment": {**depth, "depth_load_op": "clear"}}
-        first = encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
+        first = part.encoder.begin_render_pass(color_attachments=[], **with_depth, **self._timer.writes("depth"))
         first.set_bind_group(0, self._frame_group)
-        calls = self._depth.draw(first, self.resources, fringed=bool(fringes))
+        calls = self._depth.draw(first, self.resources, self._clusters.seen(clip_from_world), fringed=bool(cut_out))
         first.end()
+        yield
+        views = views if planar else []
         if views and planar:
-            calls += self._planar.encode(encoder, views, draws, planar, self._frame_group, target, self._timer)
+            calls += yield from self._planar.encode(
+                part, views, draws, planar, self._frame_group, target, self._clusters, clip_from_world, self._timer
+            )  # fmt: skip
+        for band in part.bands("shade", (state.width, state.height)):
+            if isinstance(part, Cut):
+                draws = self._draws(state)  # a renderer beside this one may have used the materials' buffers since
             draws = self._planar.marked(views, draws)
-        shade = encoder.begin_render_pass(
-            color_attachments=[{"view": target.radiance.create_view(), "load_op": "clear", "store_op": "store"}],
-            depth_stencil_attachment={**depth, "depth_load_op": "load"},
-            **self._timer.writes("shade"),
-        )
-        shade.set_bind_group(0, self._frame_group)
-        format = target.radiance.format
-        calls += self._shade.draw(shade, self.resources, draws, format, self._planar.shown_group, light_group)
-        calls += self._sky.draw(shade, self.resources, format)
-        calls += self._fringe.draw(shade, self.resources, fringes, format, light_group=light_group)
-        shade.end()
+            fringes = [draw for draw in draws if draw.item.record.name in cut_out]
+            shade = part.encoder.begin_render_pass(
+                color_attachments=[
+                    {"view": target.radiance.create_view(), "load_op": band.load_op, "store_op": "store"}
+                ],
+                depth_stencil_attachment={**depth, "depth_load_op": "load"},
+                **self._timer.writes("shade"),
+            )
+            band.cut(shade)
+            shade.set_bind_group(0, self._frame_group)
+            format, seen = target.radiance.format, self._clusters.seen(clip_from_world, band.shares)
+            calls += self._shade.draw(shade, self.resources, draws, seen, format, self._planar.shown_group, light_group)
+            calls += self._sky.draw(shade, self.resources, format)
+            calls += self._fringe.draw(shade, self.resources, fringes, seen, format, light_group=light_group)
+            shade.end()
+            yield
         return calls
 
-    def _encode_display(self, encoder: Any, state: FrameState, radiance: Any, target_view: Any) -> None:
+    def _encode_display(self, part: Whole | Cut, state: FrameState, radiance: Any, target_view: Any) -> Steps:
         prior = self._few if self._has_prior(state, radiance) else None
         alone = state.accumulate is None or (prior is not None and state.prior > SMOOTH_PRIOR)
         smooth = alone and state.is_smoothed
         edged = self._targets.picture("edged", state.width, state.height) if smooth else None
         shown = target_view if edged is None else edged.create_view()
-        self._tonemap.encode(encoder, self._frame_group, (radiance, prior), shown, self._timer.writes("tonemap"))
+        yield from self._tonemap.encode(part, self._frame_group, (radiance, prior), shown, self._timer)
         if edged is not None:
-            self._smooth.encode(encoder, edged, target_view, self._timer.writes("smooth"))
+            yield from self._smooth.encode(part, edged, target_view, self._timer)
+        return 0
 
     def _has_prior(self, state: FrameState, radiance: Any) -> bool:
         there = self._few is not None and self._few.size == radiance.size
@@ -389,6 +449,10 @@ class Renderer:
 def quantity_of(show: str) -> Quantity:
     """What the numbers of a picture are that shows this part of the light."""
     return QUANTITIES.get(show, LUMINANCE)
+
+
+def _clusters(scene: BakedScene) -> Clusters:
+    return Clusters(scene.positions, scene.faces, scene.record.objects)
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

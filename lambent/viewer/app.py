@@ -131,6 +131,11 @@ class Drawing(Protocol):
 
     def wait_s(self, state: ViewerState) -> float | None: ...
 
+    @property
+    def under_way(self) -> bool: ...
+
+    def work(self, state: ViewerState) -> bool: ...
+
     def save(self, state: ViewerState) -> object: ...
 
 
@@ -189,6 +194,7 @@ class Window:
         self._drawn_s = state.clock()
         self._moving = False  # between this frame and the next
         self._wake_at_s: float | None = None
+        self._working = False  # between two parts of a frame at rest
         self._failed = FirstError(then=lambda: loop.call_soon(self.canvas.close))
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
         self._take_dropped_files()
@@ -310,6 +316,9 @@ class Window:
         self._moving = self._input.walking or self.state.playing
         if self._moving or self._extra_frames or self._frames is not None:
             self.canvas.request_draw()
+        if self._picture.under_way and not self._working:
+            self._working = True
+            self._loop.call_later(0, self._work)
         waits = [m.until_s - self.state.clock() for m in self.state.messages]
         if self.state.editor is not None and self.state.editor.busy:
             waits.append(POLL_S)
@@ -320,6 +329,18 @@ class Window:
             waits.append(due)
         if waits:
             self._wake_in(max(0.0, min(waits)))
+
+    def _work(self) -> None:
+        """Draw a part of a frame at rest; the loop looks at the events before the next one."""
+        self._working = False
+        if self.canvas.get_closed():
+            return
+        with self._failed:
+            if self._picture.work(self.state):
+                self.canvas.request_draw()
+            elif self._picture.under_way:
+                self._working = True
+                self._loop.call_later(0, self._work)
 
     def _wake_in(self, seconds: float) -> None:
         at_s = self.state.clock() + seconds

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer, quantity_o
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.mirror_integrators import CHOICES as PLANAR_WAYS
 from lambent.realtime.mirror_integrators import OFF
+from lambent.realtime.parts import PART_S, Cut
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
 from lambent.realtime.resources import LOOKUPS
@@ -42,7 +44,19 @@ CHOICES = Choices(
 REST_FRAMES = 128
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
 SOFTWARE_N = 1
-QUIET_S = 1.5  # at most so long after an event, or as long as a frame at rest takes, none is begun
+QUIET_S = 0.5  # at most so long after an event, or as long as a part of a frame at rest takes, none is begun
+
+
+@dataclass
+class Job:
+    """A frame at rest that is drawn in parts."""
+
+    frame: FrameState
+    plan: Plan
+    view: Any
+    steps: Generator[None, None, Any]
+    seconds: float = 0.0
+    longest_s: float = 0.0
 
 
 class Picture:
@@ -55,12 +69,16 @@ class Picture:
         self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
         self._pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
         self._refine = True
-        self._rest_s = 0.0  # what the last frame at rest took
+        self._part_s = 0.0  # what the longest part of the last frame at rest took
+        self._whole_s = math.inf if adapter.is_software else 0.0  # what the last frame at rest took altogether
+        self._cut = Cut()
+        self._under_way: Job | None = None
         self.view: Any = None
         self.radiance: Any = None  # texture of what `view` shows, linear
         self.drawn: FrameState | None = None  # as it was planned
         self.version = 0  # grows with every drawn frame
         self._size: tuple[int, int] = (0, 0)
+        self._spare: list[Any] = []  # views of that size, two at most
 
     @property
     def views(self) -> tuple[Any, ...]:
@@ -96,37 +114,87 @@ class Picture:
         now_s, self._refine = state.clock(), state.refine if refine is None else refine
         self._pacer.aim(share * state.target_ms / 1e3)
         rests = wanted == self._pacer.shown
+        if not rests:
+            self._under_way = None  # another frame is wanted: nobody will see this one
+        if self._under_way is not None:
+            return
         plan = self._pacer.plan(wanted, now_s, refine=self._refine, adaptive=state.adaptive_resolution)
         if plan is None or (rests and (state.answering or self._quiet_for_s(state) > 0)):
             return
         frame = self._planned(wanted, plan)
-        self._fit(frame.width, frame.height)
+        view = self._view_of(frame.width, frame.height)
+        if rests and self._whole_s > PART_S:
+            self._under_way = Job(frame, plan, view, self._renderer.parts(frame, view, self._cut))
+            return
         started = time.perf_counter()
-        self.radiance, self.drawn = self._renderer.draw(frame, self.view), frame
-        self.version += 1
+        radiance = self._renderer.draw(frame, view)
         # Waiting keeps the queue short, so that a frame shows the latest event, and tells what a frame costs.
         self._renderer.finish()
         seconds = time.perf_counter() - started
+        if rests:
+            self._whole_s = self._part_s = seconds
+        self._show(state, frame, plan, view, radiance, seconds)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a frame at rest is being drawn in parts, see `work`."""
+        return self._under_way is not None
+
+    @property
+    def readable(self) -> bool:
+        """Whether `radiance` is that of `view`: a frame under way may be drawn over it."""
+        over = self._under_way is not None and self._under_way.plan.accumulate is None
+        return self.radiance is not None and not over
+
+    def work(self, state: ViewerState) -> bool:
+        """Draw a part of the frame under way; whether there is a new picture to show.
+
+        Parts take about `parts.PART_S`, so that events are answered in between. What was drawn before stays in `view`
+        until the frame is whole.
+        """
+        job = self._under_way
+        if job is None:
+            return False
+        started = time.perf_counter()
+        try:
+            next(job.steps)
+        except StopIteration as done:
+            self._under_way = None
+            self._whole_s, self._part_s = job.seconds, job.longest_s
+            self._show(state, job.frame, job.plan, job.view, done.value, job.seconds)
+            return True
+        seconds = time.perf_counter() - started
+        job.seconds, job.longest_s = job.seconds + seconds, max(job.longest_s, seconds)
+        return False
+
+    def _show(
+        self, state: ViewerState, frame: FrameState, plan: Plan, view: Any, radiance: Any, seconds: float
+    ) -> None:
+        """Take a frame that is there."""
+        self.view, self.radiance, self.drawn = view, radiance, frame
+        self.version += 1
         self._pacer.drawn(plan)
-        self._rest_s = seconds if rests else self._rest_s
         drawn = self._renderer.statistics
         self._pacer.cost(plan, seconds, drawn["mirrors"])
         state.statistics = self._statistics(drawn, seconds, plan)
 
     def wait_s(self, state: ViewerState) -> float | None:
         """Seconds until a frame is due although nothing changes; None: never."""
+        if self._under_way is not None:
+            return None  # `work` goes on by itself
         due = self._pacer.wait_s(state.clock(), refine=self._refine)
         return None if due is None else max(due, self._quiet_for_s(state))
 
     def _quiet_for_s(self, state: ViewerState) -> float:
-        """Seconds that no frame of rest is begun: while one is drawn, which takes long in software, nothing answers."""
-        return max(0.0, state.touched_s + min(self._rest_s, QUIET_S) - state.clock())
+        """Seconds that no frame of rest is begun: while a part of one is drawn nothing answers."""
+        return max(0.0, state.touched_s + min(self._part_s, QUIET_S) - state.clock())
 
     def save(self, state: ViewerState) -> str | None:
         """Write the picture at full size into the state's folder: PNG as shown, EXR as linear radiance.
 
         Returns the name without its suffix, None where it could not be written.
         """
+        self._under_way = None  # the renderer draws one frame at a time; what is lost is drawn again
         name = free_name(state.folder, state.scene.name)
         frame = self._pacer.shown
         assert isinstance(frame, FrameState), "saved before the first frame"
@@ -153,13 +221,17 @@ class Picture:
         width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
         return replace(frame, width=width, height=height)
 
-    def _fit(self, width: int, height: int) -> None:
-        if self._size == (width, height):
-            return
-        self._size = (width, height)
-        usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING
-        texture = self.device.create_texture(size=(width, height, 1), format=DISPLAY_FORMAT, usage=usage)
-        self.view = texture.create_view()
+    def _view_of(self, width: int, height: int) -> Any:
+        """What the next frame is drawn into: not what is shown, which a frame in parts must leave alone."""
+        if self._size != (width, height):
+            self._size, self._spare = (width, height), []
+        free = [view for view in self._spare if view is not self.view]
+        if not free:
+            usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING
+            texture = self.device.create_texture(size=(width, height, 1), format=DISPLAY_FORMAT, usage=usage)
+            free = [texture.create_view()]
+            self._spare += free
+        return free[0]
 
     @property
     def accumulated(self) -> int:

@@ -76,6 +76,20 @@ class Pictures:
             waits += [self._b.wait_s(state), 0.1 if self._errors.busy else None]
         return min((wait for wait in waits if wait is not None), default=None)
 
+    @property
+    def under_way(self) -> bool:
+        """Whether a frame at rest is being drawn in parts."""
+        return any(picture.under_way for picture in self._pictures)
+
+    def work(self, state: ViewerState) -> bool:
+        """Draw a part of it; whether there is a new picture to show."""
+        busy = next((picture for picture in self._pictures if picture.under_way), None)
+        return busy is not None and busy.work(state)
+
+    @property
+    def _pictures(self) -> tuple[Picture, ...]:
+        return (self._b, self._a) if self._comparing and self._b is not None else (self._a,)
+
     def save(self, state: ViewerState) -> None:
         """Write the picture A, and the error map where one is shown."""
         name = self._a.save(state)
@@ -117,7 +131,8 @@ class Pictures:
         """Compare A and B where both are whole and at rest."""
         comparison = state.comparison
         assert comparison is not None
-        at_rest = a.wait_s(state) is None and (b.samples > 0 or b.wait_s(state) is None)
+        done = not a.under_way and a.wait_s(state) is None
+        at_rest = done and (b.samples > 0 or not (b.under_way or b.wait_s(state) is not None))
         if a.drawn is None or b.drawn is None or a.radiance.size != b.radiance.size or not at_rest:
             comparison.figures = None if not at_rest else comparison.figures
             self._errors.forget()
@@ -149,7 +164,7 @@ class Pictures:
     def _meter(self, state: ViewerState) -> None:
         meter, now_s = state.meter, state.clock()
         a, b = self._a, self._b
-        if a.radiance is None:
+        if not a.readable:
             return
         stale = a.version != self._read_version and now_s - self._read_s >= METER_S
         if is_false_coloured(state) and shows_noise(state) not in meter.fitted:
@@ -164,6 +179,8 @@ class Pictures:
             x, y = meter.cursor
             beyond = self._comparing and state.comparison is not None and state.comparison.mode == "side by side"
             picture = b if beyond and b is not None and state.comparison and x > state.comparison.split else a
+            if not picture.readable:
+                return
             width, height = picture.radiance.size[:2]
             meter.under_cursor = read_pixel(self.device, picture.radiance, int(x * width), int(y * height))
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import wgpu
 
+from lambent.realtime.parts import Whole
 from lambent.realtime.passes.smooth import SmoothPass
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
 from lambent.realtime.resources import Layouts
+from lambent.realtime.targets import PassTimer
 
 SIZE = 64
 
@@ -29,9 +31,10 @@ def smoothed(device) -> Any:
     def run(grey: np.ndarray) -> np.ndarray:
         pixels = np.repeat(np.round(grey * 255).astype(np.uint8)[..., None], 4, axis=-1)
         device.queue.write_texture({"texture": given}, np.ascontiguousarray(pixels), rows, size)
-        encoder = device.create_command_encoder()
-        smooth.encode(encoder, given, target.create_view(), {})
-        device.queue.submit([encoder.finish()])
+        part = Whole(device.create_command_encoder())
+        for _ in smooth.encode(part, given, target.create_view(), PassTimer(device)):
+            pass
+        device.queue.submit([part.encoder.finish()])
         read = np.frombuffer(device.queue.read_texture({"texture": target}, rows, size), np.uint8)
         return read.reshape(SIZE, SIZE, 4)[..., 0] / 255
 

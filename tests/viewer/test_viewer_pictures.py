@@ -39,6 +39,8 @@ def state(renderer, tmp_path):
 def drawn(pictures, state, steps=1, dt_s=1.0):
     for _ in range(steps):
         pictures.update(state, PLACE, 1.0)
+        while pictures.under_way:
+            pictures.work(state)
         state.now_s += dt_s
 
 
@@ -102,16 +104,56 @@ def test_the_meter_sets_the_exposure(renderer, state):
 def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
     pictures = Pictures(renderer)
     drawn(pictures, state, 3)
-    version, pictures._a._rest_s = pictures._a.version, 1.0
+    version, pictures._a._part_s = pictures._a.version, 0.45
     state.touched_s = state.now_s
-    drawn(pictures, state, 3, dt_s=0.3)
+    drawn(pictures, state, 2, dt_s=0.2)
     assert pictures._a.version == version
-    assert pictures.wait_s(state) == pytest.approx(0.1)
+    assert pictures.wait_s(state) == pytest.approx(0.05)
     state.camera = SIDE
-    drawn(pictures, state, dt_s=0)
+    pictures.update(state, PLACE, 1.0)
     assert pictures._a.version == version + 1, "motion is drawn at once"
     drawn(pictures, state, 2)
     assert pictures._a.version > version + 1
+
+
+@pytest.fixture
+def at_rest(renderer, state):
+    """Pictures of a slow adapter, with a frame at rest begun and a part of it drawn."""
+    pictures = Pictures(renderer)
+    drawn(pictures, state, 2)
+    pictures._a._whole_s = 1.0
+    state.now_s += 1
+    pictures.update(state, PLACE, 1.0)
+    assert pictures.under_way and not pictures.work(state)
+    return pictures
+
+
+def test_a_frame_at_rest_is_drawn_in_parts_and_shown_when_it_is_whole(at_rest, state):
+    shown, version = at_rest._a.view, at_rest._a.version
+    state.touched_s = state.now_s
+    at_rest.update(state, PLACE, 1.0)  # an event that changes nothing: the frame goes on
+    assert at_rest.wait_s(state) is None
+    parts = 1
+    while not at_rest.work(state):
+        assert at_rest.under_way and at_rest._a.view is shown and at_rest._a.version == version
+        parts += 1
+    assert parts > 3 and at_rest._a.view is not shown and at_rest._a.version == version + 1
+    assert not at_rest.under_way and at_rest.wait_s(state) is not None
+
+
+def test_a_movement_drops_the_frame_at_rest(at_rest, state):
+    version = at_rest._a.version
+    state.camera = SIDE
+    at_rest.update(state, PLACE, 1.0)
+    assert not at_rest.under_way and at_rest._a.version == version + 1 and at_rest._a.accumulated == 0
+
+
+def test_a_picture_is_saved_in_the_midst_of_a_frame(at_rest, state):
+    state.camera = state.camera.model_copy(update={"name": "another name is no other picture"})
+    at_rest.save(state)
+    assert "saved" in state.messages[-1].text
+    drawn(at_rest, state)
+    assert not at_rest.under_way
 
 
 def test_what_is_under_the_cursor(renderer, state):
@@ -131,7 +173,7 @@ def test_what_is_under_the_cursor(renderer, state):
 def test_side_by_side_with_the_reference(renderer, state):
     pictures = Pictures(renderer)
     state.comparison.mode = "side by side"
-    drawn(pictures, state, 12)
+    drawn(pictures, state, 24)
     figures = state.comparison.figures
     assert len(pictures.views) == 2 and figures.of >= 8
     assert 20 < figures.psnr_db < 80

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from lambent.realtime.clusters import Seen
 from lambent.realtime.resources import VERTEX_FLOATS, Layouts, SceneResources
 from lambent.realtime.shader_source import assemble
 
@@ -35,7 +36,7 @@ class DepthPass:
             for entry in ("mask_main", "solid_main")
         )
 
-    def draw(self, target: Any, resources: SceneResources, fringed: bool = False) -> int:
+    def draw(self, target: Any, resources: SceneResources, seen: Seen, fringed: bool = False) -> int:
         """Encode into the render pass `target`, whose group 0 is set; returns the draw calls.
 
         With `fringed` pixels that a masked surface covers in part are left open, for `passes.shade.FRINGE`.
@@ -46,16 +47,22 @@ class DepthPass:
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
         target.set_pipeline(self._whole)
-        ranges = resources.whole_ranges
-        for first, count in ranges:
-            target.draw_indexed(count * 3, 1, first * 3)
+        calls = sum(draw_seen(target, seen, *faces) for faces in resources.whole_ranges)
         cut_out = resources.cut_out
         if cut_out:
             target.set_pipeline(self._solid if fringed else self._cut_out)
         for record in cut_out:
             target.set_bind_group(1, resources.materials[record.material].group)
-            target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
-        return len(ranges) + len(cut_out)
+            calls += draw_seen(target, seen, record.first_face, record.face_count)
+        return calls
+
+
+def draw_seen(target: Any, seen: Seen, first_face: int, face_count: int) -> int:
+    """Encode what is seen of a range of faces; returns the draw calls."""
+    runs = seen.of(first_face, face_count)
+    for first, count in runs:
+        target.draw_indexed(count * 3, 1, first * 3)
+    return len(runs)
 
 
 def _pipeline(device: Any, groups: list[Any], module: Any, fragment: dict[str, Any] | None = None) -> Any:

@@ -7,9 +7,11 @@ from typing import Any
 
 import wgpu
 
+from lambent.realtime.clusters import Clusters
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.mirror import MIRROR_DTYPE, MirrorView, levels_of
+from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.passes.depth import DEPTH_FORMAT, DepthPass
 from lambent.realtime.passes.shade import Draw, ShadePass, Stage
 from lambent.realtime.resources import Layouts, SceneResources
@@ -78,41 +80,48 @@ class MirrorPass:
         """Buffer of MIRROR_DTYPE of the view `index`."""
         return self._buffers[index][2]
 
-    def encode(self, encoder: Any, index: int, view: MirrorView, draws: list[Draw], timer: PassTimer) -> int:
-        """Draw the mirror picture of a view; returns the draw calls."""
-        picture = self.picture(view.size)
+    def encode(
+        self, part: Whole | Cut, index: int, view: MirrorView, draws: list[Draw], clusters: Clusters, timer: PassTimer
+    ) -> Steps:
+        """Draw the mirror picture of a view, part by part."""
+        picture, clip_from_world = self.picture(view.size), view.frame["clip_from_world"].T
         depth = {"view": picture.depth.create_view(), "depth_clear_value": 0.0, "depth_store_op": "store"}
-        first = encoder.begin_render_pass(
+        first = part.encoder.begin_render_pass(
             color_attachments=[],
             depth_stencil_attachment={**depth, "depth_load_op": "clear"},
             **timer.writes("mirror"),
         )
         first.set_bind_group(0, self._buffers[index][1])
-        calls = self._depth.draw(first, self._resources)
+        calls = self._depth.draw(first, self._resources, clusters.seen(clip_from_world))
         first.end()
-        target = encoder.begin_render_pass(
-            color_attachments=[
-                {"view": v, "load_op": "clear", "store_op": "store"}
-                for v in (picture.level_views[0], picture.planes_view)
-            ],
-            depth_stencil_attachment={**depth, "depth_load_op": "load"},
-            **timer.writes("mirror"),
-        )
-        target.set_bind_group(0, self._buffers[index][1])
-        calls += self._shade.draw(target, self._resources, draws, LIGHT_FORMAT)
-        target.set_pipeline(self._sky)
-        target.set_bind_group(1, self._resources.sky_group)
-        target.draw(3)
-        target.end()
+        yield
+        for band in part.bands("mirror", view.size):
+            target = part.encoder.begin_render_pass(
+                color_attachments=[
+                    {"view": v, "load_op": band.load_op, "store_op": "store"}
+                    for v in (picture.level_views[0], picture.planes_view)
+                ],
+                depth_stencil_attachment={**depth, "depth_load_op": "load"},
+                **timer.writes("mirror"),
+            )
+            band.cut(target)
+            target.set_bind_group(0, self._buffers[index][1])
+            seen = clusters.seen(clip_from_world, band.shares)
+            calls += 1 + self._shade.draw(target, self._resources, draws, seen, LIGHT_FORMAT)
+            target.set_pipeline(self._sky)
+            target.set_bind_group(1, self._resources.sky_group)
+            target.draw(3)
+            target.end()
+            yield
         for group, into in zip(picture.mip_groups, picture.level_views[1:], strict=True):
-            level = encoder.begin_render_pass(
+            level = part.encoder.begin_render_pass(
                 color_attachments=[{"view": into, "load_op": "clear", "store_op": "store"}], **timer.writes("mips")
             )
             level.set_pipeline(self._mips)
             level.set_bind_group(0, group)
             level.draw(3)
             level.end()
-        return calls + 1
+        return calls
 
     def picture(self, size: tuple[int, int]) -> MirrorPicture:
         """The textures of that size; those of another are forgotten."""

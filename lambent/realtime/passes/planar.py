@@ -7,10 +7,12 @@ from typing import Any
 
 import wgpu
 
+from lambent.realtime.clusters import Clusters, Seen
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.mirror import MirrorView
 from lambent.realtime.mirror_integrators import is_interleaved
-from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS
+from lambent.realtime.parts import Band, Cut, Steps, Whole
+from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS, draw_seen
 from lambent.realtime.passes.mirror import MirrorPass
 from lambent.realtime.passes.shade import Draw, constants_of
 from lambent.realtime.resources import Layouts, SceneResources
@@ -53,21 +55,25 @@ class PlanarPass:
         return self._shown
 
     def encode(
-        self, encoder: Any, views: list[MirrorView], draws: list[Draw], how: Integrator, frame_group: Any,
-        target: Target, timer: PassTimer,
-    ) -> int:  # fmt: skip
-        """Draw the mirror pictures of `views` and the light that `how` finds in them; returns the draw calls.
+        self, part: Whole | Cut, views: list[MirrorView], draws: list[Draw], how: Integrator, frame_group: Any,
+        target: Target, clusters: Clusters, clip_from_world: Any, timer: PassTimer,
+    ) -> Steps:  # fmt: skip
+        """Draw the mirror pictures of `views` and the light that `how` finds in them, part by part.
 
-        `draws` are the frame's; the depth of `target` is there already.
+        `draws` and `clip_from_world` are the frame's; the depth of `target` is there already.
         """
         self._fit(target.radiance.size[:2])
         mirrored = self._mirror.write(views, draws)
         calls = 0
         for index, view in enumerate(views):
-            calls += self._mirror.encode(encoder, index, view, mirrored, timer)
+            calls += yield from self._mirror.encode(part, index, view, mirrored, clusters, timer)
             mine = [self._planar(draw, how) for draw in draws if _is_part(draw, view)]
-            calls += self._encode_light(encoder, index, view, mine, frame_group, target, timer)
-        self._encode_clean(encoder, is_interleaved(how), timer)
+            for band in part.bands("planar", self._size):
+                seen = clusters.seen(clip_from_world, band.shares)
+                calls += self._encode_light(part.encoder, index, view, mine, seen, band, frame_group, target, timer)
+                yield
+        self._encode_clean(part.encoder, is_interleaved(how), timer)
+        yield
         return calls
 
     def marked(self, views: list[MirrorView], draws: list[Draw]) -> list[Draw]:
@@ -80,12 +86,12 @@ class PlanarPass:
         return replace(draw, integrator=how, material_group=buffers.group)
 
     def _encode_light(
-        self, encoder: Any, index: int, view: MirrorView, draws: list[Draw], frame_group: Any, target: Target,
-        timer: PassTimer,
+        self, encoder: Any, index: int, view: MirrorView, draws: list[Draw], seen: Seen, band: Band, frame_group: Any,
+        target: Target, timer: PassTimer,
     ) -> int:  # fmt: skip
         picture = self._mirror.picture(view.size)
         group = self._layouts.group(self._look_up, self._mirror.uniform(index), picture.light_view, picture.planes_view)
-        kept = {"load_op": "load" if index else "clear", "store_op": "store"}
+        kept = {"load_op": "load" if index else band.load_op, "store_op": "store"}
         render = encoder.begin_render_pass(
             color_attachments=[{"view": texture.create_view(), **kept} for texture in self._light],
             depth_stencil_attachment={
@@ -93,18 +99,20 @@ class PlanarPass:
             },
             **timer.writes("planar"),
         )  # fmt: skip
+        band.cut(render)
         render.set_bind_group(0, frame_group)
         render.set_bind_group(3, group)
         render.set_vertex_buffer(0, self._resources.vertices)
         render.set_index_buffer(self._resources.indices, "uint32")
+        calls = 0
         for draw in draws:
             record = draw.item.record
             render.set_pipeline(self._pipeline(draw))
             render.set_bind_group(1, draw.material_group)
             render.set_bind_group(2, draw.item.group(draw.integrator.cube))
-            render.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
+            calls += draw_seen(render, seen, record.first_face, record.face_count)
         render.end()
-        return len(draws)
+        return calls
 
     def _encode_clean(self, encoder: Any, interleaved: bool, timer: PassTimer) -> None:
         render = encoder.begin_render_pass(

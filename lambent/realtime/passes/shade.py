@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from lambent.materials.document import Material
+from lambent.realtime.clusters import Seen
 from lambent.realtime.integrators import Integrator
-from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS
+from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS, draw_seen
 from lambent.realtime.resources import LOOKUPS, Layouts, ObjectResources, SceneResources
 from lambent.realtime.shader_source import assemble
 
@@ -79,6 +80,7 @@ class ShadePass:
         target: Any,
         resources: SceneResources,
         draws: list[Draw],
+        seen: Seen,
         format: str,
         planar_group: Any = None,
         light_group: Any = None,
@@ -89,14 +91,17 @@ class ShadePass:
         """
         target.set_vertex_buffer(0, resources.vertices)
         target.set_index_buffer(resources.indices, "uint32")
+        calls = 0
         for draw in draws:
             record = draw.item.record
+            if not seen.of(record.first_face, record.face_count):
+                continue
             target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
             target.set_bind_group(2, draw.item.group(draw.integrator.cube))
             target.set_bind_group(3, planar_group if draw.planar else light_group or resources.light_group)
-            target.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
-        return len(draws)
+            calls += draw_seen(target, seen, record.first_face, record.face_count)
+        return calls
 
     def _pipeline(self, draw: Draw, format: str) -> Any:
         constants = constants_of(draw)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
+from lambent.realtime.targets import PassTimer
 
 
 class SmoothPass:
@@ -22,13 +24,18 @@ class SmoothPass:
             primitive={"topology": "triangle-list"},
         )
 
-    def encode(self, encoder: Any, shown: Any, target: Any, timestamps: dict[str, Any]) -> None:
+    def encode(self, part: Whole | Cut, shown: Any, target: Any, timer: PassTimer) -> Steps:
         """Draw the texture `shown` into the view `target`."""
         group = self._layouts.group(self._layouts.shown, shown.create_view(), self._sampler)
-        draw = encoder.begin_render_pass(
-            color_attachments=[{"view": target, "load_op": "clear", "store_op": "store"}], **timestamps
-        )
-        draw.set_pipeline(self._pipeline)
-        draw.set_bind_group(0, group)
-        draw.draw(3)
-        draw.end()
+        for band in part.bands("smooth", shown.size[:2]):
+            draw = part.encoder.begin_render_pass(
+                color_attachments=[{"view": target, "load_op": band.load_op, "store_op": "store"}],
+                **timer.writes("smooth"),
+            )
+            band.cut(draw)
+            draw.set_pipeline(self._pipeline)
+            draw.set_bind_group(0, group)
+            draw.draw(3)
+            draw.end()
+            yield
+        return 0

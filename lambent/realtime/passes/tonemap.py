@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import wgpu
 
+from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
+
+if TYPE_CHECKING:
+    from lambent.realtime.targets import PassTimer  # which knows the format of this one
 
 DISPLAY_FORMAT = "rgba8unorm"
 FALSE_COLOUR = "false-colour"
@@ -32,19 +36,24 @@ class TonemapPass:
         )
 
     def encode(
-        self, encoder: Any, frame_group: Any, radiance: tuple[Any, Any], target: Any, timestamps: dict[str, Any]
-    ) -> None:
+        self, part: Whole | Cut, frame_group: Any, radiance: tuple[Any, Any], target: Any, timer: PassTimer
+    ) -> Steps:
         """Draw textures of radiance into the view `target`: the second, if any, with the share that the frame says."""
         seen, prior = radiance
         views = [(seen if texture is None else texture).create_view() for texture in (seen, prior)]
         group = self._device.create_bind_group(
             layout=self._group_layout, entries=[{"binding": i, "resource": view} for i, view in enumerate(views)]
         )
-        draw = encoder.begin_render_pass(
-            color_attachments=[{"view": target, "load_op": "clear", "store_op": "store"}], **timestamps
-        )
-        draw.set_pipeline(self._pipeline)
-        draw.set_bind_group(0, frame_group)
-        draw.set_bind_group(1, group)
-        draw.draw(3)
-        draw.end()
+        for band in part.bands("tonemap", seen.size[:2]):
+            draw = part.encoder.begin_render_pass(
+                color_attachments=[{"view": target, "load_op": band.load_op, "store_op": "store"}],
+                **timer.writes("tonemap"),
+            )
+            band.cut(draw)
+            draw.set_pipeline(self._pipeline)
+            draw.set_bind_group(0, frame_group)
+            draw.set_bind_group(1, group)
+            draw.draw(3)
+            draw.end()
+            yield
+        return 0

@@ -54,6 +54,16 @@ class Stage:
         waits = [due for picture in self._shown if (due := picture.wait_s(state)) is not None]
         return min(waits, default=None)
 
+    @property
+    def under_way(self) -> bool:
+        """Whether a frame at rest is being drawn in parts."""
+        return any(picture.under_way for picture in self._shown)
+
+    def work(self, state: ViewerState) -> bool:
+        """Draw a part of it; whether there is a new picture to show."""
+        busy = next((picture for picture in self._shown if picture.under_way), None)
+        return busy is not None and busy.work(state)
+
     def save(self, state: ViewerState) -> None:
         """Write the picture of A, and of B where there is one."""
         for picture in self._shown:
