@@ -17,7 +17,6 @@ FRAME_DTYPE = np.dtype(  # Frame in shaders/frame.wgsl
         ("clip_from_world", "f4", (4, 4)), ("eye", "f4", 4), ("across", "f4", 4), ("up", "f4", 4),
         ("forward", "f4", 4), ("show", "f4", 4), ("first_sample", "u4"), ("view_transform", "u4"),
         ("exposure", "f4"), ("prior", "f4"), ("scale", "f4", 4),
-        ("walls", "f4", (8, 4)),
     ]
 )  # fmt: skip
 LOBE_DTYPE = np.dtype(  # PlacedLobe in shaders/surface.wgsl

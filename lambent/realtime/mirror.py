@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.store.contract import ReflectorRecord
+from lambent.store.contract import PlanRecord, ReflectorRecord
 
 Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
@@ -27,16 +27,15 @@ CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plan
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
 
-MOST_WALLS = 8  # of a reflector, the longest: array in frame.wgsl and planar.wgsl
-
 MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar.wgsl
     [
         ("eye", "f4", 4), ("row_x", "f4", 4), ("row_y", "f4", 4), ("row_w", "f4", 4), ("plane", "f4", 4),
         ("across", "f4", 4), ("up", "f4", 4), ("forward", "f4", 4),
         ("size", "f4", 2), ("offset", "f4", 2), ("tolerance", "f4"), ("focal_px", "f4"), ("levels", "f4"),
-        ("number", "f4"), ("walls", "f4", (MOST_WALLS, 4)),
+        ("number", "f4"),
     ]
 )  # fmt: skip
+PLAN_DTYPE = np.dtype([("to_u", "f4", 4), ("to_v", "f4", 4), ("below", "f4", 4)])  # Plan in shaders/mirror_walls.wgsl
 
 
 @dataclass(frozen=True)
@@ -56,6 +55,8 @@ class MirrorView:
         Width and height of the mirror picture, pixels.
     share : float
         Of the frame that the reflector's outline covers.
+    plan : NDArray of PLAN_DTYPE or None
+        How rays of the mirrored frame find their place in the reflector's plan; None where no walls stand on it.
     """
 
     reflector: ReflectorRecord
@@ -64,6 +65,7 @@ class MirrorView:
     uniform: NDArray[np.void]
     size: tuple[int, int]
     share: float
+    plan: NDArray[np.void] | None = None
 
 
 def mirror_views(
@@ -153,38 +155,32 @@ def _view(
         seen[name][:3] = vector
     seen["across"][3], seen["up"][3], seen["forward"][3] = n
     seen["show"] = (1, 1, 1, 0)
-    seen["walls"] = 0 if n @ reflector.plane[:3] < 0 else _walls(reflector, eye)
+    upright = n @ reflector.plane[:3] > 0  # walls stand on the side that the reflector faces
     uniform = np.zeros((), MIRROR_DTYPE)
     uniform["eye"][:3] = eye
     for row, name in ((0, "row_x"), (1, "row_y"), (3, "row_w")):
         uniform[name][:3] = clip[row, :3]
     for name in ("across", "up", "forward"):
         uniform[name][:3] = seen[name][:3]
-    uniform["walls"] = seen["walls"]
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
     uniform["tolerance"] = reflector.deviation_m + 2 * CLEARANCE_M
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)
     uniform["levels"], uniform["number"] = levels_of((int(wide[0]), int(wide[1]))), number
-    return MirrorView(reflector, plane, seen, uniform, (int(wide[0]), int(wide[1])), share)
+    size_px, plan = (int(wide[0]), int(wide[1])), _plan(reflector.plan, plane, eye) if upright else None
+    return MirrorView(reflector, plane, seen, uniform, size_px, share, plan)
 
 
-def _walls(reflector: ReflectorRecord, eye: Floats) -> Floats:
-    """(MOST_WALLS, 4): q . wall < 0 where the line from the mirror eye to eye + q meets the reflector's plane past one.
-
-    Each is the plane through the eye and an edge of the outline that a wall stands on, its normal inwards; unused ones
-    are 0.
-    """
-    plane, outline = np.asarray(reflector.plane, float), np.asarray(reflector.outline, float)
-    edges = np.roll(outline, -1, axis=0) - outline
-    length = np.linalg.norm(edges, axis=1)
-    walled = [i for i in np.argsort(-length, kind="stable") if i < len(reflector.walled) and reflector.walled[i]]
-    below = -(plane[:3] @ eye + plane[3])
-    walls = np.zeros((MOST_WALLS, 4))
-    for row, i in zip(walls, walled, strict=False):
-        inwards = np.cross(plane[:3], edges[i] / length[i])
-        wall = below * inwards + inwards @ (eye - outline[i]) * plane[:3]
-        row[:3] = wall / np.linalg.norm(wall)
-    return walls
+def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.void] | None:
+    if record is None:
+        return None
+    uniform = np.zeros((), PLAN_DTYPE)
+    offset = eye - np.asarray(record.corner)
+    axes = (("to_u", record.across, record.columns), ("to_v", record.along, record.rows))
+    for name, axis, cells in axes:
+        uniform[name][:3] = np.asarray(axis) / (record.cell_m * cells)
+        uniform[name][3] = (offset @ np.asarray(axis) / record.cell_m + 0.5) / cells
+    uniform["below"] = -(plane[:3] @ eye + plane[3])
+    return uniform
 
 
 def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[Floats, Floats]:

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from lambent.core.frames import basis
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.floor_plan import FloorPlan, floor_plan
 from lambent.scenes.geometry import areas
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
-from lambent.scenes.walls import walled_edges
 
 Floats = NDArray[np.floating]
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
@@ -48,7 +48,8 @@ class Reflector:
     """A plane (n, d), n.x + d = 0, n outwards; `outline` (P, 3) is the convex hull of its parts, in the plane.
 
     `deviation_m` is the largest distance of a vertex of its parts from the plane; `two_sided` is whether it is a sheet
-    that may be seen from behind, too. `walled` says which edges of the outline walls stand on (see walls.py).
+    that may be seen from behind, too. `plan` says where walls stand on the edges of its parts; None where
+    none does.
     """
 
     plane: tuple[float, float, float, float]
@@ -56,7 +57,7 @@ class Reflector:
     deviation_m: float
     two_sided: bool
     parts: tuple[ReflectorPart, ...]
-    walled: tuple[bool, ...] = ()
+    plan: FloorPlan | None = None
 
     @property
     def area_m2(self) -> float:
@@ -92,8 +93,16 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
     corners = scene.corners
-    walled = (replace(r, walled=walled_edges(r.outline, np.array(r.plane[:3]), corners)) for r in large)
-    return tuple(sorted(walled, key=lambda r: -r.area_m2))
+    meshes = {o.name: o.mesh for o in candidates}
+    return tuple(sorted((_with_walls(r, meshes, corners) for r in large), key=lambda r: -r.area_m2))
+
+
+def _with_walls(found: Reflector, meshes: Mapping[str, Mesh], corners: Floats) -> Reflector:
+    """The reflector with what stands on its edges; `corners` (F, 3, 3) are the triangles of the scene."""
+    n = np.array(found.plane[:3])
+    parts = ((meshes[part.object], part.faces) for part in found.parts)
+    faces = np.concatenate([mesh.positions[mesh.faces[numbers]] for mesh, numbers in parts]).astype(float)
+    return replace(found, plan=floor_plan(faces, n, corners))
 
 
 def is_glossy(material: Material) -> bool:

@@ -27,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
@@ -90,10 +90,23 @@ class ReflectorPart(_Record):
     area_m2: float
 
 
+class PlanRecord(_Record):
+    """See scenes.floor_plan.FloorPlan: a grid of signed distances, `packed` by store.plans."""
+
+    corner: Triple
+    across: Triple
+    along: Triple
+    cell_m: float = Field(gt=0)
+    rows: int = Field(ge=1, le=8192)
+    columns: int = Field(ge=1, le=8192)
+    packed: str
+
+
 class ReflectorRecord(_Record):
     """A planar reflector, see scenes.reflectors.Reflector: plane (n, d) with n.x + d = 0, convex outline in it.
 
-    `walled` are the edges of the outline that walls stand on; without it, none.
+    `plan` has the walls that stand on its true edges; without it, none. `walled` is what older stores had in its place,
+    and not read.
     """
 
     plane: tuple[float, float, float, float]
@@ -101,6 +114,7 @@ class ReflectorRecord(_Record):
     deviation_m: float = 0.0
     two_sided: bool = False
     walled: tuple[bool, ...] = ()
+    plan: PlanRecord | None = None
     parts: tuple[ReflectorPart, ...]
 
 

@@ -19,8 +19,10 @@ from lambent.realtime.mirror import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_sha
 from lambent.realtime.mirror_integrators import interleaved_table, multi_ring_table
 from lambent.realtime.patterns import radius
 from lambent.realtime.unbaked import unbaked_scene
+from lambent.scenes.floor_plan import floor_plan
 from lambent.scenes.geometry import box, patch, placed, sphere
-from lambent.store.contract import CameraRecord, ReflectorPart, ReflectorRecord
+from lambent.store.contract import CameraRecord, PlanRecord, ReflectorPart, ReflectorRecord
+from lambent.store.plans import plan_record
 
 CAMERA = CameraRecord(name="c", position=(0.4, 1.3, 3.0), target=(0.1, 0.4, 0.0), fov_y_deg=50)
 FLOOR = ReflectorRecord(
@@ -150,11 +152,14 @@ def test_no_light_comes_in_below_the_walls(device: Any, integrator: str) -> None
     floor = scene.record.objects[-1].model_copy(update={"material": "floor"})
     lit = tuple(o.model_copy(update={"emission": (1, 1, 1)}) for o in scene.record.objects[:-1])
     outline = ((-2, 0, -2), (-2, 0, 2), (2, 0, 2), (2, 0, -2))
+    corners = scene.positions[scene.faces].astype(float)
+    plan = floor_plan(corners[-2:], np.array((0.0, 1.0, 0.0)), corners[:-2])
+    assert plan is not None
     one = Probe((0.0, 1.0, 0.0), np.ones((6, 4, 4, 3), np.float32))
     camera = CameraRecord(name="low", position=(0.5, 0.6, 1.6), target=(-0.2, 0.2, -2.0), fov_y_deg=50)
 
-    def seen(walled: tuple[bool, ...]) -> np.ndarray:
-        reflector = FLOOR.model_copy(update={"outline": outline, "walled": walled})
+    def seen(plan: PlanRecord | None) -> np.ndarray:
+        reflector = FLOOR.model_copy(update={"outline": outline, "plan": plan})
         materials = scene.record.materials | {"floor": mirror(0.15)}
         update = {"objects": (*lit, floor), "materials": materials, "reflectors": (reflector,)}
         made = replace(scene, record=scene.record.model_copy(update=update), probes={"floor": one})
@@ -162,10 +167,10 @@ def test_no_light_comes_in_below_the_walls(device: Any, integrator: str) -> None
         renderer = Renderer(device, made)
         return (renderer.converged(drawn, 64) if integrator == "qmc" else renderer.image(drawn))[HEIGHT // 2 :]
 
-    closed = seen((True,) * 4)
+    closed = seen(plan_record(plan))
     assert closed.max() < 1.1
     assert closed.min() > 0.6  # towards grazing a single lobe returns less
-    assert seen(()).max() > 10
+    assert seen(None).max() > 10
 
 
 def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:

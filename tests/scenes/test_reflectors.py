@@ -103,26 +103,3 @@ def test_the_room_shows_its_floor_its_tables_and_its_plate() -> None:
     assert all(any(wanted in n for n in names) for wanted in ("table_top", "brushed_plate", "screen_pane"))
     scene = load_scene("builtin:room")
     assert find_reflectors(replace(scene, reflector_rules=(ReflectorRule("*", use=False),))) == ()
-
-
-def test_walls_on_the_edges_of_a_floor_are_told_from_an_open_side() -> None:
-    """A room of three walls, one with a hole over half its length, a screen in the middle; a table has none."""
-    room = merge(
-        [
-            patch((0, 0, 0), (4, 0, 0), (0, 2, 0)),  # z = 0
-            patch((0, -0.5, 0), (0, 0, 4), (0, 3, 0)),  # x = 0, reaching below
-            patch((4, 0.3, 0), (0, 0, 4), (0, 2, 0)),  # x = 4, begins 30 cm above the floor
-            patch((0, 0, 4), (1.5, 0, 0), (0, 2, 0)),  # z = 4, the smaller part of it
-            patch((2, 0, 1), (0, 0, 2), (0, 1, 0)),
-        ]
-    )
-    (found,) = find_reflectors(
-        scene_of(
-            SceneObject("floor", patch((0, 0, 0), (0, 0, 4), (4, 0, 0)), "varnish"), SceneObject("room", room, "paint")
-        )
-    )
-    middles = (found.outline + np.roll(found.outline, -1, axis=0)) / 2
-    closed = {tuple(m[[0, 2]].round(3).tolist()) for m, walled in zip(middles, found.walled, strict=True) if walled}
-    assert closed == {(2, 0), (0, 2)}
-    slab = placed(box((1.0, 0.05, 1.0)), (0, 0.7, 0))
-    assert not any(any(r.walled) for r in find_reflectors(scene_of(SceneObject("slab", slab, "varnish"))))

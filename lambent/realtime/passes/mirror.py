@@ -14,6 +14,7 @@ from lambent.realtime.mirror import MIRROR_DTYPE, MirrorView, levels_of
 from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.passes.depth import DEPTH_FORMAT, DepthPass
 from lambent.realtime.passes.shade import Draw, ShadePass, Stage
+from lambent.realtime.passes.walls import WallsPass
 from lambent.realtime.resources import Layouts, SceneResources
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer
@@ -53,6 +54,7 @@ class MirrorPass:
         self._picture: MirrorPicture | None = None
         self._sky = self._pipeline("mirror_sky.wgsl", "mirror_sky_main", layouts.frame, layouts.cube, sky=True)
         self._mips = self._pipeline("mirror_mips.wgsl", "mirror_mips_main", layouts.shown)
+        self._walls = WallsPass(device, layouts)
 
     def write(self, views: list[MirrorView], frame_draws: list[Draw]) -> list[Draw]:
         """Bring buffers up to date with this frame; returns what the mirror pictures draw."""
@@ -62,6 +64,7 @@ class MirrorPass:
             frame, uniform = (self._device.create_buffer(size=size, usage=usage) for size in sizes)
             group = self._layouts.group(self._layouts.frame, frame, self._resources.sampler)
             self._buffers.append((frame, group, uniform))
+        self._walls.write(views)
         for view, (frame, _, uniform) in zip(views, self._buffers, strict=False):
             self._device.queue.write_buffer(frame, 0, view.frame.tobytes())
             self._device.queue.write_buffer(uniform, 0, view.uniform.tobytes())
@@ -92,7 +95,8 @@ class MirrorPass:
             **timer.writes("mirror"),
         )
         first.set_bind_group(0, self._buffers[index][1])
-        calls = self._depth.draw(first, self._resources, clusters.seen(clip_from_world))
+        seen = clusters.seen(clip_from_world)
+        calls = self._walls.draw(first, index, view) + self._depth.draw(first, self._resources, seen)
         first.end()
         yield
         for band in part.bands("mirror", view.size):

@@ -12,15 +12,7 @@ struct Frame {
     exposure: f32,   // factor on radiance, 2^EV
     prior: f32,      // share of the picture of few samples that is shown beside a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
-    walls: array<vec4f, 8>, // of a mirrored frame: q . wall < 0 past the walls that stand on the reflector; else 0
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var linear_sampler: sampler;
-
-// Whether a mirror eye sees a point, q from it, past the foot of a wall: from outside the room.
-fn past_walls(q: vec3f) -> bool {
-    var inwards = 0.0;
-    for (var i = 0u; i < 8u; i++) { inwards = min(inwards, dot(frame.walls[i].xyz, q)); }
-    return inwards < 0.0;
-}

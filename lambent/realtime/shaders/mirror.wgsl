@@ -3,13 +3,12 @@
 
 struct MirrorTexel {
     @location(0) light: vec4f, // a: 1 where the reflector may face what is seen
-    @location(1) plane: vec4f, // N towards the mirror eye e, and N.(p - e)
+    @location(1) plane: vec4f, // N towards the mirror eye e, and N.(p - e); 0 past walls, where nothing is drawn
 }
 
 @fragment fn mirror_main(v: Varyings, @builtin(front_facing) front: bool) -> MirrorTexel {
     let to_eye = frame.eye.xyz - v.p_world;
     let given = select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12);
     let n = normalize(given) * select(-1.0, 1.0, dot(given, to_eye) > 0.0);
-    let light = vec4f(surface_light(v, front), 1.0);
-    return MirrorTexel(select(light, vec4f(0.0), past_walls(-to_eye)), vec4f(n, -dot(n, to_eye)));
+    return MirrorTexel(vec4f(surface_light(v, front), 1.0), vec4f(n, -dot(n, to_eye)));
 }

@@ -15,7 +15,7 @@ struct MirrorSky {
 @fragment fn mirror_sky_main(screen: Screen) -> MirrorSky {
     let w = frame.forward.xyz + screen.clip.x * frame.across.xyz + screen.clip.y * frame.up.xyz;
     let n = vec3f(frame.across.w, frame.up.w, frame.forward.w);
-    let faced = dot(w, n) > 0.0 && !past_walls(w); // other rays never leave the reflector: nothing lies there
+    let faced = dot(w, n) > 0.0; // other rays never leave the reflector: nothing lies there
     let light = vec4f(textureSampleLevel(environment, linear_sampler, w, 0.0).rgb, 1.0);
     return MirrorSky(select(vec4f(0.0), light, faced), vec4f(-normalize(w), -FAR));
 }

@@ -18,7 +18,6 @@ struct Mirror { // MIRROR_DTYPE in mirror.py
     focal_px: f32,
     levels: f32,
     number: f32, // of the reflector in this frame
-    walls: array<vec4f, 8>, // as in Frame, of this mirror picture
 }
 
 @group(3) @binding(0) var<uniform> mirror: Mirror;
@@ -78,6 +77,11 @@ fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
     return Place(q, seen, t, s.x);
 }
 
+// Whether the picture shows anything there: the mirror eye sees nothing past the foot of a wall.
+fn is_shown(plane: vec4f) -> bool {
+    return dot(plane.xyz, plane.xyz) > 0.5;
+}
+
 // Depth of what the picture shows at a point's place, relative to the point's.
 fn seen_depth(q: vec3f, plane: vec4f) -> f32 {
     return plane.w / min(dot(plane.xyz, q), -1e-6);
@@ -100,7 +104,7 @@ fn hit_within(place: Place, w: vec3f, t: f32, plane: vec4f) -> Hit {
     let projected = project(q);
     var found = plane;
     if (behind) { found = wall; }
-    return Hit(q, t_hit, found, projected.xy, inside_picture(projected));
+    return Hit(q, t_hit, found, projected.xy, select(0.0, inside_picture(projected), is_shown(found)));
 }
 
 // The three steps: the plane seen in the mirror direction, then the one seen where that is met.

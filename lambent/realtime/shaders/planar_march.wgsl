@@ -2,29 +2,24 @@
 
 override MARCH_STEPS: u32 = 24u; // 0: the three steps of find_hit alone
 
-// Distance at which a ray leaves the mirror picture, or passes the walls that stand on the reflector's edges.
+// Distance at which a ray leaves the mirror picture.
 fn exit_distance(q: vec3f, w: vec3f) -> f32 {
     let at = vec3f(dot(mirror.row_x.xyz, q), dot(mirror.row_y.xyz, q), dot(mirror.row_w.xyz, q));
     let along = vec3f(dot(mirror.row_x.xyz, w), dot(mirror.row_y.xyz, w), dot(mirror.row_w.xyz, w));
     let sides = vec4f(at.z - at.x, at.z + at.x, at.z - at.y, at.z + at.y);
     let closing = -vec4f(along.z - along.x, along.z + along.x, along.z - along.y, along.z + along.y);
     let t = select(vec4f(FARTHEST), sides / max(closing, vec4f(1e-9)), closing > vec4f(1e-9));
-    var nearest = min(min(t.x, t.y), min(t.z, t.w));
-    for (var i = 0u; i < 8u; i++) {
-        let wall = mirror.walls[i].xyz;
-        let outwards = -dot(wall, w);
-        nearest = select(nearest, min(nearest, max(dot(wall, q), 0.0) / outwards), outwards > 1e-6);
-    }
-    return clamp(0.999 * nearest, 1e-3, FARTHEST);
+    return clamp(0.999 * min(min(t.x, t.y), min(t.z, t.w)), 1e-3, FARTHEST);
 }
 
-// What a ray meets that passes behind something before anything is found: the surface that the picture shows where the ray
+// What a ray meets that passes a wall, or behind something, before anything is found: the surface that the picture shows where the ray
 // was last before all, as the sky beside the frame of a window.
 fn hit_behind(place: Place, w: vec3f, free: f32) -> Hit {
     let projected = project(place.q + free * w);
     let plane = plane_at(projected.xy);
     let t = meet(plane, place.q, w, max(free, 1e-3));
-    return Hit(place.q + t * w, t, plane, projected.xy, inside_picture(projected));
+    let inside = select(0.0, inside_picture(projected), is_shown(plane));
+    return Hit(place.q + t * w, t, plane, projected.xy, inside);
 }
 
 // Steps are even in the picture but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
@@ -33,12 +28,13 @@ fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
     if (MARCH_STEPS == 0u) { return find_hit(place, w); }
     let guess = find_hit(place, w);
     let again = meet(plane_at(guess.texel), place.q, w, guess.t);
-    let settled = abs(again - guess.t) < 0.03 * guess.t; // only what is nearer can be the hit
+    let settled = is_shown(guess.plane) && abs(again - guess.t) < 0.03 * guess.t; // only what is nearer can be the hit
     let t_exit = min(exit_distance(place.q, w), select(FARTHEST, guess.t, settled));
     let z = dot(mirror.row_w.xyz, place.q);
     let z_exit = max(z + t_exit * dot(mirror.row_w.xyz, w), 1e-6);
     var found = -1.0;
     var before = 0.0;
+    var walled = false; // a step has passed the foot of a wall
     var free = 0.0; // the last step before all that the picture shows
     for (var i = 0u; i < MARCH_STEPS; i++) {
         let step = min((f32(i) + 1.0 - 0.999 * jitter) / (f32(MARCH_STEPS) - 1.0), 1.0);
@@ -48,9 +44,10 @@ fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
         let plane = plane_at(project(q).xy);
         let met = meet(plane, place.q, w, -1.0);
         let last = share >= 1.0 && !settled;
-        let hit = found < 0.0 && met > 0.97 * before && (met < 1.03 * t || last);
+        walled = walled || !is_shown(plane);
+        let hit = found < 0.0 && !walled && met > 0.97 * before && (met < 1.03 * t || last);
         found = select(found, met, hit);
-        free = select(free, t, found < 0.0 && seen_depth(q, plane) > 1.0);
+        free = select(free, t, found < 0.0 && !walled && seen_depth(q, plane) > 1.0);
         before = t;
     }
     if (found < 0.0 && !settled) { return hit_behind(place, w, free); }

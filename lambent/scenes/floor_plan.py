@@ -1,0 +1,139 @@
+"""Floor plans of planar reflectors: which points of the plane lie past a wall that stands on the reflector's edge.
+
+Seen from below its floor, a room ends at the foot of its walls; past it the mirrored eye looks outside, where nothing
+that the floor mirrors lies. Past the edge of a table it sees what the table's points see, too. So edges are told apart,
+along the true outline, bays and all: a plan is a grid of signed distances, positive on the reflector and past its open
+edges, negative past a wall. Where a point beyond the reflector belongs is told by the nearest point of its edge:
+something stands there, or nothing does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_edt, maximum_filter, uniform_filter
+
+from lambent.core.frames import basis
+
+Floats = NDArray[np.floating]
+Mask = NDArray[np.bool_]
+CELLS = 600  # per size of the reflector, the root of its area
+MOST_CELLS = 2048  # along one side
+HEIGHTS = (0.01, 0.03)  # over the reflector, of its size, at which a wall is looked for
+SHARE = 0.6  # of a stretch of edge and of the heights, on which something stands
+BORDER = 4  # cells around the reflector; beyond, the plan goes on as it ends
+NEAR = 0.02  # of the size, from an edge to what stands on it
+WINDOW = 0.05  # of the size: along so much of an edge must things stand
+STEPS = 16  # per cell, of distances in a plan
+FINE = 4  # by as many a cell is divided along each axis, for what share of it the reflector covers
+MARGIN = 0.25  # cells before a wall that count as past it: light from outside may be a thousand times as bright
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """Signed distances (rows, columns) int8 in cells / STEPS at corner + (column across + row along) cell_m.
+
+    `across` and `along` (3,) are unit vectors in the plane.
+    """
+
+    corner: Floats
+    across: Floats
+    along: Floats
+    cell_m: float
+    distance: NDArray[np.int8]
+
+
+def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | None:
+    """Plan of a reflector of the triangles `faces` (K, 3, 3), all in a plane of unit normal (3,); None without walls.
+
+    `corners` (F, 3, 3) are the triangles of the scene. Something stands on an edge where it crosses, within NEAR of the
+    edge, planes at both HEIGHTS over the reflector.
+    """
+    across, along = (axis.reshape(3) for axis in basis(normal[None]))
+    axes = np.stack([across, along], axis=1)
+    flat = faces @ axes
+    (ux, uy), (vx, vy) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
+    size = float(np.sqrt(np.abs(ux * vy - uy * vx).sum() / 2))
+    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+    cell = max(size / CELLS, float((high - low).max()) / MOST_CELLS)
+    corner = low - BORDER * cell
+    columns, rows = (np.ceil((high - low) / cell).astype(int) + 2 * BORDER).tolist()
+    fine = _filled(((flat - corner) / cell + 0.5) * FINE - 0.5, (rows * FINE, columns * FINE))
+    share_of = fine.reshape(rows, FINE, columns, FINE).mean(axis=(1, 3))
+    covered = share_of >= 0.5
+    height = float((faces @ normal).mean())
+    share = np.zeros((rows, columns))
+    for over in HEIGHTS:
+        cut = _cut((corners @ normal) - height - over * size, corners)
+        standing = _drawn((cut @ axes - corner) / cell, (rows, columns))
+        if standing.any():
+            share += (distance_transform_edt(~standing) <= NEAR * size / cell) / len(HEIGHTS)
+    edge = covered & ~binary_erosion(covered)
+    window = 2 * round(WINDOW * size / cell) + 1
+    along_edge = uniform_filter(edge.astype(float), window, mode="constant")
+    walled = uniform_filter(share * edge, window, mode="constant") >= SHARE * np.maximum(along_edge, 1e-9)
+    if not (walled & edge).any():
+        return None
+    beyond, nearest = distance_transform_edt(~covered, return_indices=True)
+    past = ~covered & walled[tuple(nearest)]
+    before, wall = distance_transform_edt(~past, return_indices=True)
+    outwards, inwards = _edge_from(share_of, covered), _edge_from(1 - share_of, ~covered)
+    signed = np.where(past, outwards[tuple(nearest)] - beyond, before - inwards[tuple(wall)])
+    steps = np.clip(np.floor((signed - MARGIN) * STEPS), -127, 127).astype(np.int8)
+    return FloorPlan(corner @ axes.T + height * normal, across, along, cell, steps)
+
+
+def _edge_from(share: Floats, covered: Mask) -> Floats:
+    """Cells from the middle of a covered cell to the edge, by what is covered of it and of those beside."""
+    around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
+    return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
+
+
+def _filled(triangles: Floats, shape: tuple[int, int]) -> Mask:
+    """Cells whose middle, at whole coordinates (column, row), lies in a triangle (K, 3, 2): by rows, summed up."""
+    change = np.zeros((shape[0], shape[1] + 1), np.int32)
+    for triangle in triangles:
+        first, last = int(np.ceil(triangle[:, 1].min())), int(np.floor(triangle[:, 1].max()))
+        row = np.arange(max(first, 0), min(last + 1, shape[0]))
+        left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+        for (x0, y0), (x1, y1) in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+            if y0 != y1:
+                share = (row - y0) / (y1 - y0)
+                x = np.where((share >= 0) & (share <= 1), x0 + share * (x1 - x0), np.nan)
+                left, right = np.fmin(left, x), np.fmax(right, x)
+        met = left <= right
+        begin, end = (np.ceil(x[met]).clip(0, shape[1]).astype(int) for x in (left, np.floor(right) + 1))
+        np.add.at(change, (row[met], begin), 1)
+        np.add.at(change, (row[met], np.maximum(begin, end)), -1)
+    return np.asarray(change.cumsum(axis=1)[:, :-1] > 0)
+
+
+def _cut(height: Floats, corners: Floats) -> Floats:
+    """Segments (S, 2, 3) in which triangles cross the plane of height 0; `height` (F, 3) is that of their corners."""
+    above = height > 0
+    crossing = above.any(axis=1) & ~above.all(axis=1)
+    height, corners, above = height[crossing], corners[crossing], above[crossing]
+    odd = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))  # the corner that is alone
+    rows = np.arange(len(odd))
+    ends = []
+    for other in ((odd + 1) % 3, (odd + 2) % 3):
+        share = height[rows, odd] / (height[rows, odd] - height[rows, other])
+        ends.append(corners[rows, odd] + share[:, None] * (corners[rows, other] - corners[rows, odd]))
+    return np.stack(ends, axis=1)
+
+
+def _drawn(segments: Floats, shape: tuple[int, int]) -> Mask:
+    """Cells that segments (S, 2, 2) of (column, row) pass, in steps of half a cell."""
+    standing = np.zeros(shape, bool)
+    last = np.array(shape[::-1]) - 1
+    near = ((segments.max(axis=1) >= 0) & (segments.min(axis=1) <= last)).all(axis=1)
+    segments = segments[near]
+    count = np.ceil(2 * np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)).astype(int).clip(0, 8 * max(shape)) + 1
+    number = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[number] - 1, 1)
+    at = np.round(segments[number, 0] + share[:, None] * (segments[number, 1] - segments[number, 0])).astype(int)
+    at = at[((at >= 0) & (at <= last)).all(axis=1)]
+    standing[at[:, 1], at[:, 0]] = True
+    return standing
