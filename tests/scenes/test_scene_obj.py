@@ -252,3 +252,50 @@ def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tupl
         assert "\n" not in str(error)
     else:
         assert all(np.isfinite(o.mesh.positions).all() for o in parts.objects)
+
+
+def test_what_exporters_write_otherwise(tmp_path: Path) -> None:
+    """Small letters, statements nobody knows, pictures that are gone, tinted glass, coats."""
+    _png(tmp_path / "wood.png", np.full((2, 2, 3), 188))
+    library = """
+newmtl small
+kd 1 1 1
+map_kd wood.png
+newmtl gone
+Kd 1 1 1
+map_Kd nowhere.png
+newmtl brown
+Kd 0.4 0.3 0.2
+map_Kd nowhere.png
+newmtl glass
+Kd 0.5 0.5 0.5
+Ks 1 1 1
+Ns 1000
+Ni 1.5
+Tf 0.5 1 0.5
+d 0.1
+illum 4
+newmtl veil
+Kd 0.5 0.5 0.5
+Tf 0 0 0
+Tr 0.5
+newmtl coated
+Kd 1 1 1
+Pc 1
+Frobnicate 3
+"""
+    names = ("small", "gone", "brown", "glass", "veil", "coated")
+    faces = "".join(f"usemtl {n}\nf 1/1 2/2 3/3\n" for n in names)
+    parts = parts_of(tmp_path, QUAD + "mtllib thing.mtl\n" + faces, library)
+    m, said = parts.materials, " ".join(parts.warnings)
+    assert m["small"].kd == pytest.approx((0.5029,) * 3, abs=1e-3)
+    assert m["gone"].kd == (0.5,) * 3 and m["brown"].kd == pytest.approx((0.4, 0.3, 0.2))
+    back, through = m["glass"].lobes
+    assert back.r0 == through.r0 == pytest.approx((0.04,) * 3) and back.k[0] > 1
+    assert through.k == pytest.approx((0.45, 0.9, 0.45), rel=1e-3) and m["glass"].kd[0] < 0.06
+    assert m["veil"].transmission_lobes[0].k == (0.5,) * 3
+    for theta_deg in (0, 60, 80):
+        wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
+        for name in names:
+            assert MaterialBSDF(m[name]).albedo(wo).max() < 1.01, (name, theta_deg)
+    assert "Frobnicate is not read" in said and said.count("nowhere.png is not there") == 2

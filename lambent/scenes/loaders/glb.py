@@ -27,7 +27,8 @@ MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 READ_EXTENSIONS = {
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
     "KHR_materials_anisotropy", "KHR_materials_transmission", "KHR_mesh_quantization", "KHR_texture_transform",
-    "KHR_materials_variants", "KHR_materials_clearcoat", "EXT_texture_webp",
+    "KHR_materials_variants", "KHR_materials_clearcoat", "EXT_texture_webp", "KHR_materials_volume",
+    "KHR_materials_diffuse_transmission", "KHR_materials_pbrSpecularGlossiness",
 }  # fmt: skip
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -189,6 +190,11 @@ def _buffer(uri: str | None, binary: bytes | None, path: Path, field: str, root:
             raise UserError("has neither a uri nor a binary chunk", file=path, field=field)
         return binary, None
     return resource(uri, path, field, root)
+
+
+def is_missing(uri: str, path: Path, field: str, root: Path) -> bool:
+    """Whether a uri of `path` names a file below `root` that is not there."""
+    return not uri.startswith("data:") and "://" not in uri and not named(unquote(uri), path, root, field).exists()
 
 
 def resource(uri: str, path: Path, field: str, root: Path) -> tuple[bytes, Path | None]:

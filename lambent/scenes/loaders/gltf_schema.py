@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -190,6 +191,9 @@ class Anisotropy(_Part):
 class ClearCoat(_Part):
     clearcoatFactor: Share = 0
     clearcoatRoughnessFactor: Share = 0
+    clearcoatTexture: TextureReference | None = None
+    clearcoatRoughnessTexture: TextureReference | None = None
+    clearcoatNormalTexture: TextureReference | None = None
 
 
 class Transmission(_Part):
@@ -197,13 +201,40 @@ class Transmission(_Part):
     transmissionTexture: TextureReference | None = None
 
 
+class DiffuseTransmission(_Part):
+    diffuseTransmissionFactor: Share = 0
+    diffuseTransmissionColorFactor: Colour = (1, 1, 1)
+    diffuseTransmissionTexture: TextureReference | None = None
+    diffuseTransmissionColorTexture: TextureReference | None = None
+
+
+class Volume(_Part):
+    thicknessFactor: NotNegative = 0
+    thicknessTexture: TextureReference | None = None
+    attenuationDistance: Annotated[float, Field(gt=0)] = math.inf
+    attenuationColor: Colour = (1, 1, 1)
+
+
+class SpecularGlossiness(_Part):
+    diffuseFactor: tuple[Share, Share, Share, Share] = (1, 1, 1, 1)
+    specularFactor: tuple[Share, Share, Share] = (1, 1, 1)
+    glossinessFactor: Share = 1
+    diffuseTexture: TextureReference | None = None
+    specularGlossinessTexture: TextureReference | None = None
+
+
 class MaterialExtensions(_Part):
+    model_config = ConfigDict(extra="allow", frozen=True)  # what is left over is not read, which is said
+
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
     KHR_materials_specular: Specular = Specular()
     KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_transmission: Transmission = Transmission()
     KHR_materials_clearcoat: ClearCoat = ClearCoat()
+    KHR_materials_diffuse_transmission: DiffuseTransmission = DiffuseTransmission()
+    KHR_materials_volume: Volume = Volume()
+    KHR_materials_pbrSpecularGlossiness: SpecularGlossiness | None = None
 
 
 class MaterialDocument(_Part):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.glb import Gltf, resource
+from lambent.scenes.loaders.glb import Gltf, is_missing, resource
 from lambent.scenes.loaders.gltf_schema import MaterialDocument, TextureReference
 from lambent.scenes.loaders.pictures import Picture, Pictures
 from lambent.scenes.loaders.varying import UvTransform, Varying
@@ -37,9 +37,11 @@ class Textures:
             return None
         gltf = self._gltf
         texture = gltf.pick(gltf.document.textures, reference.index, "textures")
+        picture = None if texture.image is None else self._picture(texture.image, said)
         if texture.image is None:
-            raise UserError("texture has no picture", file=gltf.path, field=f"textures.{reference.index}")
-        picture = self._picture(texture.image)
+            said.append(f"texture {reference.index} has no picture of a kind that is read: its factor stands alone")
+        if picture is None:
+            return None
         if uv_set_of(reference) != uv_set:
             said.append("uses two sets of uv: what lies on the second is averaged")
             mean = picture.texels.mean(axis=(0, 1), keepdims=True)
@@ -55,9 +57,13 @@ class Textures:
         found = self.of(reference, uv_set, said)
         return None if found is None else Varying(found[0].rgb(srgb=srgb), found[1])
 
-    def _picture(self, image: int) -> Picture:
+    def _picture(self, image: int, said: list[str]) -> Picture | None:
+        """A picture; None where its file is not there, which `said` is told."""
         gltf, field = self._gltf, f"images.{image}"
         document = gltf.pick(gltf.document.images, image, "images")
+        if document.uri is not None and is_missing(document.uri, gltf.path, field, gltf.root):
+            said.append(f"picture {document.uri} is not there: its factor stands alone")
+            return None
         if document.uri is not None:
             data, source = resource(document.uri, gltf.path, field, gltf.root)
             if source is not None and source not in self.sources:
@@ -84,10 +90,16 @@ def main_uv_set(document: MaterialDocument) -> int:
 def references(document: MaterialDocument) -> Iterable[TextureReference]:
     """The textures of a material that are read, the most visible first."""
     pbr, more = document.pbrMetallicRoughness, document.extensions
+    older = more.KHR_materials_pbrSpecularGlossiness
     named = (
-        pbr.baseColorTexture, document.normalTexture, pbr.metallicRoughnessTexture,
-        more.KHR_materials_anisotropy.anisotropyTexture, document.emissiveTexture,
-    )  # fmt: skip
+        older.diffuseTexture if older is not None else None,
+        older.specularGlossinessTexture if older is not None else None,
+        pbr.baseColorTexture,
+        document.normalTexture,
+        pbr.metallicRoughnessTexture,
+        more.KHR_materials_anisotropy.anisotropyTexture,
+        document.emissiveTexture,
+    )
     return [reference for reference in named if reference is not None]
 
 

@@ -18,6 +18,7 @@ def metallic_roughness(
     plain: Floats,
     said: list[str],
     *,
+    weight: float = 1.0,
     aspect: float = 1.0,
     through: float = 0.0,
 ) -> Surface:
@@ -31,6 +32,8 @@ def metallic_roughness(
         Share of metal, and GGX's roughness along t as a slope (roughness squared); 1 channel.
     plain : (3,)
         Reflectance of the dielectric at normal incidence.
+    weight : float
+        Share of the dielectric's reflection, at grazing incidence too.
     aspect : float
         Roughness across t by that along it.
     through : float
@@ -43,17 +46,19 @@ def metallic_roughness(
     never more light than arrives; but what reflects less there does so at grazing incidence too.
     """
     plain = np.clip(plain, 0, 1)
-    kd = combined(lambda b, m: b * (1 - m) * (1 - through) * (1 - plain), base, metallic, said=said)
-    reflectance = combined(lambda b, m: (1 - m) * plain + m * b, base, metallic, said=said)
+    left = 1 - weight * float(plain.max())
+    kd = combined(lambda b, m: b * (1 - m) * (1 - through) * left, base, metallic, said=said)
+    reflectance = combined(lambda b, m: (1 - m) * weight * plain + m * b, base, metallic, said=said)
     highest = np.maximum(reflectance.highest, 1e-6)
     if reflectance.is_picture and float((reflectance.highest - reflectance.values.min(axis=(0, 1))).max()) > 1e-3:
         k, r0 = replace(reflectance, values=reflectance.values / highest.astype(np.float32)), highest
         if metallic.is_picture:
             said.append("its metallic texture is right at normal incidence alone: bare parts lack Fresnel's rise")
     else:
-        k, r0 = constant(np.ones(3)), reflectance.mean
+        grazing = weight + (1 - weight) * float(np.clip(metallic.mean[0], 0, 1))
+        k, r0 = constant(np.full(3, grazing)), reflectance.mean / max(grazing, 1e-6)
     glosses = [Gloss(alpha, k, r0, aspect)]
     if through > 0:
         passed = combined(lambda b, m: through * b * (1 - m), base, metallic, said=said)
-        glosses.append(Gloss(alpha, passed, plain, aspect, side="transmission"))
-    return Surface(kd=kd, coupled=bool(plain.max() > 0), glosses=tuple(glosses))
+        glosses.append(Gloss(alpha, passed, weight * plain, aspect, side="transmission"))
+    return Surface(kd=kd, coupled=bool(weight > 0.5 and plain.max() > 0), glosses=tuple(glosses))

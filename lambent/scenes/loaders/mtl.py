@@ -23,8 +23,8 @@ from lambent.materials.document import Material
 from lambent.scenes.loaders.metallic import metallic_roughness
 from lambent.scenes.loaders.pictures import Picture, Pictures
 from lambent.scenes.loaders.place import found
-from lambent.scenes.loaders.surface import Gloss, Surface, finished, seen_through, triple
-from lambent.scenes.loaders.varying import IDENTITY, UvTransform, Varying, absolute, combined, constant
+from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, coated, finished, seen_through, triple
+from lambent.scenes.loaders.varying import IDENTITY, UvTransform, Varying, absolute, combined, constant, scaled
 from lambent.scenes.scene import MaterialTextures, Texture, Triple
 
 LIMIT_BYTES = 16 << 20
@@ -42,7 +42,10 @@ MAPS = {
     "map_Kd", "map_Ks", "map_Ke", "map_Pr", "map_Pm", "map_d", "map_Ns", "norm", "map_Bump", "map_bump", "bump",
     "map_Ka", "map_Ps", "disp", "decal", "refl", "map_aat",
 }  # fmt: skip
-UNREAD = {"map_Ns", "disp", "decal", "refl", "map_Ps", "Ps", "Tf"}
+UNREAD = {"map_Ns", "disp", "decal", "refl", "map_Ps", "Ps"}
+SPELLED = {name.lower(): name for name in sorted(NUMBERS | MAPS, reverse=True)}  # exporters mind no capitals
+SILENT = {"map_ka", "ka", "sharpness", "map_aat", "vt", "endmtl"}  # which change nothing here
+GLASS = (4, 6, 7, 9)  # illum that asks for glass
 
 
 @dataclass
@@ -118,7 +121,8 @@ def _entries(path: Path, said: list[str]) -> dict[str, Entry]:
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
-        if words[0] == "newmtl":
+        key = SPELLED.get(words[0].lower(), words[0])
+        if words[0].lower() == "newmtl":
             name = line.strip()[len("newmtl") :].strip() or f"material_{number}"
             if name in entries:
                 said.append(f"material {name} is described twice in {path.name}: the last holds")
@@ -126,13 +130,15 @@ def _entries(path: Path, said: list[str]) -> dict[str, Entry]:
                 raise UserError("too many materials", file=path, got=f"over {MATERIALS_MAX}")
             entry = entries[name] = Entry(path, number)
         elif entry is None:
-            if words[0] in NUMBERS | MAPS:
+            if key in NUMBERS | MAPS:
                 raise UserError("stands before any newmtl", file=path, field=f"line {number}", got=words[0])
-        elif words[0] in NUMBERS:
-            entry.numbers[words[0]] = _numbers(words, path, number, said)
-        elif words[0] in MAPS:
+        elif key in NUMBERS:
+            entry.numbers[key] = _numbers(words, path, number, said)
+        elif key in MAPS:
             name, layout = _map(line.strip()[len(words[0]) :].strip(), path, number)
-            entry.maps[words[0]] = (name, layout, number)
+            entry.maps[key] = (name, layout, number)
+        elif words[0].lower() not in SILENT and f"statement {words[0]} is not read" not in said:
+            said.append(f"statement {words[0]} is not read")
     return entries
 
 
@@ -222,8 +228,7 @@ class _Reading:
         if not share:
             return surface
         m = max(self._number("Pcr", 0.03), 0.0) ** 2
-        coat = Gloss(constant(m), constant(np.full(3, share)), np.full(3, self._r0()))
-        return replace(surface, glosses=(*surface.glosses, coat))
+        return coated(surface, Gloss(constant(m), constant(np.full(3, share)), np.full(3, self._r0())))
 
     def _r0(self) -> float:
         ior = self._number("Ni", 1.5)
@@ -251,8 +256,21 @@ class _Reading:
             return replace(surface, opacity=absolute(Varying(cut[0].opacity(), cut[1])))
         if opacity < 1:
             self._said.append(f"is seen through ({1 - opacity:.0%}), without refraction")
-            return seen_through(surface, np.full(3, opacity))
+            return self._pane(surface, opacity)
         return surface
+
+    def _pane(self, surface: Surface, opacity: float) -> Surface:
+        """What covers a share of what is behind it; glass reflects as much whatever it covers. Tf tints what passes."""
+        tint = np.clip(self._colour("Tf", 1.0), 0, 1)
+        tint = tint if tint.any() else np.ones(3)
+        if int(self._number("illum", 2)) not in GLASS:
+            covered = seen_through(surface, np.full(3, opacity))
+            *others, straight = covered.glosses
+            return replace(covered, glosses=(*others, replace(straight, k=scaled(straight.k, tint))))
+        r0 = np.full(3, self._r0())
+        shown = tuple(replace(g, r0=r0) for g in surface.glosses)
+        straight = Gloss(constant(ROUGHNESS_MIN), constant((1 - opacity) * tint), r0, side="transmission")
+        return replace(surface, kd=scaled(surface.kd, opacity), glosses=(*shown, straight))
 
     def _normal(self) -> Texture | None:
         for key in ("norm", "map_Bump", "map_bump", "bump"):
@@ -284,7 +302,9 @@ class _Reading:
         factor = np.maximum(self._colour(key, default), 0)
         picture = self._picture(map_key)
         if picture is None:
-            return constant(factor)
+            even = float(np.ptp(factor)) == 0 and factor[0] in (0, 1)  # what exporters write beside a picture
+            lost = map_key == "map_Kd" and map_key in self._entry.maps
+            return constant(np.full(3, GREY) if lost and even else factor)
         if not factor.any():
             factor = np.ones(3)  # exporters write a black factor beside a picture that they mean to be seen
         return Varying(picture[0].rgb(srgb=True) * factor.astype(np.float32), picture[1] or IDENTITY)

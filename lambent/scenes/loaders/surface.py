@@ -10,7 +10,7 @@ import numpy as np
 
 from lambent.core.frames import Floats
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.loaders.varying import Varying, combined, constant, relative
+from lambent.scenes.loaders.varying import Varying, combined, constant, relative, scaled
 from lambent.scenes.scene import MaterialTextures, Texture, Triple
 
 ROUGHNESS_MIN, ROUGHNESS_MAX = 0.003, 4.0  # slopes; below the first single precision loses the lobe
@@ -133,6 +133,18 @@ def seen_through(surface: Surface, opacity: Floats) -> Surface:
     return replace(
         surface, kd=part(surface.kd), kt_d=part(surface.kt_d), glosses=(*glosses, straight_through(1 - opacity))
     )
+
+
+def coated(surface: Surface, coat: Gloss) -> Surface:
+    """A surface below a clear coat: it loses what the coat reflects, more of it the flatter light arrives.
+
+    1 - k F is nearly (1 - k r0) cos^(k/4) as far as 80 degrees: lobes get that factor, the diffuse term is coupled.
+    """
+    share = float(np.clip(coat.k.mean.mean(), 0, 1))
+    left = 1 - share * float(np.mean(coat.r0))
+    under = tuple(replace(g, k=scaled(g.k, left), falloff=g.falloff + share / 4) for g in surface.glosses)
+    coupled = surface.coupled or share > 0.5
+    return replace(surface, kd=scaled(surface.kd, left), coupled=coupled, glosses=(*under, coat))
 
 
 def straight_through(k: Floats) -> Gloss:
