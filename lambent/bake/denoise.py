@@ -15,6 +15,8 @@ RINGS = 16  # texels grown into gutters; what is farther from any chart is never
 CONTRAST = 8.0  # times as bright: the filter takes light of such neighbours across a gutter
 NEAR = 6  # texels that it reaches
 LAYERS = 4
+BLOCK = 64  # texels: what is denoised is cut out by such blocks and those around them
+MOST = 0.7  # of a map, from which on it is denoised whole
 RIM = 32  # texels mirrored at the borders, where the filter is off by up to 20 % otherwise
 
 
@@ -126,6 +128,28 @@ def denoise(irradiance: Array) -> Array:
     return np.maximum(clean[RIM:-RIM, RIM:-RIM], 0.0)
 
 
+def _denoise_around(irradiance: Array, wanted: Mask) -> Array:
+    """`denoise` where texels (H, W) are wanted, with what is around them; the rest stays as it is."""
+    from scipy.ndimage import binary_dilation, find_objects, label
+
+    height, width = wanted.shape
+    down, across = -(-height // BLOCK), -(-width // BLOCK)
+    blocks = np.zeros((down * BLOCK, across * BLOCK), bool)
+    blocks[:height, :width] = wanted
+    blocks = blocks.reshape(down, BLOCK, across, BLOCK).any(axis=(1, 3))
+    around = binary_dilation(blocks, np.ones((3, 3), bool))
+    boxes = [
+        tuple(slice(side.start * BLOCK, side.stop * BLOCK) for side in box)
+        for box in find_objects(label(around, np.ones((3, 3), int))[0])
+    ]
+    if sum(irradiance[box].shape[0] * irradiance[box].shape[1] for box in boxes) > MOST * wanted.size:
+        return denoise(irradiance)
+    clean = irradiance.copy()
+    for box in boxes:
+        clean[box] = denoise(irradiance[box])
+    return clean
+
+
 def denoise_charts(irradiance: Array, known: Mask, labels: NDArray[np.integer], *, smooth: int = 0) -> Array:
     """A noisy light map, filled and denoised, without light of one chart in another: (H, W, 3).
 
@@ -136,7 +160,7 @@ def denoise_charts(irradiance: Array, known: Mask, labels: NDArray[np.integer], 
     clean = np.zeros_like(irradiance)
     for number in range(max(1, int(layer.max()) + 1)):
         mine = layer == number
-        part = denoise(fill(irradiance, known & mine, np.where(mine, labels, -1), smooth=smooth))
+        part = _denoise_around(fill(irradiance, known & mine, np.where(mine, labels, -1), smooth=smooth), known & mine)
         clean = np.where(mine[..., None] | ((layer < 0) & (number == 0))[..., None], part, clean)
     return clean
 
