@@ -112,7 +112,9 @@ class _Points:
 
     def __init__(self, sides: Sides, mine: NDArray[np.integer]) -> None:
         valid = sides.valid[mine]
-        choice = np.where(valid, np.arange(POINTS), np.argmax(valid, axis=1)[:, None])[..., None]
+        ranked = np.argsort(~valid, axis=1, kind="stable")  # those that are valid first, taken in turn
+        turn = np.arange(POINTS) % valid.sum(axis=1)[:, None]
+        choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
         t, take = sides.texels, np.take_along_axis
         self.count = len(mine)
         self.position = _vectors(take(t.positions[mine], choice, axis=1))
@@ -136,9 +138,9 @@ def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampl
     shifts = rng.random((4, n), dtype=np.float32)
     thread = dr.arange(mi.UInt32, n * samples)
     texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
-    point = (
-        texel % dr.opaque(mi.UInt32, points.count) * POINTS + (k // 2) % POINTS
-    )  # the low bit already steers the azimuth of Hammersley points; a constant count would compile every tile anew
+    first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
+    # the low bit already steers the azimuth of Hammersley points; a constant count would compile every tile anew
+    point = texel % dr.opaque(mi.UInt32, points.count) * POINTS + (k // 2 + first) % POINTS
     at = paths.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)

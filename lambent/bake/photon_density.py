@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.texels import CANDIDATES_AT_ONCE, Texels
+from lambent.bake.texels import Texels
 from lambent.core.frames import normalize
 
 Array = NDArray[np.floating]
@@ -26,55 +26,6 @@ SMALLEST = 0.05  # share of the texels that lies on the surface: what gathers fr
 TEXELS_AT_ONCE = 1 << 18
 
 
-def texel_areas(geometry: dict[str, Array], width: int, height: int) -> Array:
-    """(H, W) float64: area in m^2 of what the light map has in each texel's square; `geometry` as in `atlas.merged`."""
-    corners = geometry["uv2"][geometry["faces"]].astype(float) * (width, height)
-    p = geometry["positions"][geometry["faces"]].astype(float)
-    world = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    in_map = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-    density = np.divide(world, in_map, out=np.zeros(len(world)), where=in_map > 0)
-    low = np.floor(corners.min(axis=1)).astype(int).clip(0, (width - 1, height - 1))
-    high = np.floor(corners.max(axis=1)).astype(int).clip(0, (width - 1, height - 1))
-    counts = high - low + 1
-    pairs = counts[:, 0] * counts[:, 1]
-    areas = np.zeros(width * height)
-    start = 0
-    while start < len(corners):
-        stop = start + max(1, int(np.searchsorted(np.cumsum(pairs[start:]), CANDIDATES_AT_ONCE, side="right")))
-        face = np.repeat(np.arange(start, min(stop, len(corners))), pairs[start:stop])
-        number = np.arange(len(face)) - np.repeat(np.cumsum(pairs[start:stop]) - pairs[start:stop], pairs[start:stop])
-        x, y = low[face, 0] + number % counts[face, 0], low[face, 1] + number // counts[face, 0]
-        overlap = _overlap(corners[face] - np.stack([x, y], axis=-1)[:, None])
-        areas += np.bincount(y * width + x, overlap * density[face], minlength=len(areas))
-        start = stop
-    return areas.reshape(height, width)
-
-
-def _overlap(triangles: Array) -> Array:
-    """Area (n,) of triangles (n, 3, 2) within the unit square, by Green's theorem.
-
-    Each edge brings the signed integral over x in [0, 1] of its height, cut to [0, 1].
-    """
-    total = np.zeros(len(triangles))
-    for i in range(3):
-        start, end = triangles[:, i], triangles[:, (i + 1) % 3]
-        run, rise = (end - start).T
-        slope = np.divide(rise, run, out=np.zeros(len(run)), where=np.abs(run) > 1e-12)
-        from_x, to_x = start[:, 0].clip(0, 1), end[:, 0].clip(0, 1)
-        from_y, to_y = (start[:, 1] + slope * (x - start[:, 0]) for x in (from_x, to_x))
-        climb = to_y - from_y
-        flat = np.abs(climb) < 1e-6
-        mean = np.divide(_integral(to_y) - _integral(from_y), climb, out=np.zeros(len(run)), where=~flat)
-        total += np.where(flat, ((from_y + to_y) / 2).clip(0, 1), mean) * (to_x - from_x)
-    return np.abs(total)
-
-
-def _integral(y: Array) -> Array:
-    """Of y cut to [0, 1]."""
-    return np.where(y <= 0, 0.0, np.where(y >= 1, y - 0.5, y * y / 2))
-
-
 class Kernel:
     """Averages over the texels around each texel, on the same surface.
 
@@ -84,7 +35,7 @@ class Kernel:
     Parameters
     ----------
     areas : (H, W)
-        `texel_areas`.
+        `coverage.texel_areas`.
     open_share : (K,)
         Share of each of the texels that light can reach: 0 within a solid, and only the rest of its area counts.
     """

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.coverage import texel_areas
 from lambent.bake.light_map import Sides, cleaned, relative_noise
-from lambent.bake.photon_density import Kernel, shares, texel_areas
+from lambent.bake.photon_density import Kernel, shares
 from lambent.bake.photons import Bins, learnt_sky, shoot
 from lambent.bake.texels import Texels
 from lambent.bake.work import run_tiles

@@ -35,8 +35,7 @@ PHOTONS_AT_ONCE = 1 << 19
 UNIT = 1 << 20  # whole numbers in a photon of mean power
 PILOT = 1 << 14  # photons that tell the mean power
 LEARNING = 1 << 20  # photons that tell where the light map wants them
-OFFSET = 1e-5  # metres, and share of the largest coordinate, over a surface from where photons leave it
-SAME = 2e-4  # likewise: as near as that to where a ray starts, a sampled point is the one that it left
+SAME = 2e-4  # metres, and share of the largest coordinate: so near to where a ray starts is the point that it left
 STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal: beyond, at grazing, it is noise
 
 
@@ -116,7 +115,7 @@ def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None) -> tuple[A
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), number)
     sky = emitter.is_environment()
     ray, power = emitter.sample_ray(0.0, u, place, direction, ~sky)
-    ray.o = _nearer(emitter, ray, place)
+    ray.o = _nearer(scene, emitter, ray, place)
     if scene.environment() is not None:
         if by_landing is None:
             from_sky, power_of_sky = _from_environment(scene, place, direction)
@@ -127,12 +126,12 @@ def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None) -> tuple[A
     return ray, dr.select(dr.all(dr.isfinite(power)), power * weight, 0.0)
 
 
-def _nearer(emitter: Any, ray: Any, place: Any) -> Any:
+def _nearer(scene: Any, emitter: Any, ray: Any, place: Any) -> Any:
     """Origins of rays that Mitsuba has sampled on emitters: on surfaces nearer to these than its own offset."""
     shape = emitter.get_shape()
     on = shape.sample_position(0.0, place, shape != None)  # noqa: E711 (an array of pointers)
     same = (on.pdf > 0) & (dr.norm(on.p - ray.o) < SAME * (1 + dr.max(dr.abs(ray.o))))
-    return dr.select(same, _leaving(on.p, on.n, ray.d).o, ray.o)
+    return dr.select(same, paths.leaving(scene, on.p, on.n, ray.d).o, ray.o)
 
 
 def _from_environment(scene: Any, place: Any, direction: Any) -> tuple[Any, Any]:
@@ -176,14 +175,8 @@ def _trace(scene, sampler, ray, power, count, max_bounces, holes):  # type: igno
         active &= (sample.pdf > 0) & (true_out * sample.wo.z > 0) & dr.isfinite(survive)
         active &= sampler.next_1d(active) < survive
         power = dr.select(active, scattered / dr.maximum(survive, 1e-9), 0.0)
-        ray = _leaving(si.p, si.n, direction)
+        ray = paths.leaving(scene, si.p, si.n, direction)
         bounces += 1
-
-
-def _leaving(p: Any, n: Any, direction: Any) -> Any:
-    """Rays that leave a surface's points p, of normals n, on the side of `direction`."""
-    above = OFFSET * (1 + dr.max(dr.abs(p)))
-    return mi.Ray3f(p + n * dr.mulsign(above, dr.dot(n, direction)), direction)
 
 
 def _count(sums: Any, bins: Bins, si: Any, power: Any, far_side: Any, active: Any) -> None:

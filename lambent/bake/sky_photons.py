@@ -102,7 +102,7 @@ class SkyPhotons:
         lit = cosine > 0
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(u))
         si.p, si.n = p, mi.Normal3f(n)
-        lit &= ~paths.in_shadow(self._whole, si.spawn_ray(w), lit, self._holes)
+        lit &= ~paths.in_shadow(self._whole, paths.leaving(self._whole, si.p, si.n, w), lit, self._holes)
         si.wi = -w
         density = self.guide.pdf(table, w)
         power = self._sky.eval(si) * (cosine / density * dr.gather(mi.Float, self._over_density, number))

@@ -1,7 +1,12 @@
-"""Which surface point a texel of the light map stands for.
+"""Which surface points a texel of the light map stands for.
 
-Texel (row, column) has its centre at ((column + 1/2)/W, (row + 1/2)/H). Every texel that a bilinear look-up on a
-triangle can touch gets points: up to four where the quarters' centres lie on a triangle, else the nearest point of one.
+Texel (row, column) is the square from (column/W, row/H) to ((column + 1)/W, (row + 1)/H), and holds the mean over
+what lies there: its points are spread over that by area, in strata, each at random in its own, so that no irradiance
+is over- or underestimated for how it varies within a texel. Texels that bilinear look-ups touch although hardly
+anything lies in them have points in all that those look-ups come from, their own square and half a texel around.
+
+Points are stored rather than drawn anew for each sample, because each is asked whether it lies within a solid and
+whether a viewer sees it: of a texel across a wall one side may be a thousand times as bright.
 """
 
 from __future__ import annotations
@@ -11,14 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.coverage import Pieces, corners_of, cross, density_of, in_cell, pieces_of, placed
 from lambent.core.frames import normalize
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]
-POINTS = 4  # per texel
-PULL = 0.25  # texels
+POINTS = 4  # per texel, an even number
+SLIVER = 0.02  # share of a texel that lies on the surface: what has less looks around itself
+FOOTPRINT = 0.5  # texels around a texel from where bilinear look-ups touch it
+MARGIN = 2e-6  # metres, and share of the largest coordinate, from the border of a triangle
+MOST = 0.2  # share of a triangle's height that is margin
 BEYOND = 1 << 40  # added to the label of a chart, for texels that no viewer sees (see viewers.py)
-CANDIDATES_AT_ONCE = 1 << 21  # (triangle, texel) pairs tested in one go: some 200 MB
 
 
 @dataclass(frozen=True)
@@ -26,8 +34,8 @@ class Texels:
     """Surface points of the covered texels, in row-major order of the texels.
 
     index (K,) int64 is row * width + column; face (K, POINTS) int64 counts through the merged geometry; positions,
-    normals (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Points repeat where there are fewer.
-    spacing (K,) is the size of a texel in metres.
+    normals (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Each point stands for an equal share of
+    area. spacing (K,) is the size of a texel in metres.
     """
 
     width: int
@@ -41,52 +49,80 @@ class Texels:
 
 
 def texels_of(geometry: dict[str, Array], width: int, height: int) -> Texels:
-    """Surface points of all texels of a light map; `geometry` as in `atlas.merged`."""
-    corners = geometry["uv2"][geometry["faces"]].astype(np.float64)  # (T, 3, 2)
-    whole = _nearest(corners, width, height, reach=1.0)
-    _pull_inwards(whole, corners * (width, height))
-    quarters = _nearest(corners, 2 * width, 2 * height, reach=0.0)
-    index = np.flatnonzero(whole.face >= 0)
-    row, column = index // width, index % width
-    quarter = [(2 * row + r) * 2 * width + 2 * column + c for r in (0, 1) for c in (0, 1)]
-    face = np.stack([quarters.face[q] for q in quarter], axis=1)
-    weights = np.stack([quarters.weights[q] for q in quarter], axis=1)
-    bare = (face < 0).all(axis=1)
-    face[bare], weights[bare] = whole.face[index[bare], None], whole.weights[index[bare], None]
-    found = np.argmax(face >= 0, axis=1)
-    rows = np.arange(len(index))
-    missing = face < 0
-    face = np.where(missing, face[rows, found][:, None], face)
-    weights = np.where(missing[..., None], weights[rows, found][:, None], weights)
-    return Texels(
-        width,
-        height,
-        index,
-        face,
-        *_surface(geometry, face, weights),
-        _spacing(geometry, corners * (width, height), face),
-    )
+    """Surface points of all texels of a light map; `geometry` as in `atlas.merged`. Deterministic."""
+    corners = corners_of(geometry, width, height)
+    own = pieces_of(geometry, width, height)
+    around = pieces_of(geometry, width, height, reach=FOOTPRINT)
+    size = density_of(geometry, corners)
+    in_map = np.divide(own.area, size[own.face], out=np.zeros(len(own.area)), where=size[own.face] > 0)
+    slight = np.bincount(own.cell, in_map, minlength=width * height) < SLIVER
+    parts = [_points(own, corners, width, 0.0, ~slight), _points(around, corners, width, FOOTPRINT, slight)]
+    index, face, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
+    order = np.argsort(index)
+    index, face, weights = index[order], face[order], weights[order]
+    weights = _off_borders(geometry, face, weights)
+    return Texels(width, height, index, face, *_surface(geometry, face, weights), np.sqrt(size[face[:, 0]]))
 
 
-def _spacing(geometry: dict[str, Array], corners: Array, face: Indices) -> Array:
-    """Metres per texel (K,): root of a triangle's area in the scene over that in the map, 0 where that has none."""
-    p = geometry["positions"][geometry["faces"]].astype(float)
-    world = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    texels = np.abs(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    ratio = np.divide(world, texels, out=np.zeros(len(world)), where=texels > 0)
-    return np.asarray(np.sqrt(ratio[face[:, 0]]))
+def _points(
+    pieces: Pieces, corners: Array, width: int, reach: float, chosen: NDArray[np.bool_]
+) -> tuple[Indices, Indices, Array]:
+    """Cells (K,) with pieces among those chosen, and POINTS of each: faces (K, POINTS), weights (K, POINTS, 3)."""
+    mine = chosen[pieces.cell]
+    cell, face, area = pieces.cell[mine], pieces.face[mine], pieces.area[mine]
+    index, first, count = np.unique(cell, return_index=True, return_counts=True)
+    if not len(index):
+        return index, np.zeros((0, POINTS), int), np.zeros((0, POINTS, 3))
+    u = _strata(len(index))
+    after = np.cumsum(area)
+    before = after - area
+    low, high = before[first], after[first + count - 1]
+    target = low[:, None] + u[..., 0] * (high - low)[:, None]
+    piece = np.searchsorted(after, target, side="right").clip(first[:, None], (first + count - 1)[:, None])
+    u[..., 0] = ((target - before[piece]) / area[piece]).clip(0, 1)
+    at, shape = piece.reshape(-1), (len(index), POINTS)
+    x, y = cell[at] % width, cell[at] // width
+    local = in_cell(corners[face[at]], x, y, reach)
+    weights = _barycentric(local, placed(local, u.reshape(-1, 2)))
+    return index, face[at].reshape(shape), weights.reshape(*shape, 3)
 
 
-def _pull_inwards(best: _Nearest, corners: Array) -> None:
-    """Move points that were clamped to an edge towards the triangle's middle, by PULL texels at most.
+def _strata(count: int) -> Array:
+    """(count, POINTS, 2) points of the unit square, each at random in a row and a column of its own.
 
-    On the edge itself a ray would start in the plane of the neighbouring wall, and might miss it.
+    Any row may go with any column, or what lies in the other places were never seen. Of two opposite points each is
+    the other's mirror image: what varies linearly has no noise (antithetic variates).
     """
-    clamped = np.flatnonzero((best.face >= 0) & (best.distance > 0))
-    triangle, weights = corners[best.face[clamped]], best.weights[clamped]
-    to_middle = triangle.mean(axis=1) - np.einsum("ncx,nc->nx", triangle, weights)
-    share = np.minimum(PULL / np.maximum(np.linalg.norm(to_middle, axis=1), 1e-12), 1.0)[:, None]
-    best.weights[clamped] = weights * (1 - share) + share / 3
+    rng, half = np.random.default_rng(0), POINTS // 2
+    pair = np.argsort(rng.random((count, half)), axis=1)
+    row = np.where(rng.random((count, half)) < 0.5, pair, POINTS - 1 - pair)
+    place = np.stack([np.broadcast_to(np.arange(half), row.shape), row], axis=-1)
+    u = (place + rng.random((count, half, 2))) / POINTS
+    return np.concatenate([u, 1 - u[:, ::-1]], axis=1)
+
+
+def _off_borders(geometry: dict[str, Array], face: Indices, weights: Array) -> Array:
+    """Weights with which all points are MARGIN off the borders of their triangles, as far as those are wide enough.
+
+    On a border itself a ray would start in the plane of the neighbouring wall, and might miss it.
+    """
+    p = geometry["positions"][geometry["faces"]].astype(float)
+    edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to the corners
+    twice = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)[:, None]
+    heights = np.divide(twice, edges, out=np.zeros_like(edges), where=edges > 0)
+    margin = MARGIN * (1 + np.abs(p).max(axis=(1, 2)))[:, None]
+    least = np.divide(margin, heights, out=np.full_like(heights, MOST), where=heights > 0).clip(0, MOST)
+    moved = np.maximum(weights, least[face])
+    return np.asarray(moved / moved.sum(axis=-1, keepdims=True))
+
+
+def _barycentric(triangles: Array, points: Array) -> Array:
+    """Barycentric weights (n, 3), none below 0, of points (n, 2) in triangles (n, 3, 2)."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    weights = np.stack([cross(c - b, points - b), cross(a - c, points - c), cross(b - a, points - a)], -1)
+    weights = np.maximum(weights * np.sign(cross(b - a, c - a))[:, None], 0)
+    total = weights.sum(axis=1, keepdims=True)
+    return np.divide(weights, total, out=np.full(weights.shape, 1 / 3), where=total > 0)
 
 
 def _surface(geometry: dict[str, Array], face: Indices, weights: Array) -> tuple[Array, Array, Array]:
@@ -98,87 +134,6 @@ def _surface(geometry: dict[str, Array], face: Indices, weights: Array) -> tuple
     normal = normalize(np.einsum("kpcx,kpc->kpx", geometry["normals"][corner], weights))
     normal = np.where((normal == 0).all(axis=-1, keepdims=True), flat, normal)
     return position.astype(np.float32), normal.astype(np.float32), flat.astype(np.float32)
-
-
-@dataclass
-class _Nearest:
-    """Per cell of a grid: the nearest triangle within reach (-1: none), and barycentric weights of the point."""
-
-    face: Indices
-    weights: Array
-    distance: Array
-
-
-def _nearest(corners_uv: Array, width: int, height: int, reach: float) -> _Nearest:
-    cells = width * height
-    best = _Nearest(np.full(cells, -1), np.zeros((cells, 3)), np.full(cells, np.inf))
-    corners = corners_uv * (width, height) - 0.5  # cell centres at whole numbers
-    low = np.ceil(corners.min(axis=1) - reach).astype(int).clip(0, (width - 1, height - 1))
-    high = np.floor(corners.max(axis=1) + reach).astype(int).clip(-1, (width - 1, height - 1))
-    counts = (high - low + 1).clip(0)
-    pairs = counts[:, 0] * counts[:, 1]
-    start = 0
-    while start < len(corners):
-        total = np.cumsum(pairs[start:])
-        stop = start + max(1, int(np.searchsorted(total, CANDIDATES_AT_ONCE, side="right")))
-        _closer(best, corners, np.arange(start, stop), low, counts, width, reach)
-        start = stop
-    return best
-
-
-def _closer(best: _Nearest, corners: Array, faces: Indices, low: Indices, counts: Indices, width: int, reach: float):
-    """Take into `best` what the given faces offer; the first of equals wins, so the result is deterministic."""
-    pairs = counts[faces, 0] * counts[faces, 1]
-    face = np.repeat(faces, pairs)
-    number = np.arange(len(face)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
-    x, y = low[face, 0] + number % counts[face, 0], low[face, 1] + number // counts[face, 0]
-    cells = np.stack([x, y], axis=-1).astype(float)
-    weights, within = _barycentric(corners[face], cells)
-    distance = np.zeros(len(face))
-    near = within
-    if reach > 0:
-        outside = np.flatnonzero(~within)
-        weights[outside], offset = _closest_on_edges(corners[face[outside]], cells[outside])
-        distance[outside] = (offset**2).sum(axis=-1)
-        near[outside] = np.abs(offset).max(axis=-1) <= reach
-    cell, face, weights, distance = (y * width + x)[near], face[near], weights[near], distance[near]
-    order = np.lexsort((face, distance, cell))
-    cell, first = np.unique(cell[order], return_index=True)
-    chosen = order[first]
-    closer = distance[chosen] < best.distance[cell]
-    cell, chosen = cell[closer], chosen[closer]
-    best.face[cell], best.weights[cell], best.distance[cell] = face[chosen], weights[chosen], distance[chosen]
-
-
-def _barycentric(triangles: Array, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Barycentric weights (n, 3) of points (n, 2) in triangles (n, 3, 2), and whether they lie within."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    area = _cross(b - a, c - a)
-    solid = np.abs(area) > 1e-12
-    weights = np.stack([_cross(c - b, points - b), _cross(a - c, points - c), _cross(b - a, points - a)], -1)
-    weights /= np.where(solid, area, 1.0)[:, None]
-    return weights, (weights >= 0).all(axis=1) & solid
-
-
-def _closest_on_edges(triangles: Array, points: Array) -> tuple[Array, Array]:
-    """Barycentric weights (n, 3) of the points on the triangles' edges nearest to points (n, 2), and the offsets."""
-    best = np.full(len(points), np.inf)
-    weights, offset = np.zeros((len(points), 3)), np.zeros((len(points), 2))
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        start, edge = triangles[:, i], triangles[:, j] - triangles[:, i]
-        length = (edge**2).sum(axis=1)
-        t = np.divide(((points - start) * edge).sum(axis=1), length, out=np.zeros(len(points)), where=length > 0)
-        t = t.clip(0, 1)
-        away = points - start - t[:, None] * edge
-        closer = (away**2).sum(axis=1) < best
-        best[closer] = (away[closer] ** 2).sum(axis=1)
-        offset[closer], weights[closer] = away[closer], 0
-        weights[closer, i], weights[closer, j] = 1 - t[closer], t[closer]
-    return weights, offset
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def chart_labels(geometry: dict[str, Array], texels: Texels) -> Indices:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.photon_density import Kernel, texel_areas
+from lambent.bake.coverage import texel_areas
+from lambent.bake.photon_density import Kernel
 from lambent.bake.texels import Texels, texels_of
 
 SIDE = 32  # texels

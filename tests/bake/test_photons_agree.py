@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.photon_density import texel_areas
+from lambent.bake.coverage import texel_areas
 from lambent.bake.texels import texels_of
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
