@@ -16,7 +16,7 @@ from lambent.scenes.textures import digest, parts
 
 REVISION = {
     "geometry": 2,
-    "light_map": 3,
+    "light_map": 4,
     "irradiance": 1,
     "environment": 1,
     "probe": 4,
