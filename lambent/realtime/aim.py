@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.materials.document import Material
 from lambent.realtime.cube_mips import blurred, exact_solid_angles
 
 Floats = NDArray[np.floating]
@@ -49,6 +50,19 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
 def prominence(variance: float) -> float:
     """How far samples are worth aiming, 0 to 1: not below a variance of 1, as far as the lobe says above 4."""
     return float(np.clip(np.log2(max(variance, 1e-9)) / 2, 0, 1))
+
+
+def aimed_share(roughness: float, prominent: float) -> float:
+    """Share of a lobe's samples that aims, before it is rounded (aimed_share of qmc.wgsl): 0 to 12/16.
+
+    `roughness` is sqrt(mx my): at .1 it is a half, 2.5/16 more for each doubling.
+    """
+    return float(np.clip(prominent * (8 + 2.5 * np.log2(roughness / 0.1)), 0, 12)) / 16
+
+
+def widest_lobe(material: Material, pictured: bool) -> float:
+    """The largest sqrt(mx my) of a material's lobes; 1 where pictures change them."""
+    return 1.0 if pictured else max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in material.lobes), default=1e-3)
 
 
 def aim_table(cube: Floats) -> NDArray[np.float32]:

@@ -40,6 +40,7 @@ class Integrator:
     cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered
     specular: bool = True
     progressive: bool = False  # unbiased: frames may be averaged, all of the same few samples
+    aimed: bool = False  # part of its samples aims at a probe's lamps where they stand out (constant AIM)
 
 
 INTEGRATORS: dict[str, Integrator] = {
@@ -48,8 +49,8 @@ INTEGRATORS: dict[str, Integrator] = {
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
     "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
-    "qmc": Integrator("qmc.wgsl", progressive=True),
-    "qmc-lobe": Integrator("qmc.wgsl", constants={"AIM": 0}, progressive=True),  # no sample aims at lamps
+    "qmc": Integrator("qmc.wgsl", progressive=True, aimed=True),
+    "qmc-lobe": Integrator("qmc.wgsl", progressive=True),  # no sample aims at lamps
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
-from lambent.realtime.aim import aim_table
+from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 from lambent.realtime.device import WEBGPU_LIMITS
@@ -121,7 +121,7 @@ class Light:
         self._device, self._sampler = device, sampler
         self._radiance = np.zeros((6, 1, 1, 3), np.float32) if probe is None else probe.radiance
         self._cubes: dict[Cube, Any] = {}
-        self._aim: Any = None
+        self._aim: tuple[Any, float] | None = None
         self.version = 0
         distance = None if probe is None else probe.distance
         self.centre = (0.0, 0.0, 0.0) if probe is None else probe.centre
@@ -145,12 +145,17 @@ class Light:
         return self._texture(cube).create_view(dimension="cube")
 
     @property
-    def aim(self) -> Any:
-        """The table that samples are aimed at lamps by."""
+    def aim(self) -> tuple[Any, float]:
+        """The table that samples are aimed at lamps by, and how far these stand out; made when first asked for."""
         if self._aim is None:
             table = aim_table(finite(self._radiance)[0])
-            self._aim = self._device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
+            buffer = self._device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
+            self._aim = buffer, float(table[0, 1])
         return self._aim
+
+    def is_aimed_at(self, material: Material, lookup: str, pictured: bool) -> bool:
+        """Whether samples of a material's lobes, which pictures may widen, are worth aiming at all."""
+        return lookup != "distance" and aimed_share(widest_lobe(material, pictured), self.aim[1]) > 1 / 16
 
     def half_log2_texels(self, cube: Cube) -> float:
         """Half the log2 of texels per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17), of which a look-up blurs one."""
@@ -211,23 +216,25 @@ class ObjectResources:
     def __init__(self, device: Any, layouts: Layouts, record: ObjectRecord, light: Light) -> None:
         self.record, self.light, self._layouts = record, light, layouts
         self._device = device
-        self._groups: dict[Cube, Any] = {}
+        self._groups: dict[tuple[Cube, bool], Any] = {}
         self._version = light.version  # of the light that the groups hold
 
-    def group(self, cube: Cube) -> Any:
-        light = self.light
+    def group(self, cube: Cube, aimed: bool = False) -> Any:
+        """Group 2 with that cube map, and with the table of lamps for shaders that read it."""
+        light, key = self.light, (cube, aimed)
         if self._version != light.version:
             self._version, self._groups = light.version, {}
-        if cube not in self._groups:
+        if key not in self._groups:
             data = np.zeros(1, OBJECT_DTYPE)
             data["centre"][0] = (*light.centre, light.half_log2_texels(cube))
             data["emission"][0, :3] = self.record.emission
             data["irradiance"][0, : len(light.irradiance)] = light.irradiance
             uniform = self._device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
-            self._groups[cube] = self._layouts.group(
-                self._layouts.object, uniform, light.planes, light.view(cube), light.depth_view, light.aim
+            table = light.aim[0] if aimed else light.planes  # a binding must hold something
+            self._groups[key] = self._layouts.group(
+                self._layouts.object, uniform, light.planes, light.view(cube), light.depth_view, table
             )
-        return self._groups[cube]
+        return self._groups[key]
 
 
 class SceneResources:

@@ -128,7 +128,7 @@ def test_density_is_that_of_numpy_and_integrates_to_one(boxed: bool) -> None:
 def test_directions_are_drawn_with_that_probability() -> None:
     cube = spotted()
     u = np.random.default_rng(3).random((60_000, 2))
-    w = evaluate("aim_draw(u)", cube, PLANES[:0], 3, u=u)
+    w = evaluate("aim_draw(u).xyz", cube, PLANES[:0], 3, u=u)
     expected = lamp_probabilities(cube)[0].ravel() * len(u)
     counts = np.bincount(texels_of(w, N), minlength=expected.size)
     assert counts[expected == 0].sum() == 0
@@ -139,7 +139,7 @@ def test_directions_are_drawn_with_that_probability() -> None:
 def test_a_direction_that_aims_leads_back_to_what_it_aims_at() -> None:
     q = normalize(np.random.default_rng(4).normal(size=(5000, 3)))
     x = np.random.default_rng(5).uniform(0.98 * BOX[0], 0.98 * BOX[1], q.shape)
-    back = evaluate("aimed_lookup(x, aim_towards(x, q)).direction", spotted(), PLANES, 3, x=x, q=q)
+    back = evaluate("aimed_lookup(x, aim_towards(x, q).w).direction", spotted(), PLANES, 3, x=x, q=q)
     np.testing.assert_allclose(normalize(back), q, atol=2e-5)
 
 

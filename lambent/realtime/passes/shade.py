@@ -11,6 +11,7 @@ from lambent.realtime.integrators import Integrator
 from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS, draw_seen
 from lambent.realtime.resources import LOOKUPS, Layouts, ObjectResources, SceneResources
 from lambent.realtime.shader_source import assemble
+from lambent.realtime.textures import BITS
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Stage:
 
 SHADE = Stage()
 FRINGE = Stage("fringe.wgsl", "fringe_main", blended=True)  # of masked surfaces, after what is whole
+WIDENING = BITS["roughness"] | BITS["normal"]  # pictures that make lobes wider
 _OVER = {
     "color": {"src_factor": "src-alpha", "dst_factor": "one-minus-src-alpha", "operation": "add"},
     "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
@@ -56,7 +58,13 @@ def constants_of(draw: Draw) -> dict[str, int]:
         "LOOKUP": LOOKUPS[draw.lookup],
         "PLANES": draw.item.light.plane_count if draw.lookup == "planes" else 0,
         **draw.integrator.constants,
+        **(aim_constant(draw) if draw.integrator.aimed else {}),
     }
+
+
+def aim_constant(draw: Draw) -> dict[str, int]:
+    """AIM of aim.wgsl's users: without it nothing that aims is compiled."""
+    return {"AIM": int(draw.item.light.is_aimed_at(draw.material, draw.lookup, draw.textures & WIDENING != 0))}
 
 
 class ShadePass:
@@ -98,7 +106,7 @@ class ShadePass:
                 continue
             target.set_pipeline(self._pipeline(draw, format))
             target.set_bind_group(1, draw.material_group)
-            target.set_bind_group(2, draw.item.group(draw.integrator.cube))
+            target.set_bind_group(2, draw.item.group(draw.integrator.cube, draw.integrator.aimed))
             target.set_bind_group(3, planar_group if draw.planar else light_group or resources.light_group)
             calls += draw_seen(target, seen, record.first_face, record.face_count)
         return calls

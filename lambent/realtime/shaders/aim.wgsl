@@ -52,8 +52,8 @@ fn aim_probability(w: vec3f) -> f32 {
 }
 
 // A direction of the probe (largest component 1) from u in [0, 1)^2: faces, then quarters, each time by what is left of u
-// (McCool & Harwood 1997), which keeps an even sequence even.
-fn aim_draw(given: vec2f) -> vec3f {
+// (McCool & Harwood 1997), which keeps an even sequence even. w: its probability as aim_probability gives it.
+fn aim_draw(given: vec2f) -> vec4f {
     var u = given;
     var face = 0u;
     var share = 1.0;
@@ -69,6 +69,7 @@ fn aim_draw(given: vec2f) -> vec3f {
     let levels = u32(aim[0].x);
     var morton = 0u;
     var texel = vec2u(0u);
+    var weight = share;
     for (var level = 0u; level < levels; level++) {
         let quarters = aim[aim_row(level, face, morton)];
         let column = quarters.xy + quarters.zw;
@@ -78,16 +79,19 @@ fn aim_draw(given: vec2f) -> vec3f {
         let half = select(quarters.xz, quarters.yw, right);
         let upper = half.x / (half.x + half.y);
         let lower = u.y >= upper;
+        weight = select(half.x, half.y, lower);
         u.y = min(select(u.y / upper, (u.y - upper) / (1.0 - upper), lower), BELOW_ONE);
         let quarter = vec2u(select(0u, 1u, right), select(0u, 1u, lower));
         morton = 4u * morton + quarter.x + 2u * quarter.y;
         texel = 2u * texel + quarter;
     }
-    let st = (vec2f(texel) + u) * (2.0 / f32(1u << levels)) - 1.0;
+    let n = f32(1u << levels);
+    let st = (vec2f(texel) + u) * (2.0 / n) - 1.0;
+    let p = weight * (0.25 * n * n);
     let sign = select(1.0, -1.0, (face & 1u) == 1u);
-    if (face < 2u) { return vec3f(sign, -st.y, -sign * st.x); }
-    if (face < 4u) { return vec3f(st.x, sign, sign * st.y); }
-    return vec3f(sign * st.x, -st.y, sign);
+    if (face < 2u) { return vec4f(sign, -st.y, -sign * st.x, p); }
+    if (face < 4u) { return vec4f(st.x, sign, sign * st.y, p); }
+    return vec4f(sign * st.x, -st.y, sign, p);
 }
 
 // Whether the probe's centre is inside of every plane that x is inside of.
@@ -96,17 +100,6 @@ fn aim_maps(x: vec3f) -> bool {
         if (dot(planes[i].xyz, x) + planes[i].w > AIM_ACTIVE && planes[i].w <= AIM_ACTIVE) { return false; }
     }
     return LOOKUP != 2u;
-}
-
-// Unit direction at x to what the probe sees in the direction q.
-fn aim_towards(x: vec3f, q: vec3f) -> vec3f {
-    var nearness = 0.0;
-    for (var i = 0u; i < PLANES; i++) {
-        let inside = dot(planes[i].xyz, x) + planes[i].w > AIM_ACTIVE;
-        nearness = max(nearness, select(0.0, -dot(planes[i].xyz, q) / planes[i].w, inside));
-    }
-    if (nearness < 1e-6) { return normalize(q); }
-    return normalize(q / nearness - x);
 }
 
 // planes_lookup, and how densely directions of the probe lie there. A piece of plane at the distance t, h above which x
@@ -127,4 +120,29 @@ fn aimed_lookup(x: vec3f, w: vec3f) -> Aimed {
     let found = x + w / nearness;
     let major = max_norm(found) * nearness;
     return Aimed(found, heights / (major * major * major));
+}
+
+// Unit direction at x to what the probe sees in the direction q, and the density there as in aimed_lookup.
+struct Towards {
+    w: vec3f,
+    density: f32,
+}
+
+fn aim_towards(x: vec3f, q: vec3f) -> Towards {
+    var nearness = 0.0;
+    var heights = 1.0;
+    for (var i = 0u; i < PLANES; i++) {
+        let height = dot(planes[i].xyz, x) + planes[i].w;
+        let near = select(0.0, -dot(planes[i].xyz, q) / planes[i].w, height > AIM_ACTIVE);
+        heights = select(heights, planes[i].w / height, near > nearness);
+        nearness = max(nearness, near);
+    }
+    let major = max_norm(q);
+    if (nearness < 1e-6) {
+        let w = normalize(q);
+        return Towards(w, dot(q, w) * dot(q, w) * dot(q, w) / (major * major * major));
+    }
+    let to = q / nearness - x;
+    let stretch = length(to) * nearness / major;
+    return Towards(normalize(to), heights * stretch * stretch * stretch);
 }

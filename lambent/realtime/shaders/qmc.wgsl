@@ -7,7 +7,7 @@
 #include "sequence.wgsl"
 #include "aim.wgsl"
 
-override AIM: u32 = 1u; // 0: no sample aims
+override AIM: u32 = 0u; // 1: there are lamps worth aiming at, for some lobe here
 const SIXTEENTHS = 16u;
 
 // Sixteenths of a lobe's samples that aim, an even number, known before any sample is taken: 8 at a roughness of .1, 2.5
@@ -18,25 +18,35 @@ fn aimed_share(lobe: LambentLobe, s: Surface) -> u32 {
     return 2u * u32(round(0.5 * clamp(wanted, 0.0, 12.0)));
 }
 
-// Light of one direction over the density of all samples there; `aim_share` of them aim at lamps. cos_d = wo.h.
-fn counted(lobe: LambentLobe, s: Surface, at: Sample, wo: vec3f, aim_share: f32) -> vec3f {
-    let w = on_side(lobe, at.wi);
-    let g = gain(lobe, at.wi, wo, at.h);
-    if (aim_share == 0.0) { return g * incident_at_level(s, w, 0.0); }
-    let found = aimed_lookup(s.x, to_world(s, w));
-    let light = s.open * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
+// f cos_i times the light over the density of all samples at a direction, of which `aim_share` aim with density `aimed`.
+fn counted(lobe: LambentLobe, at: Sample, wo: vec3f, light: vec3f, aimed: f32, aim_share: f32) -> vec3f {
     let pdf = lambent_distribution(at.h, lobe) * at.h.z / (4.0 * at.cos_d);
-    let aimed = aim_probability(found.direction) * found.density;
-    return g * light * (pdf / max(mix(pdf, aimed, aim_share), 1e-30));
+    return gain(lobe, at.wi, wo, at.h) * light * (pdf / max(mix(pdf, aimed, aim_share), 1e-30));
 }
 
-// A direction that aims, on the side where lobes are, as a sample of the lobe.
-fn aimed_sample(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface) -> Sample {
-    let w = aim_towards(s.x, aim_draw(u));
-    let wi = on_side(lobe, vec3f(dot(w, s.t), dot(w, s.b), dot(w, s.n)));
+fn probe_light(s: Surface, direction: vec3f) -> vec3f {
+    return s.open * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
+}
+
+fn of_lobe(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
+    let at = sample_about(wo, lambent_sample_half_vector(u, lobe));
+    if (!at.seen) { return vec3f(0.0); }
+    let w = on_side(lobe, at.wi);
+    if (AIM == 0u) { return gain(lobe, at.wi, wo, at.h) * incident_at_level(s, w, 0.0); }
+    let found = aimed_lookup(s.x, to_world(s, w));
+    let aimed = aim_probability(found.direction) * found.density;
+    return counted(lobe, at, wo, probe_light(s, found.direction), aimed, aim_share);
+}
+
+fn of_lamps(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
+    let drawn = aim_draw(u);
+    let to = aim_towards(s.x, drawn.xyz);
+    let wi = on_side(lobe, vec3f(dot(to.w, s.t), dot(to.w, s.b), dot(to.w, s.n)));
     let h = lambent_half_vector(wi, wo);
     let cos_d = dot(wo, h);
-    return Sample(h, cos_d, wi, cos_d > LAMBENT_COS_MIN && wi.z > LAMBENT_COS_MIN);
+    if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { return vec3f(0.0); }
+    let at = Sample(h, cos_d, wi, true);
+    return counted(lobe, at, wo, probe_light(s, drawn.xyz), drawn.w * to.density, aim_share);
 }
 
 // Which samples of the two sequences a frame takes: first and past, of the lobe's and of those that aim.
@@ -66,13 +76,12 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let aim_share = f32(share) / f32(SIXTEENTHS);
     var sum = vec3f(0.0);
     for (var k = turn.lobe.x; k < turn.lobe.y; k++) {
-        let at = sample_about(wo, lambent_sample_half_vector(sequence(offset.xy, k), lobe));
-        if (at.seen) { sum += counted(lobe, s, at, wo, aim_share); }
+        sum += of_lobe(sequence(offset.xy, k), lobe, wo, s, aim_share);
     }
+    if (AIM == 0u) { return sum / f32(SAMPLES); }
     let other = pixel_hash(s.pixel, index + 16u).xy;
     for (var k = turn.aimed.x; k < turn.aimed.y; k++) {
-        let at = aimed_sample(sequence(other, k), lobe, wo, s);
-        if (at.seen) { sum += counted(lobe, s, at, wo, aim_share); }
+        sum += of_lamps(sequence(other, k), lobe, wo, s, aim_share);
     }
     return sum / f32(SAMPLES);
 }
