@@ -120,8 +120,8 @@ def z_of(a: Floats, b: Floats) -> Floats:
 def agreement(aimed: Floats, lobe_alone: Floats, shown: NDArray[np.bool_]) -> dict[str, float]:
     """How two sets of replicas (R, H, W, 3) agree: by pixels shown, by blocks of them, and z_whole of their mean.
 
-    z_rms is 1 of unbiased ones, z_above_3 .0027, as far as means are distributed normally. Where rare samples are bright
-    those of pixels are not: most are too dark and seem exact. Those of blocks are nearer to it.
+    z_rms is 1 of unbiased ones, z_above_3 .0027, as far as means are distributed normally. Where rare samples are
+    bright those of pixels are not: most are too dark and seem exact. Those of blocks are nearer to it.
     """
     a, b = (x[:, shown].astype(np.float64).mean(axis=-1) for x in (aimed, lobe_alone))
     z, by_block = z_of(a, b), z_of(block_means(a, shown), block_means(b, shown))
