@@ -18,11 +18,12 @@ Floats = NDArray[np.floating]
 TILE = 64  # pixels that sample a lobe in turns
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 # Of the filter, against one that covers the lobe: found by experiment. The narrower the better where each sample finds
-# its own hit; where it is a guess, far from the mirror direction, width hides the error.
-FIXED_BIAS, MARCHED_BIAS = 0.4, 0.03
-GUESSED_BIAS, GUESSED_BIAS_PER_M = 0.12, 1.2  # the most, and by sqrt(mx my)
+# its own hit, and where 64 pixels share the lobe.
+FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.03
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
+# Hidden hits count a fifth. What the mirror picture does not hold is filtered in the probe as fixed rings are.
+SHARED = {"HIDDEN_DROP": 0.8, "BEYOND_WIDER": 1.75}
 
 
 def multi_ring_table(lobe: Lobe, n: int) -> Floats:
@@ -47,14 +48,12 @@ def fixed_table(lobe: Lobe, n: int) -> Floats:
     return rows
 
 
-def interleaved_table(lobe: Lobe, n: int, bias: float | None = None) -> Floats:
+def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Floats:
     """`fixed_table`, then 64 spirals of n samples, one for each pixel of a tile of 8 x 8: (65 n, 4).
 
     Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/64 and
     beta = fract(TURN o): all 64 together cover the lobe's mass evenly, and so do every fourth of them.
     """
-    if bias is None:
-        bias = min(max(GUESSED_BIAS_PER_M * float(np.sqrt(lobe.mx * lobe.my)), MARCHED_BIAS), GUESSED_BIAS)
     ggx = lobe.distribution == "ggx"
     k, blocks = np.arange(n), [fixed_table(lobe, n)]
     for o in range(TILE):
@@ -65,15 +64,10 @@ def interleaved_table(lobe: Lobe, n: int, bias: float | None = None) -> Floats:
     return np.concatenate(blocks)
 
 
-def marched_table(lobe: Lobe, n: int) -> Floats:
-    """`interleaved_table` with narrower filters."""
-    return interleaved_table(lobe, n, MARCHED_BIAS)
-
-
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
-        "marched": Integrator("planar_interleaved.wgsl", marched_table, {"MARCH_STEPS": 12, "HIDDEN_DROP": 0.8}),
-        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, THREE_STEPS),
+        "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, **SHARED}),
+        "interleaved": Integrator("planar_interleaved.wgsl", interleaved_table, {"CELL_STEPS": 3, **SHARED}),
         "fixed": Integrator("planar_quadrature.wgsl", fixed_table, THREE_STEPS),
     },
     "lobe-4.24": {"thesis": Integrator("planar_thesis.wgsl", multi_ring_table, {"FORMULA": 24})},
@@ -108,4 +102,9 @@ def check_planar(integrator: str, way: str) -> None:
 
 def is_interleaved(how: Integrator) -> bool:
     """Whether neighbouring pixels sample lobes in turns, so that the picture is cleaned afterwards."""
-    return how.table in (interleaved_table, marched_table)
+    return how.table is interleaved_table
+
+
+def is_searched(how: Integrator) -> bool:
+    """Whether hits are searched for in the cells of `passes.near`."""
+    return how.constants.get("CELL_STEPS", 0) > 0

@@ -34,7 +34,7 @@ def test_ray_casting_and_a_sharp_mirror_agree() -> None:
 
 
 def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At n = 7 it is 6 dB at full size; here a tile of 4 x 4 pixels is much of the picture."""
+    """At n = 7 it is 8 dB at full size; here a tile of 8 x 8 pixels is much of the picture."""
     monkeypatch.setattr(planar_quality, "ROUGHNESSES", ((0.05, 0.05), (0.1, 0.1)))
     monkeypatch.setattr(planar_quality, "NS", (7,))
     monkeypatch.setattr(planar_quality, "SIZES", {True: (160, 120)})
@@ -42,8 +42,8 @@ def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyP
     assert len(report["rows"]) == 2 * 4
     psnr = {way: by_n["7"] for way, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["interleaved"] > psnr["thesis"] + 2
-    assert psnr["marched"] > psnr["interleaved"] + 0.3
-    assert psnr["interleaved"] > psnr["fixed"] > psnr["thesis"]
+    assert min(psnr["marched"], psnr["interleaved"]) > psnr["fixed"] + 1
+    assert psnr["fixed"] > psnr["thesis"]
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
     with pytest.raises(UserError):
         planar_quality.run(True, [Path("x.hdr")])

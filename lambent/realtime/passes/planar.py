@@ -10,10 +10,11 @@ import wgpu
 from lambent.realtime.clusters import Clusters, Seen
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.mirror import MirrorView
-from lambent.realtime.mirror_integrators import is_interleaved
+from lambent.realtime.mirror_integrators import is_interleaved, is_searched
 from lambent.realtime.parts import Band, Cut, Steps, Whole
 from lambent.realtime.passes.depth import DEPTH_FORMAT, TRIANGLES, VERTEX_BUFFERS, draw_seen
 from lambent.realtime.passes.mirror import MirrorPass
+from lambent.realtime.passes.near import NearPass
 from lambent.realtime.passes.shade import Draw, constants_of
 from lambent.realtime.resources import Layouts, SceneResources
 from lambent.realtime.shader_source import assemble
@@ -32,10 +33,13 @@ class PlanarPass:
     def __init__(self, device: Any, layouts: Layouts, resources: SceneResources, depth: Any) -> None:
         self._device, self._layouts, self._resources = device, layouts, resources
         self._mirror = MirrorPass(device, layouts, resources, depth)
+        self._near = NearPass(device, layouts)
         self._materials = {name: buffers.twin() for name, buffers in resources.materials.items()}
         # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. Shading's light maps, which have the same
         # numbers, are not read here.
-        self._look_up = self._group_layout({"buffer": {"type": "uniform"}}, {"texture": _FLAT}, {"texture": _EXACT})
+        self._look_up = self._group_layout(
+            {"buffer": {"type": "uniform"}}, {"texture": _FLAT}, *[{"texture": _EXACT}] * 2
+        )
         self.shown_layout = self._group_layout(*[{"texture": _FLAT}] * 2, *[{"texture": _EXACT}] * 5)
         self._clean_layout = self._group_layout(*[{"texture": _EXACT}] * 2)
         self._clean = self._clean_pipeline()
@@ -68,6 +72,8 @@ class PlanarPass:
         for index, view in enumerate(views):
             calls += yield from self._mirror.encode(part, index, view, mirrored, clusters, timer)
             mine = [self._planar(draw, how) for draw in draws if _is_part(draw, view)]
+            if is_searched(how):
+                self._near.encode(part.encoder, self._mirror.picture(view.size), self._mirror.uniform(index), timer)
             for band in part.bands("planar", self._size):
                 seen = clusters.seen(clip_from_world, band.shares)
                 calls += self._encode_light(part.encoder, index, view, mine, seen, band, frame_group, target, timer)
@@ -90,7 +96,8 @@ class PlanarPass:
         target: Target, timer: PassTimer,
     ) -> int:  # fmt: skip
         picture = self._mirror.picture(view.size)
-        group = self._layouts.group(self._look_up, self._mirror.uniform(index), picture.light_view, picture.planes_view)
+        uniform, near = self._mirror.uniform(index), self._near.view(view.size)
+        group = self._layouts.group(self._look_up, uniform, picture.light_view, picture.planes_view, near)
         kept = {"load_op": "load" if index else band.load_op, "store_op": "store"}
         render = encoder.begin_render_pass(
             color_attachments=[{"view": texture.create_view(), **kept} for texture in self._light],
@@ -142,7 +149,7 @@ class PlanarPass:
 
     def _pipeline(self, draw: Draw) -> Any:
         constants = constants_of(draw)
-        key = (draw.integrator.shader, *constants.values())
+        key = (draw.integrator.shader, *constants.items())
         if key not in self._pipelines:
             code = assemble("diffuse.wgsl", "probe_light.wgsl", "shade.wgsl", draw.integrator.shader)
             module = self._device.create_shader_module(code=code)

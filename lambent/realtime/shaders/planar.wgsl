@@ -3,26 +3,12 @@
 //
 // Places are kept about the mirror eye e: q = p - e. A plane is N towards e and N.q, both of the same picture.
 
-struct Mirror { // MIRROR_DTYPE in mirror.py
-    eye: vec4f,
-    row_x: vec4f, // q to clip x, y and w
-    row_y: vec4f,
-    row_w: vec4f,
-    plane: vec4f, // of the reflector, n towards the viewer
-    across: vec4f, // the ray of clip position (x, y) is forward + x across + y up
-    up: vec4f,
-    forward: vec4f,
-    size: vec2f,
-    offset: vec2f,  // of the frame in the mirror picture
-    tolerance: f32, // m: how far the reflector's pixels may lie from its plane
-    focal_px: f32,
-    levels: f32,
-    number: f32, // of the reflector in this frame
-}
+#include "planar_mirror.wgsl"
 
 @group(3) @binding(0) var<uniform> mirror: Mirror;
 @group(3) @binding(1) var mirror_light: texture_2d<f32>;
 @group(3) @binding(2) var mirror_planes: texture_2d<f32>;
+@group(3) @binding(3) var mirror_near: texture_2d<f32>; // of planar_near.wgsl
 
 override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the mirror picture shows something else before it
 

@@ -1,6 +1,6 @@
 // The first surface along a ray that the mirror picture shows, searched for step by step across the picture.
 
-override MARCH_STEPS: u32 = 24u; // 0: the three steps of find_hit alone
+override MARCH_STEPS: u32 = 24u;
 
 // Distance at which a ray leaves the mirror picture.
 fn exit_distance(q: vec3f, w: vec3f) -> f32 {
@@ -25,7 +25,6 @@ fn hit_behind(place: Place, w: vec3f, free: f32) -> Hit {
 // Steps are even in the picture but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
 // hit where the ray meets the plane seen at its end within the step. No branch: see planar_quadrature.
 fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
-    if (MARCH_STEPS == 0u) { return find_hit(place, w); }
     let guess = find_hit(place, w);
     let again = meet(plane_at(guess.texel), place.q, w, guess.t);
     let settled = is_shown(guess.plane) && abs(again - guess.t) < 0.03 * guess.t; // only what is nearer can be the hit
