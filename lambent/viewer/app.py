@@ -20,6 +20,7 @@ from lambent.store.store import Store
 from lambent.viewer.comparison import Comparison
 from lambent.viewer.filming import FilmOptions
 from lambent.viewer.input import Input, Rect
+from lambent.viewer.lost import kept
 from lambent.viewer.picking import Geometry
 from lambent.viewer.picture import CHOICES
 from lambent.viewer.pictures import Pictures
@@ -78,17 +79,13 @@ def run(
     geometry = Geometry(scene.positions, scene.faces, scene.record.objects)
     pictures = Pictures(Renderer(open_device(device_needs(scene)), scene))
     window = Window(state, geometry, pictures, size=size, frames=frames)
-    try:
-        window.run()
-    except Exception:
-        for rescued in state.rescue_materials():
-            sys.stderr.write(f"lambent: note: an unsaved material is in {rescued}\n")
-        raise
-    finally:
-        pictures.close(state)
-        kept = state.keep_recording()
-        if kept is not None:
-            sys.stderr.write(f"lambent: note: the recorded walk was saved as {kept!r}\n")
+    with kept(state, end=lambda: pictures.close(state)):
+        try:
+            window.run()
+        finally:
+            pictures.close(state)
+    for place in state.rescue_recording():
+        sys.stderr.write(f"lambent: note: the recorded walk is in {place}\n")
     if state.unsaved:
         sys.stderr.write(f"lambent: note: {', '.join(state.unsaved)} changed and not saved\n")
 

@@ -113,6 +113,13 @@ def walk(
     return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))
 
 
+def standing(camera: CameraRecord, bounds: Bounds, floor_y: float | None, height_m: float) -> CameraRecord:
+    """The camera with its eye `height_m` above `floor_y` (the scene's lowest point where it is None)."""
+    down = np.array([0.0, (bounds[0][1] if floor_y is None else floor_y) + height_m - camera.position[1], 0.0])
+    eye, target = np.array(camera.position) + down, np.array(camera.target) + down
+    return _placed(camera, eye, target)
+
+
 def eye_height_m(bounds: Bounds) -> float:
     """`EYE_HEIGHT_M`, or 60 % of the height of a scene that is too low to stand in."""
     height = bounds[1][1] - bounds[0][1]

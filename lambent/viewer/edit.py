@@ -19,6 +19,7 @@ from lambent.viewer.editor.measurement import Measurement, read_measurement
 from lambent.viewer.editor.preview import OBJECT, Preview, preview_record
 from lambent.viewer.editor.stage import Stage
 from lambent.viewer.editor.start import start_material
+from lambent.viewer.lost import kept
 from lambent.viewer.picking import Geometry
 from lambent.viewer.picture import CHOICES
 from lambent.viewer.state import ViewerState
@@ -57,13 +58,8 @@ def run(
     geometry = Geometry(ball.positions, ball.faces, ())
     editor = state.editor
     window = Window(state, geometry, Stage(open_device()), size=size, frames=frames)
-    try:
+    with kept(state):
         window.run()
-    except Exception:
-        if editor is not None and editor.unsaved:
-            rescued = editor.rescue()
-            sys.stderr.write(f"lambent: note: the unsaved material is in {rescued}\n")
-        raise
     if editor is not None and editor.unsaved:
         sys.stderr.write(f"lambent: note: {editor.name} was changed and not saved\n")
 

@@ -73,6 +73,7 @@ class Input:
     _at: tuple[float, float] = (0.0, 0.0)
     _moved_px: float = 0.0
     _on_divider: bool = False
+    _flew: bool = False
 
     @property
     def walking(self) -> bool:
@@ -104,7 +105,12 @@ class Input:
                 self._key(state, event["key"], event["modifiers"])
 
     def walk(self, state: ViewerState, dt_s: float) -> None:
-        """Let the held keys carry the eye for `dt_s` seconds."""
+        """Let the held keys carry the eye for `dt_s` seconds; who has just stopped flying comes down."""
+        flew, self._flew = self._flew, state.flying and state.mode == "walk"
+        if flew and not self._flew and state.mode == "walk" and not state.playing:
+            position, height_m = state.camera.position, state.walker.eye_height_m
+            floor_y = self.geometry.floor_below(position, height_m)
+            state.move(cameras.standing(state.camera, state.scene.bounds, floor_y, height_m))
         if not self.walking or state.mode != "walk":
             return
         bounds = state.scene.bounds

@@ -17,7 +17,7 @@ from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, Scene
 from lambent.viewer import cameras
 from lambent.viewer.metering import Meter
 from lambent.viewer.recorder import Recorder
-from lambent.viewer.views import SavedViews
+from lambent.viewer.views import SavedViews, write_alone
 
 if TYPE_CHECKING:
     from lambent.viewer.comparison import Comparison
@@ -261,7 +261,9 @@ class ViewerState:
 
     @property
     def unsaved(self) -> tuple[str, ...]:
-        """Materials that are neither the scene's nor as they were saved."""
+        """Materials that are neither the scene's nor as they were saved; of the editor's own window, its material."""
+        if self.preview is not None and self.editor is not None:
+            return (self.editor.name,) if self.editor.unsaved else ()
         saved = dict(self.saved)
         if self.editor is not None and self.editor.saved is not None:
             saved[self.editor.name] = self.editor.saved
@@ -273,12 +275,24 @@ class ViewerState:
         """Write what was not saved to files of new names, because the window is about to be lost."""
         written = []
         for name in self.unsaved:
-            stem, number = plain_name(name), 1
-            while (path := self.folder / f"{stem}-rescued-{number:03}.json").exists():
-                number += 1
-            self.edits.current(name).save(path)
+            material = self.edits.current(name)
+            path = rescue_file(self.folder, material.name or name)
+            material.save(path)
             written.append(path)
         return tuple(written)
+
+    def rescue_recording(self) -> tuple[str, ...]:
+        """Save what was recorded; where the store cannot take it, write a `views.json` that holds it into `folder`."""
+        name = self.keep_recording()
+        if name is not None:
+            return (f"the store as {name!r}",)
+        draft = self.recorder.draft
+        if self.views is None or draft is None:
+            return ()
+        name = self.recorder.name.strip() or self.views.free_path_name()
+        path = rescue_file(self.folder, name)
+        write_alone(path, draft.model_copy(update={"name": name}))
+        return (f"{path}, a views.json for a store",)
 
     # views and recordings
 
@@ -413,6 +427,14 @@ class ViewerState:
 def plain_name(name: str) -> str:
     """A name of a file for any name of a material."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or "material"
+
+
+def rescue_file(folder: Path, name: str) -> Path:
+    """A file that is not there yet, for what would else be lost."""
+    stem, number = plain_name(name), 1
+    while (path := folder / f"{stem}-rescued-{number:03}.json").exists():
+        number += 1
+    return path
 
 
 def file_in(folder: Path, file_name: str) -> Path:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from lambent.core.errors import UserError
+from lambent.core.files import write_text
 from lambent.store.camera_paths import TimedPath
 from lambent.store.contract import CameraRecord, SceneRecord
 from lambent.store.views import Views, change_views, checked_name, free_name, read_views, with_views
@@ -118,6 +120,9 @@ class SavedViews:
         if self.folder is None:
             self.say("not saved: there is no store")
             return False
+        if not self.folder.is_dir():
+            self.say(f"not saved: the store is gone: {self.folder}")  # and a folder with nothing but views is none
+            return False
         try:
             self._take(change_views(self.folder, change))
         except UserError as error:
@@ -127,3 +132,8 @@ class SavedViews:
 
     def _take(self, views: Views) -> None:
         self._views = views
+
+
+def write_alone(file: Path, path: TimedPath) -> None:
+    """A `views.json` of another name that holds one path, for a store that is not there."""
+    write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")

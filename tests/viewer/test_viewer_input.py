@@ -174,3 +174,14 @@ def test_the_walkers_own_pace(mouse, state):
     send(mouse, state, "key_down", key="w")
     mouse.walk(state, 0.2)
     assert before[2] - state.camera.position[2] == pytest.approx(0.1)
+
+
+def test_who_stops_flying_comes_down(mouse, state):
+    send(mouse, state, "key_down", key="f")
+    mouse.walk(state, 0.0)
+    state.camera = state.camera.model_copy(update={"position": (2.0, 2.4, 2.0), "target": (2.0, 2.4, 1.0)})
+    mouse.walk(state, 0.0)
+    assert state.camera.position[1] == 2.4
+    send(mouse, state, "key_down", key="f")
+    mouse.walk(state, 0.0)
+    assert state.camera.position == pytest.approx((2.0, 1.6, 2.0)) and state.camera.target[1] == pytest.approx(1.6)

@@ -247,14 +247,6 @@ class Editor:
             self.saved = material
             self.say(f"saved {path}")
 
-    def rescue(self) -> Path:
-        """Write the material to a file of a new name, because the window is about to be lost."""
-        number = 1
-        while (path := self.folder / f"{_plain(self.material.name)}-rescued-{number:03}.json").exists():
-            number += 1
-        self.material.save(path)
-        return path
-
     def may_replace(self, path: Path) -> None:
         """Saving to `path` needs no second try: the material came from there."""
         self._may_replace.add(path.resolve())

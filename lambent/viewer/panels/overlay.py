@@ -25,7 +25,7 @@ FLAGS = (
 def draw(state: ViewerState, picture: Rect) -> None:
     lines = [message.text for message in state.messages]
     s = state.statistics
-    if 0 < s.accumulated < s.accumulate_to:
+    if 0 < s.accumulated < s.accumulate_to and state.filming is None:  # which has the adapter to itself
         lines.append(f"refining: {s.accumulated} of {s.accumulate_to}")
     _scale_bar(state, picture)
     _readout(state, picture)

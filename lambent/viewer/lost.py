@@ -1,0 +1,94 @@
+"""What is kept when the window is lost: by an error, a signal, or a display that goes away.
+
+An X server that dies ends the process from within Xlib, past every `finally` and `atexit` of Python; Xlib offers one
+call before it does. A process that is killed outright (SIGKILL), or dies in the graphics driver, keeps nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.viewer.state import ViewerState
+
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+LIBX11 = "libX11.so.6"
+_IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+
+
+def keep(state: ViewerState) -> None:
+    """Write what was not saved to files of new names, and say where on stderr."""
+    for what, write in (("an unsaved material", state.rescue_materials), ("the recorded walk", state.rescue_recording)):
+        try:
+            for place in write():
+                sys.stderr.write(f"lambent: note: {what} is in {place}\n")
+        except (UserError, OSError) as error:
+            sys.stderr.write(f"lambent: note: {what} could not be kept: {error}\n")
+
+
+@contextmanager
+def kept(state: ViewerState, end: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """While the window is open: where it is lost, keep what was not saved and call `end`.
+
+    Signals that end a process, and Xlib's error of the connection, are taken over inside and given back after.
+    """
+    over = False
+
+    def lost() -> None:
+        nonlocal over
+        if not over:
+            over = True  # what follows may fail in its turn
+            keep(state)
+            end()
+
+    def on_signal(number: int, _: FrameType | None) -> None:
+        lost()
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+
+    def on_io_error(_: Any) -> int:
+        try:
+            lost()
+        finally:
+            sys.stderr.write("lambent: error: the connection to the display was lost\n")
+            sys.stderr.flush()
+            os._exit(1)  # Xlib would do the same, by way of the graphics driver's own farewells
+        return 0
+
+    main = threading.current_thread() is threading.main_thread()
+    mine = [number for number in SIGNALS if main and signal.getsignal(number) == signal.SIG_DFL]
+    for number in mine:
+        signal.signal(number, on_signal)
+    handler = _IoErrorHandler(on_io_error)  # kept alive until it is given back
+    xlib = _xlib()
+    before = xlib.XSetIOErrorHandler(ctypes.cast(handler, ctypes.c_void_p)) if xlib is not None else None
+    try:
+        yield
+    except Exception:
+        lost()
+        raise
+    finally:
+        if xlib is not None:
+            xlib.XSetIOErrorHandler(before)
+        for number in mine:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _xlib() -> Any:
+    """Xlib, the one that the window uses; None where there is none."""
+    if not sys.platform.startswith("linux") or not os.environ.get("DISPLAY"):
+        return None
+    try:
+        xlib = ctypes.CDLL(LIBX11)
+    except OSError:
+        return None
+    xlib.XSetIOErrorHandler.argtypes, xlib.XSetIOErrorHandler.restype = (ctypes.c_void_p,), ctypes.c_void_p
+    return xlib

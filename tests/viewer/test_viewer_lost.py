@@ -1,0 +1,95 @@
+"""What is kept when the window is lost."""
+
+import os
+import shutil
+import signal
+
+import pytest
+
+from lambent.materials.document import load_material
+from lambent.store.contract import CameraRecord
+from lambent.store.views import Views
+from lambent.viewer.lost import kept
+from lambent.viewer.state import ViewerState
+from lambent.viewer.views import SavedViews
+from tests.viewer.small_store import write_small_store
+from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
+
+
+@pytest.fixture
+def state(scene, choices, tmp_path, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    (tmp_path / "store").mkdir()
+    state = ViewerState.of(scene, choices, "walk", folder=tmp_path)
+    state.views = SavedViews(scene, tmp_path / "store", state.say)
+    state.now_s = 0.0
+    state.clock = lambda: state.now_s
+    return state
+
+
+def walk_and_edit(state):
+    state.edits.change("brass", state.scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)}))
+    state.record()
+    for k in range(1, 20):
+        state.now_s = 0.1 * k
+        state.camera = CameraRecord(name="free", position=(0.1 * k, 1.6, 0), target=(0.1 * k, 1.6, -1))
+        state.recorder.take(state.camera, state.now_s)
+
+
+def test_an_error_keeps_the_material_and_the_walk_once(state, tmp_path, capsys):
+    walk_and_edit(state)
+    ended = []
+    with pytest.raises(ZeroDivisionError), kept(state, end=lambda: ended.append(1)):
+        raise ZeroDivisionError
+    assert load_material(tmp_path / "brass-rescued-001.json").kd == (0.3, 0.3, 0.3)
+    assert [path.name for path in state.views.paths] == ["walk 1"] and ended == [1]
+    assert "brass-rescued-001.json" in capsys.readouterr().err
+    assert not (tmp_path / "brass-rescued-002.json").exists()
+
+
+def test_closing_in_order_keeps_nothing_aside(state, tmp_path):
+    walk_and_edit(state)
+    before = signal.getsignal(signal.SIGTERM)
+    with kept(state):
+        assert signal.getsignal(signal.SIGTERM) != before
+    assert signal.getsignal(signal.SIGTERM) == before
+    assert [p.name for p in tmp_path.iterdir()] == ["store"]
+
+
+def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
+    walk_and_edit(state)
+    shutil.rmtree(tmp_path / "store")
+    state.save_view()
+    assert "the store is gone" in state.messages[-1].text and not (tmp_path / "store").exists()
+    (said,) = state.rescue_recording()
+    file = tmp_path / "walk 1-rescued-001.json"
+    assert str(file) in said
+    assert [p.name for p in Views.model_validate_json(file.read_text()).paths] == ["walk 1"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["display", "SIGTERM"])
+def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    screen = VirtualScreen()
+    session = WindowSession(screen, write_small_store(tmp_path / "store"), tmp_path)
+    try:
+        session.click(135, 200)
+        session.wait_for(lambda state: state["selected"] == "ball")
+        for header in ("Scene", "View"):
+            session.click(*session.point(header, 0.3))
+        session.drag(session.point("mx", 0.5), session.point("mx", 0.8))
+        seen = session.wait_for(lambda state: state["edited"])
+        if how == "display":
+            screen.close()
+        else:
+            os.kill(session.process.pid, signal.SIGTERM)
+        code = session.process.wait(40)
+    finally:
+        session.kill()
+        screen.close()
+    assert code == (1 if how == "display" else -signal.SIGTERM), session.log()
+    rescued = load_material(tmp_path / "brass-rescued-001.json")
+    assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
+    assert "brass-rescued-001.json" in session.log()
