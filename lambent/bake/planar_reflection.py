@@ -19,7 +19,7 @@ from lambent.materials.document import Lobe
 from lambent.scenes.scene import Scene, Triple
 
 Array = NDArray[np.floating]
-RAYS_AT_ONCE = 1 << 23
+RAYS_AT_ONCE = 1 << 21  # a few hundred MiB, and progress every second or so
 WIDE = 1e-3  # mx my of a lobe from which on rays to lamps are worth theirs
 
 

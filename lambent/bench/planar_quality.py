@@ -37,6 +37,7 @@ NS = (3, 5, 7, 9, 11, 15, 19)
 ROUGHNESSES = ((0.01, 0.01), (0.02, 0.02), (0.05, 0.05), (0.1, 0.1), (0.2, 0.2), (0.02, 0.1), (0.1, 0.02))
 SIZES = {True: (192, 144), False: (1024, 768)}  # by quick
 SPP = {True: 64, False: 512}
+STEPS = 1000  # of progress per lobe
 
 
 def lobe_of(mx: float, my: float) -> Lobe:
@@ -52,26 +53,42 @@ def run(quick: bool, inputs: list[Path], progress: Progress = silent) -> dict[st
     width, height = SIZES[quick]
     renderer = Renderer(device, planar_scene.planar_scene(lobe_of(*ROUGHNESSES[0])))
     rows: list[dict[str, Any]] = []
+    converged_errors: list[dict[str, Any]] = []
     for done, (mx, my) in enumerate(ROUGHNESSES):
-        lobe = lobe_of(mx, my)
-        exact, floor = planar_scene.exact_reflection(lobe, planar_scene.CAMERA, width, height, SPP[quick])
+        lobe, name = lobe_of(mx, my), f"roughness {mx}/{my}"
+        exact, floor = planar_scene.exact_reflection(
+            lobe, planar_scene.CAMERA, width, height, SPP[quick], _within(progress, done, 0.0, f"{name}, exact")
+        )
         state = FrameState(
             planar_scene.CAMERA, width, height, show="specular", antialias=False,
             materials={planar_scene.FLOOR: planar_scene.floor_material(lobe)},
         )  # fmt: skip
-        converged = None if quick else renderer.converged(state, SPP[quick])
+        converged = None
+        if not quick:
+            converged = renderer.converged(state, SPP[quick], _within(progress, done, 0.5, f"{name}, converged"))
+            converged_errors.append({"mx": mx, "my": my} | _errors(converged, exact, floor))
         for n in NS:
             for way, (integrator, planar) in WAYS.items():
                 image = renderer.image(replace(state, integrator=integrator, planar=planar, n=n))
                 row = {"mx": mx, "my": my, "n": n, "way": way}
                 rows.append(row | errors(image, exact, converged, floor))
-        progress(done + 1, len(ROUGHNESSES), f"roughness {mx}/{my}")
+        progress((done + 1) * STEPS, len(ROUGHNESSES) * STEPS, name)
     return {
         "machine": machine(device),
         "inputs": inputs_of(inputs),
         "rows": rows,
-        "summary": summary(rows),
+        "converged": converged_errors,
+        "summary": {"width": width, "height": height, "spp": SPP[quick], **summary(rows, converged_errors)},
     }
+
+
+def _within(progress: Progress, lobe: int, begin: float, label: str) -> Progress:
+    """Progress of one half of a lobe's work as that of the whole bench."""
+
+    def said(done: int, total: int, _: str) -> None:
+        progress(int(STEPS * (lobe + begin + 0.5 * done / max(total, 1))), len(ROUGHNESSES) * STEPS, label)
+
+    return said
 
 
 def errors(image: Floats, exact: Floats, converged: Floats | None, floor: NDArray[np.bool_]) -> dict[str, float | None]:
@@ -94,8 +111,8 @@ def _errors(image: Floats, truth: Floats, floor: NDArray[np.bool_]) -> dict[str,
     }
 
 
-def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Means over the lobes by way and n; of the worst tiles the worst."""
+def summary(rows: list[dict[str, Any]], converged: list[dict[str, Any]]) -> dict[str, Any]:
+    """Means over the lobes by way and n, and of the converged picture's own error; of the worst tiles the worst."""
     groups: dict[tuple[str, int], list[dict[str, Any]]] = defaultdict(list)
     for row in rows:
         groups[row["way"], row["n"]].append(row)
@@ -107,4 +124,12 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     said["flip_worst_tile_path"] = {
         way: {str(n): max(r["flip_worst_tile_path"] for r in groups[way, n]) for n in NS} for way in WAYS
     }
+    if converged:
+        means = {
+            name: round(float(np.mean([c[name] for c in converged])), 4) for name in ("psnr", "flip", "flip_floor")
+        }
+        said["converged_path"] = means | {"flip_worst_tile": max(c["flip_worst_tile"] for c in converged)}
+        said["psnr_qmc"] = {
+            way: {str(n): round(float(np.mean([r["psnr_qmc"] for r in groups[way, n]])), 4) for n in NS} for way in WAYS
+        }
     return said

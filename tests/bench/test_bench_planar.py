@@ -49,6 +49,20 @@ def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyP
         planar_quality.run(True, [Path("x.hdr")])
 
 
+def test_the_whole_run_tells_how_far_the_converged_picture_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planar_quality, "ROUGHNESSES", ((0.05, 0.05),))
+    monkeypatch.setattr(planar_quality, "NS", (7,))
+    monkeypatch.setattr(planar_quality, "SIZES", {False: (64, 48)})
+    monkeypatch.setattr(planar_quality, "SPP", {False: 128})
+    steps: list[float] = []
+    report = planar_quality.run(False, [], lambda done, total, what: steps.append(done / total))
+    summary = report["summary"]
+    assert (summary["width"], summary["height"], summary["spp"]) == (64, 48, 128)
+    assert summary["converged_path"]["psnr"] > summary["psnr_path"]["fixed"]["7"]
+    assert summary["psnr_qmc"]["marched"]["7"] > summary["psnr_qmc"]["thesis"]["7"]
+    assert len(steps) >= 3 and steps == sorted(steps) and steps[-1] == 1
+
+
 def test_times_of_planes_come_in_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     from lambent.bench import walk_cube
 
