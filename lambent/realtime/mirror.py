@@ -27,7 +27,7 @@ CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plan
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
 
-MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar.wgsl
+MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar_mirror.wgsl
     [
         ("eye", "f4", 4), ("row_x", "f4", 4), ("row_y", "f4", 4), ("row_w", "f4", 4), ("plane", "f4", 4),
         ("across", "f4", 4), ("up", "f4", 4), ("forward", "f4", 4),
