@@ -52,8 +52,8 @@ def test_drag_looks_and_w_walks(session):
     session.drag((60, 200), (140, 220))
     turned = session.wait_for(lambda state: state["camera"]["target"] != list(FRONT.target))
     assert turned["camera"]["position"] == list(FRONT.position)
-    session.hold("w", 0.6)
-    walked = session.wait_for(lambda state: math.dist(state["camera"]["position"], FRONT.position) > 0.2)
+    session.hold("w", lambda state: math.dist(state["camera"]["position"], FRONT.position) > 0.2)
+    walked = session.state()
     assert walked["camera"]["position"][1] == pytest.approx(1.6)
 
 
@@ -85,10 +85,7 @@ def test_a_slider_changes_the_material_and_not_the_camera(session):
 def test_it_refines_then_sleeps_and_wakes(session):
     done = session.wait_for(lambda state: state["accumulated"] >= 128)
     assert done["integrator"] == "qmc"
-    session.settle()
-    frames = session.state()["frames"]
-    session.settle()
-    assert session.state()["frames"] <= frames + 2, "frames are drawn although nothing changes"
+    frames = session.sleeps()["frames"]
     session.move(100, 100)
     session.wait_for(lambda state: state["frames"] > frames)
     assert session.state()["accumulated"] == done["accumulated"], "hovering must not start the picture anew"
@@ -111,7 +108,7 @@ def test_views_and_walks_are_saved_with_keys(session, store):
     session.tool("key", "v")
     session.wait_for(lambda state: any(m == "saved the view view 1" for m in state["messages"]))
     session.tool("key", "1", "r")
-    session.hold("w", 0.8)
+    session.hold("w", lambda state: state["camera"]["position"][2] < FRONT.position[2] - 0.3)
     session.tool("key", "r")
     session.wait_for(lambda state: any(m.startswith("recorded ") for m in state["messages"]))
     session.click(*session.point("save path##path name"))
@@ -119,7 +116,7 @@ def test_views_and_walks_are_saved_with_keys(session, store):
     views = read_views(store)
     assert [c.name for c in views.cameras] == ["view 1"] and views.cameras[0].position == FRONT.position
     (walk,) = views.paths
-    assert walk.keys[-1].position[2] < FRONT.position[2] - 0.2 and walk.seconds < 5
+    assert walk.keys[-1].position[2] < FRONT.position[2] - 0.2
 
 
 def test_close(window):

@@ -16,13 +16,20 @@ from tests.viewer.panel_driver import recording
 store, out, size = Path(sys.argv[1]), Path(sys.argv[2]), tuple(map(int, sys.argv[3].split("x")))
 
 
+MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
+
+
 class WatchedWindow(app.Window):
-    frames_drawn = 0
+    frames_drawn = marks_seen = 0
 
     def __init__(self, *args, **kwargs):
         self.rects = {}
         recording(setattr, self.rects)
         super().__init__(*args, **kwargs)
+
+    def _on_event(self, event):
+        super()._on_event(event)
+        self.marks_seen += event["event_type"] == "key_down" and event["key"] == MARK
 
     def _schedule(self):
         super()._schedule()
@@ -30,6 +37,8 @@ class WatchedWindow(app.Window):
         state = self.state
         seen = {
             "frames": self.frames_drawn,
+            "marks": self.marks_seen,
+            "settled": self._extra_frames == 0,
             "camera": state.camera.model_dump(),
             "mode": state.mode,
             "selected": state.selected,

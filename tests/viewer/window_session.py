@@ -11,8 +11,9 @@ from pathlib import Path
 from tests.viewer.panel_driver import point_of
 
 ROOT = Path(__file__).parents[2]
-PAUSE_S = 0.4  # between the steps of a drag; quicker ones are merged into one event
-PATIENCE_S = 40.0  # software adapters on a busy machine
+PATIENCE_S = 120.0  # software adapters on a busy machine
+ASLEEP_S = 1.0  # without a frame
+MARK = "F12"  # see watched_window
 
 
 def missing_tools():
@@ -80,19 +81,30 @@ class WindowSession:
             time.sleep(0.05)
 
     def settle(self):
-        """Let the window answer what was sent."""
-        frames = self.state()["frames"]
-        time.sleep(PAUSE_S)
-        self.wait_for(lambda state: state["frames"] >= frames)
+        """Let the window answer what was sent: a key that means nothing comes after it, and is waited for."""
+        marks = self.state()["marks"]
+        self.tool("key", MARK)
+        self.wait_for(lambda state: state["marks"] > marks and state["settled"])
+
+    def sleeps(self):
+        """Wait until the window draws nothing for a while; the state then."""
+        last = [-1, time.monotonic()]
+
+        def asleep(state):
+            if state["frames"] != last[0]:
+                last[:] = state["frames"], time.monotonic()
+            return time.monotonic() - last[1] > ASLEEP_S
+
+        return self.wait_for(asleep)
 
     def move(self, x, y):
         self.tool("mousemove", "--window", self.id, round(x), round(y))
-        time.sleep(PAUSE_S)
+        self.settle()
 
     def drag(self, begin, end, button=1):
         self.move(*begin)
         self.tool("mousedown", button)
-        time.sleep(PAUSE_S)
+        self.settle()
         for share in (0.4, 0.7, 1.0):
             self.move(*(a + share * (b - a) for a, b in zip(begin, end, strict=True)))
         self.tool("mouseup", button)
@@ -101,14 +113,17 @@ class WindowSession:
     def click(self, x, y):
         self.move(x, y)
         self.tool("mousedown", 1)
-        time.sleep(PAUSE_S)
+        self.settle()
         self.tool("mouseup", 1)
         self.settle()
 
-    def hold(self, key, seconds):
+    def hold(self, key, until):
+        """Hold a key until the state meets a condition."""
         self.tool("keydown", key)
-        time.sleep(seconds)
-        self.tool("keyup", key)
+        try:
+            self.wait_for(until)
+        finally:
+            self.tool("keyup", key)
         self.settle()
 
     def point(self, label, along=0.5):
