@@ -13,8 +13,10 @@ Each step writes what it made under one folder and hands the next only that, as 
 from __future__ import annotations
 
 import json
+import multiprocessing
 import time
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +43,8 @@ STILLS = 8
 class Effort:
     """Sizes of one kind of demo: pictures in pixels, film in seconds, samples per pixel of the compared view.
 
-    `tuples` is how many of a table's tuples are fitted, all where None; `still_frames` how many frames make a still.
+    `tuples` is how many of a table's tuples are fitted, all where None; `still_frames` how many frames make a still,
+    `moving_frames` how many the view in motion, so that its edges can be compared.
     """
 
     quality: Quality
@@ -54,11 +57,12 @@ class Effort:
     compared: tuple[int, int]
     path_spp: int
     qmc_spp: int
+    moving_frames: int = 16
 
 
 DRAFT = Quality("draft", 192, (16, 16), 0.5, 6, 128, 64, 8, gather_samples=64)
 FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (800, 500), 5.0, 20, (840, 525), 48, 256)
-QUICK = Effort(DRAFT, 3_000, (1120, 700), 1, (640, 400), 3.0, 10, (420, 262), 32, 128)
+QUICK = Effort(DRAFT, 3_000, (1120, 700), 1, (640, 400), 3.0, 10, (420, 262), 32, 128, 4)
 
 
 class Flow:
@@ -67,6 +71,8 @@ class Flow:
     def __init__(self, out: Path, effort: Effort, progress: Progress) -> None:
         self.out, self.effort, self.progress = Path(out), effort, progress
         self.report: dict[str, Any] = {"seconds": {}, "fits": {}}
+        self._plots = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+        self._plotted: list[Future[list[Path]]] = []
         self.out.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -76,8 +82,14 @@ class Flow:
     def prepare(self) -> Scene:
         """Everything before the walk; returns the scene as it was baked."""
         tables = self.measure()
-        scene = self.place(self.fit(tables))
-        self.bake(scene)
+        try:
+            scene = self.place(self.fit(tables))
+            self.bake(scene)
+            with self._timed("plot"):  # what is left of it
+                for plotted in self._plotted:
+                    plotted.result()
+        finally:
+            self._plots.shutdown(wait=False, cancel_futures=True)
         return scene
 
     def measure(self) -> dict[str, Path]:
@@ -93,7 +105,10 @@ class Flow:
         return paths
 
     def fit(self, tables: Mapping[str, Path]) -> dict[str, Path]:
-        """Material documents fitted to the table files, with a plot beside each."""
+        """Material documents fitted to the table files, with a plot beside each.
+
+        Plots are drawn by a process of their own while the bake goes on: both have times when they use one core.
+        """
         from lambent.materials import measured
         from lambent.materials.fitting.fit import fit
         from lambent.materials.fitting.plot import save_plots
@@ -105,8 +120,7 @@ class Flow:
                 result = fit(samples, source=path, progress=self.progress)
                 paths[name] = self.out / "materials" / f"{name}.json"
                 result.material.model_copy(update={"name": name}).save(paths[name])
-            with self._timed("plot"):
-                save_plots(samples, result.material, paths[name].parent, name)
+            self._plotted.append(self._plots.submit(save_plots, samples, result.material, paths[name].parent, name))
             self.report["fits"][name] = {
                 "seconds": result.seconds,
                 "errors": result.errors,
@@ -190,7 +204,8 @@ class Flow:
         )
         with self._timed("frame at rest"):
             rest = renderer.converged(state, self.effort.qmc_spp, self.progress)
-        moving = renderer.still_radiance(state)
+        with self._timed("frame in motion"):
+            moving = renderer.still_radiance(state, self.effort.moving_frames)
         with self._timed("path tracing"):
             truth, _ = render_reference(
                 scene, camera, *self.effort.compared, self.effort.path_spp, progress=self.progress
