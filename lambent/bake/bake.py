@@ -32,6 +32,7 @@ from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 from lambent.store.contract import (
+    LEAN,
     SIDES,
     TIMINGS,
     CameraRecord,
@@ -105,6 +106,7 @@ def bake(
         if kind in kinds:
             step()
     if "light_map" in kinds:
+        job.lean()
         job.noise()
     return job.store
 
@@ -284,6 +286,23 @@ class _Bake:
                 meta = self._meta(integrator=self.integrator, **meta)
                 self.store.put(name, "light_map", clean, key=self.irradiance_key, meta=meta)
 
+    def lean(self) -> None:
+        """Where the light comes from on surfaces with a normal map."""
+        bent = {name for name, textures in self.scene.textures.items() if textures.normal}
+        ours = np.repeat(
+            [o.material in bent for o in self.scene.objects], [len(o.mesh.faces) for o in self.scene.objects]
+        )
+        if not ours.any() or self._current(LEAN, self.irradiance_key):
+            return
+        from lambent.bake.light_lean import lean_of, leaning
+        from lambent.bake.probe import LightMapCache
+
+        front, back = self._finished_maps()
+        how = leaning(LightMapCache(self.ground.builder(diffuse=False), front, back), self.quality.max_depth)
+        raw, _ = self._samples(SIDES[0], "leaning", how, ours)
+        lean = lean_of(raw, front, self.ground.labels)
+        self.store.put(LEAN, "light_map", lean, key=self.irradiance_key, meta=self._meta())
+
     def noise(self) -> None:
         """How exact the light map is at every texel, from the samples that stay in the store."""
         count = 2 if any(self._two_sided) else 1
@@ -305,6 +324,11 @@ class _Bake:
             noise = noise_map(halves, known, self.ground.labels)
             self.store.put(name, "light_map", noise, key=self.irradiance_key, meta=self._meta())
 
+    def _finished_maps(self) -> tuple[Array, Array | None]:
+        """The light map of both sides, that of the far one where there is any."""
+        back = "light_map/irradiance_back"
+        return self.store.read("light_map/irradiance"), self.store.read(back) if back in self.store else None
+
     def _photon_maps(self, count: int) -> list[tuple[Array, dict[str, float]]]:
         """Both sides' maps, denoised, and what to note of them; the batches stay as `light_map/photons`."""
         from lambent.bake.photon_map import Shots, finished, shape_of, shoot_batches
@@ -322,8 +346,21 @@ class _Bake:
         return finished(self.store.read(name), self.merged, sides, ground.labels)
 
     def _sampled_map(self, side: str, stage: str, how: Any) -> tuple[Array, dict[str, float]]:
-        """One side's map, denoised, and what to note of it; its raw tiles stay in the store as `light_map/STAGE...`."""
-        from lambent.bake.light_map import finished, tile_samples
+        """One side's map, denoised, and what to note of it."""
+        from lambent.bake.light_map import finished
+
+        raw, labels = self._samples(side, stage, how)
+        self.progress(0, 1, "denoising")
+        return finished(raw, self.ground.texels, labels)
+
+    def _samples(
+        self, side: str, stage: str, how: Any, faces: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, NDArray[np.integer]]:
+        """One side's raw sums, which stay in the store as `light_map/STAGE...`, and the charts that viewers see.
+
+        With `faces` (T,), of texels on these alone.
+        """
+        from lambent.bake.light_map import tile_samples
 
         name = f"light_map/{stage}" if side == "irradiance" else f"light_map/{stage}_back"
         tile, texels = self.quality.tile_texels, self.ground.texels
@@ -331,6 +368,8 @@ class _Bake:
         writer = self.store.begin(name, "raw", shape, chunks, "float32", key=self.light_map_key, meta=self._meta())
         scene = self.ground.whole(diffuse=how.cache is None)
         sides, labels = self.ground.in_view(1.0 if side == "irradiance" else -1.0)
+        if faces is not None:
+            sides = replace(sides, valid=sides.valid & faces[texels.face])
         if writer.missing:
             covered = np.zeros(texels.width * texels.height, bool)
             covered[texels.index[sides.valid.any(axis=1)]] = True
@@ -344,8 +383,7 @@ class _Bake:
                 cost=lambda region: 1 + float(covered[region[1], region[2]].sum()),
             )
         writer.finish()
-        self.progress(0, 1, "denoising")
-        return finished(self.store.read(name), texels, labels)
+        return self.store.read(name), labels
 
     @cached_property
     def _two_sided(self) -> list[bool]:
@@ -364,9 +402,7 @@ class _Bake:
         with self._timed("probe"):
             from lambent.bake.probe_set import ProbeSet
 
-            front, back = self.store.read("light_map/irradiance"), None
-            if "light_map/irradiance_back" in self.store:
-                back = self.store.read("light_map/irradiance_back")
+            front, back = self._finished_maps()
             probes = ProbeSet(self.ground, front if self.probe_way == CACHED else None, back)
             for i, name in enumerate(missing):
                 self.progress(i, len(missing), f"probe of {name}")

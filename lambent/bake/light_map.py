@@ -6,6 +6,7 @@ tells the noise. The raw sums stay in the store (`light_map/traced`): a bake goe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +42,9 @@ class Sides:
     valid: NDArray[np.bool_]
 
 
+Estimate = Callable[..., Any]  # one sample of three numbers at each point, called as `paths.irradiance` is
+
+
 @dataclass(frozen=True)
 class Sampling:
     """How texels are sampled: at least and at most so many times, until the relative noise is reached.
@@ -53,6 +57,7 @@ class Sampling:
     max_depth: int
     per_pass: int
     cache: paths.Cache | None = None
+    estimate: Estimate = paths.irradiance
 
 
 def path_traced(quality: Quality) -> Sampling:
@@ -146,7 +151,7 @@ def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampl
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(int(rng.integers(1 << 32)), n * samples)
-    e = paths.irradiance(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
+    e = how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
     e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
     dr.eval(e)
     sums = [np.array(dr.block_sum(channel, samples)) for channel in (e.x, e.y, e.z)]

@@ -36,14 +36,15 @@ def noise_map(halves: Array, known: NDArray[np.bool_], labels: NDArray[np.intege
     """
     light = luminance(np.asarray(halves, np.float32))
     squares, mean = np.where(known, (light[0] - light[1]) ** 2 / 4, 0), np.where(known, light.mean(axis=0), 0)
-    total, level = _around(np.stack([squares, mean], axis=-1), known, labels)
+    around = chart_means(np.stack([squares, mean], axis=-1), known, labels)
+    total, level = around[..., 0], around[..., 1]
     error = np.divide(np.sqrt(total), level, out=np.zeros_like(level), where=level > 0)
     filled = fill(error[..., None], known, labels)[..., 0]
     return np.minimum(filled, HALF_MAX).astype(np.float16)
 
 
-def _around(values: Array, known: NDArray[np.bool_], labels: NDArray[np.integer]) -> tuple[Array, Array]:
-    """Means of two values (H, W, 2) over the known texels of the same chart within REACH; both (H, W)."""
+def chart_means(values: Array, known: NDArray[np.bool_], labels: NDArray[np.integer]) -> Array:
+    """Means of values (H, W, C) over the known texels of the same chart within REACH."""
     rim = ((REACH, REACH), (REACH, REACH))
     there, chart = np.pad(known, rim), np.pad(labels, rim, constant_values=-1)
     padded, count = np.pad(values, (*rim, (0, 0))), np.zeros(known.shape, np.float32)
@@ -55,5 +56,4 @@ def _around(values: Array, known: NDArray[np.bool_], labels: NDArray[np.integer]
             same = there[window] & (chart[window] == labels)
             total += padded[window] * same[..., None]
             count += same
-    mean = total / np.maximum(count, 1)[..., None]
-    return mean[..., 0], mean[..., 1]
+    return np.asarray(total / np.maximum(count, 1)[..., None])

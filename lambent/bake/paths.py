@@ -218,6 +218,22 @@ def irradiance(
     max_depth, cache
         As `radiance` takes them.
     """
+    (found, _), (aimed, _) = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    return found + aimed
+
+
+def moment(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
+) -> Any:
+    """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
+    both = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in both))
+
+
+def _contributions(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None
+) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """What a direction of the cosine's adds to the irradiance, and what one to an emitter does, with the directions."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
@@ -227,4 +243,4 @@ def irradiance(
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)
-    return dr.pi * arriving + direct
+    return (dr.pi * arriving, ray.d), (direct, ds.d)

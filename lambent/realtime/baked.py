@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
-from lambent.store.contract import SIDES, ObjectRecord, SceneRecord, noise_name
+from lambent.store.contract import LEAN, SIDES, ObjectRecord, SceneRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -53,6 +53,7 @@ class BakedScene:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     noise: Array | None = None  # (H, W), relative standard error of the light map
     noise_back: Array | None = None
+    lean: Array | None = None  # (H, W, 3), where light comes from; may be absent
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -115,6 +116,7 @@ def read_baked(store: Store) -> BakedScene:
         textures=read_textures(store, record),
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
+        lean=store.read(LEAN) if LEAN in store else None,
     )
 
 

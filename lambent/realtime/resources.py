@@ -51,7 +51,7 @@ class Layouts:
         self.frame = self._make(_BOTH, _UNIFORM, _SAMPLER)
         self.material = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _STORAGE, _SAMPLER, *[_FLAT] * len(PARTS))
         self.object = self._make(_FRAGMENT, _UNIFORM, _STORAGE, _CUBE, _CUBE, _STORAGE)
-        self.light = self._make(_FRAGMENT, _FLAT, _FLAT)
+        self.light = self._make(_FRAGMENT, _FLAT, _FLAT, _FLAT)
         self.cube = self._make(_FRAGMENT, _CUBE)
         self.shown = self._make(_FRAGMENT, _FLAT, _SAMPLER)
 
@@ -92,8 +92,17 @@ def _with_alpha(rgb: Floats) -> NDArray[np.float16]:
 
 
 def flat_texture(device: Any, rgb: Floats | None) -> Any:
-    """Half-float texture of (H, W, 3); one black texel where there is none."""
-    rgba = _with_alpha(np.zeros((1, 1, 3), np.float32) if rgb is None else finite(rgb)[0])
+    """Half-float texture of light (H, W, 3); one black texel where there is none."""
+    return _texture(device, np.zeros((1, 1, 3), np.float32) if rgb is None else finite(rgb)[0])
+
+
+def lean_texture(device: Any, lean: Floats | None) -> Any:
+    """Half-float texture of directions (H, W, 3); one of length 0 where there is none."""
+    return _texture(device, np.zeros((1, 1, 3), np.float32) if lean is None else np.nan_to_num(lean))
+
+
+def _texture(device: Any, rgb: Floats) -> Any:
+    rgba = _with_alpha(rgb)
     height, width = rgba.shape[:2]
     usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
     texture = device.create_texture(size=(width, height, 1), format="rgba16float", usage=usage)
@@ -254,7 +263,8 @@ class SceneResources:
         self.indices = device.create_buffer_with_data(
             data=np.ascontiguousarray(scene.faces, np.uint32), usage=wgpu.BufferUsage.INDEX
         )
-        self._light_maps = [flat_texture(device, scene.irradiance), flat_texture(device, scene.irradiance_back)]
+        maps = (scene.irradiance, scene.irradiance_back)
+        self._light_maps = [*(flat_texture(device, values) for values in maps), lean_texture(device, scene.lean)]
         self.light_map_views = [texture.create_view() for texture in self._light_maps]
         self.light_group = layouts.group(layouts.light, *self.light_map_views)
         self._device, self._layouts = device, layouts
@@ -284,7 +294,7 @@ class SceneResources:
         """In the place of `light_group`: how exact the light map is."""
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
-        textures = [flat_texture(self._device, values) for values in grey]
+        textures = [*(flat_texture(self._device, values) for values in grey), lean_texture(self._device, None)]
         return self._layouts.group(self._layouts.light, *(texture.create_view() for texture in textures))
 
 

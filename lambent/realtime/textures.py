@@ -191,8 +191,8 @@ def material_pictures(pictures: Pictures, textures: MaterialTextures | None) -> 
 
 
 def bits_that_show(bits: int, lobes: int, anisotropic: bool) -> int:
-    """The pictures that shading reads: opacity is tested before, and without lobes only the diffuse one counts."""
+    """The pictures that shading reads: opacity is tested before, and lobes alone read roughness and more."""
     shown = bits & ~BITS["opacity"]
     if not lobes:
-        return shown & BITS["diffuse"]
+        return shown & (BITS["diffuse"] | BITS["normal"])
     return shown if anisotropic else shown & ~BITS["direction"]

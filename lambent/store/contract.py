@@ -8,6 +8,8 @@
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before they were denoised; may be absent
+    light_map/lean                         (H, W, 3) float16, mean direction that the light of irradiance comes from,
+                                           weighted by what it adds to it, world space; 0 where there is no normal map
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
     probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], OBJECT left out if
                                            meta["object_left_out"]; meta["seen_irradiance"], may be absent: luminance of
@@ -38,6 +40,7 @@ HALF_MAX = 65504.0  # the largest half float: brighter light is cut there
 SCENE = "scene"
 TIMINGS = "timings"
 SIDES = ("irradiance", "irradiance_back")  # of the light map
+LEAN = "light_map/lean"
 Triple = tuple[float, float, float]
 
 

@@ -175,6 +175,32 @@ def test_light_through_a_screen_is_half_and_a_whole_one_lets_none_through(tmp_pa
     assert lit.max() == pytest.approx(1.0, rel=0.05)
 
 
+def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> None:
+    """A wall whose halves' normals lean to the left and to the right, between a lamp and a lit wall."""
+    from lambent.bake.bake import bake
+    from lambent.bake.reference import render_reference
+    from lambent.realtime.device import open_device
+    from lambent.realtime.frame import FrameState, Renderer
+
+    bumps = np.zeros((2, 2, 3), np.float16)
+    bumps[..., 2], bumps[:, 0, 0], bumps[:, 1, 0] = 1, -0.5, 0.5
+    scene = wall(
+        Material(kd=0.5), MaterialTextures(normal=Texture(bumps)), lights=(PointLight((-1.0, 0.0, 1.0), (3.0,) * 3),)
+    )
+    shade = SceneObject("shade", patch((0.52, -0.5, 0), (0, 0, 0.5), (0, 1, 0)), "grey")
+    grey = scene.materials | {"grey": Material(kd=0.8)}
+    scene = replace(scene, objects=(*scene.objects, shade), materials=grey)
+    store = bake(scene, tmp_path / "s", quality=replace(TINY, gather_samples=64), only={"light_map"})
+    drawn = Renderer(open_device(), store).image(FrameState(ABOVE, 32, 32))
+    traced, _ = render_reference(scene, ABOVE, 32, 32, 256)
+    halves = (slice(4, 28), slice(3, 13)), (slice(4, 28), slice(19, 29))
+    got, expected = (np.array([image[half].mean() for half in halves]) for image in (drawn, traced))
+    unbent = replace(scene, textures={})
+    flat = np.array([render_reference(unbent, ABOVE, 32, 32, 256)[0][half].mean() for half in halves])
+    assert (np.abs(flat / expected - 1) > 0.1).all()
+    np.testing.assert_allclose(got, expected, rtol=0.06)  # the lit wall is neither a lamp nor a sky
+
+
 def test_a_changed_picture_bakes_light_again_and_geometry_not(tmp_path) -> None:
     sun = DirectionalLight((0.0, -1.0, 0.0), (3.0, 3.0, 3.0))
     scene = screened(sun)

@@ -12,7 +12,7 @@ from lambent.core.colour import srgb_decode
 from lambent.materials.document import Lobe, Material
 from lambent.realtime import textures as on_gpu
 from lambent.realtime.frame import FrameState, Renderer
-from lambent.realtime.unbaked import irradiance, unbaked_scene
+from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Camera, MaterialTextures, Scene, SceneObject, Texture
 from lambent.scenes.textures import doubled_angle, halved, slopes
@@ -225,11 +225,32 @@ def test_materials_without_pictures_pay_nothing(device) -> None:
     assert [draw.textures for draw in renderer._draws(FrameState(FRONT, 8, 8))] == [1 | 2 | 4 | 8]
 
 
-def test_light_that_a_bumpy_surface_gets_is_that_of_its_mesh(device) -> None:
-    """Irradiance is baked for the mesh's normals: a normal map bends mirrors, not the diffuse light."""
-    bumpy = MaterialTextures(normal=constant(0.5, 0.0, 1.0))
-    light = irradiance(cube_of(smooth_light), np.array([[0.0, 0, 1]]))[0]
-    image = Renderer(device, square(Material(name="m", kd=0.5), bumpy, light=tuple(light))).image(
-        FrameState(FRONT, 8, 8)
-    )
-    np.testing.assert_allclose(image, np.broadcast_to(0.5 * light / np.pi, image.shape), rtol=2e-3)
+BUMPS = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.2, -0.4))  # slopes of the normal along x and y
+
+
+def shares(device, lean, slope) -> float:
+    """Diffuse light of a wall that faces +z, over that without the normal map."""
+    scene = square(Material(name="m", kd=0.5), MaterialTextures(normal=constant(*slope, 1.0)), light=(1.0, 2.0, 3.0))
+    scene = replace(scene, lean=None if lean is None else np.array(lean, np.float32)[None, None])
+    image = Renderer(device, scene).image(FrameState(FRONT, 8, 8))
+    share = image / (0.5 / np.pi * np.array([1.0, 2.0, 3.0]))
+    assert np.ptp(share) < 2e-3 * share.mean()
+    return float(share.mean())
+
+
+@pytest.mark.parametrize("slope", BUMPS)
+def test_a_normal_map_bends_diffuse_light_as_it_leans(device, slope) -> None:
+    """Exact for one lamp, for a uniform hemisphere (half of 1 + n.n'), and for a mixture of both."""
+    bent = np.array([*slope, 1.0]) / np.linalg.norm([*slope, 1.0])
+    lamp = np.array([0.6, 0.0, 0.8])
+    of_lamp, of_sky = max(lamp @ bent, 0) / lamp[2], (1 + bent[2]) / 2
+    assert shares(device, lamp, slope) == pytest.approx(of_lamp, rel=3e-3)
+    assert shares(device, (0, 0, 2 / 3), slope) == pytest.approx(of_sky, rel=3e-3)
+    mixed = 0.3 * lamp + 0.7 * np.array([0, 0, 2 / 3])
+    assert shares(device, mixed, slope) == pytest.approx(0.3 * of_lamp + 0.7 * of_sky, rel=3e-3)
+    assert shares(device, None, slope) == pytest.approx(1, rel=2e-3)  # where it is not known, light is not bent
+
+
+def test_a_lamp_that_grazes_a_bump_from_behind_leaves_it_dark(device) -> None:
+    assert shares(device, (0.9, 0.0, np.sqrt(1 - 0.81)), (-1.0, 0.0)) == pytest.approx(0, abs=1e-3)
+    assert 0 < shares(device, (1.0, 0.0, 0.0), (1.0, 0.0)) < 20  # no light but along the wall: bounded

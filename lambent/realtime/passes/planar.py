@@ -40,7 +40,7 @@ class PlanarPass:
         self._look_up = self._group_layout(
             {"buffer": {"type": "uniform"}}, {"texture": _FLAT}, *[{"texture": _EXACT}] * 2
         )
-        self.shown_layout = self._group_layout(*[{"texture": _FLAT}] * 2, *[{"texture": _EXACT}] * 5)
+        self.shown_layout = self._group_layout(*[{"texture": _FLAT}] * 3, *[{"texture": _EXACT}] * 5)
         self._clean_layout = self._group_layout(*[{"texture": _EXACT}] * 2)
         self._clean = self._clean_pipeline()
         self._cleaned: list[Any] = []

@@ -4,11 +4,11 @@
 
 #include "lobe_width.wgsl"
 
-@group(3) @binding(2) var planar_rough: texture_2d<f32>;
-@group(3) @binding(3) var planar_sharp: texture_2d<f32>;
-@group(3) @binding(4) var planar_sum: texture_2d<f32>;
-@group(3) @binding(5) var planar_wide: texture_2d<f32>;
-@group(3) @binding(6) var planar_least: texture_2d<f32>;
+@group(3) @binding(3) var planar_rough: texture_2d<f32>;
+@group(3) @binding(4) var planar_sharp: texture_2d<f32>;
+@group(3) @binding(5) var planar_sum: texture_2d<f32>;
+@group(3) @binding(6) var planar_wide: texture_2d<f32>;
+@group(3) @binding(7) var planar_least: texture_2d<f32>;
 
 const WIDE = 3.0; // half-width in pixels of a lobe from which on 8 x 8 pixels are mixed, not 4 x 4
 

@@ -2,29 +2,36 @@
 
 #include "vertex.wgsl"
 #include "surface.wgsl"
+#include "lean.wgsl"
 
 @group(3) @binding(0) var light_map: texture_2d<f32>;
 @group(3) @binding(1) var light_map_back: texture_2d<f32>;
+@group(3) @binding(2) var light_lean: texture_2d<f32>; // where front light comes from, world space; 0: not known
 
 // Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
 const HALF_MAX = 6e4; // below the largest half float
 
+// Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
+// progressive series.
+fn mesh_frame(v: Varyings) -> mat3x3f {
+    let n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12));
+    let flat_t = v.t_world - n * dot(n, v.t_world);
+    let t = flat_t * inverseSqrt(max(dot(flat_t, flat_t), 1e-12));
+    return mat3x3f(t, cross(n, t), n);
+}
+
 // At silhouettes an interpolated normal turns away from a viewer whom the triangle faces: it is bent back towards him
 // (along `view`) until cos_o is GRAZING, so that frame, mirror direction and lobe agree.
 fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
-    // a mesh may bring a zero normal, and one NaN would stay in the mean of a progressive series
-    let mesh_n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12));
-    var given = mesh_n * facing;
+    let mesh = mesh_frame(v);
+    var given = mesh[2] * facing;
     var brushed = v.t_world;
     var shown = painted(v.uv);
     if ((TEXTURES & 24u) != 0u) {
-        let flat_t = v.t_world - mesh_n * dot(mesh_n, v.t_world);
-        let mesh_t = flat_t * inverseSqrt(max(dot(flat_t, flat_t), 1e-12));
-        let mesh_b = cross(mesh_n, mesh_t);
-        given = normalize(shown.slope.x * mesh_t + shown.slope.y * mesh_b + mesh_n) * facing;
-        brushed = shown.turn.x * mesh_t + shown.turn.y * mesh_b;
+        given = normalize(mesh * vec3f(shown.slope, 1.0)) * facing;
+        brushed = shown.turn.x * mesh[0] + shown.turn.y * mesh[1];
         let shares = shown.turn * shown.turn;
         shown.widening = vec2f(dot(shares, shown.widening), dot(shares.yx, shown.widening));
     }
@@ -44,10 +51,16 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
     let e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front);
-    let diffuse = diffuse_light(wo.z, e_here, e_beyond, s.painted);
+    var e_bent = e_here;
+    if ((TEXTURES & 8u) != 0u && front) {
+        let mesh = mesh_frame(v);
+        let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
+        e_bent *= bent_share(textureSampleLevel(light_lean, linear_sampler, v.uv2, 0.0).xyz, mesh[2], bent);
+    }
+    let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
-    s.open = open_share(s.n, e_here);
+    s.open = open_share(s.n, e_bent);
     let specular = specular_light(wo, s);
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return clamp(light, vec3f(0.0), vec3f(HALF_MAX));
