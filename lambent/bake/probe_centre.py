@@ -2,7 +2,8 @@
 
 - Where the scene says so; else
 - above a flat object (floor, mirror, table top), on the side of the middle of the scene: half the object's length,
-  half the free way and EYE_HEIGHT are upper bounds of the height; else
+  half the free way and EYE_HEIGHT are upper bounds of the height. Over its middle, or, where something hides from there
+  much of what its viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
 - in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
 """
 
@@ -19,11 +20,12 @@ from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.solids import SolidTest
 from lambent.bake.vectors import array_of, rays_from
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.frames import basis, normalize
 from lambent.scenes.scene import Mesh
 
 Array = NDArray[np.floating]
 EYE_HEIGHT = 1.6  # metres
+GRID = 5  # points along each side of a flat object that a probe may stand over
 FLAT_SHARE = 0.9  # of an object's area with normals along one axis
 CLEARANCE = 0.02  # metres beyond the surface of the solid that a centre is moved out of
 MOVES = 4
@@ -67,6 +69,21 @@ def _above(mesh: Mesh, centre: Array, axis: Array, middle: Array, without: Any) 
     size = float(np.ptp(mesh.positions, axis=0).max())
     free = float(_distances(without, top + axis * 1e-3, axis[None])[0])
     return np.asarray(top + axis * min(EYE_HEIGHT, size / 2, free / 2))
+
+
+def places_above(mesh: Mesh, middle: Array, without: Any) -> Array:
+    """(n, 3) where the probe of a flat object may stand: over its middle, then over points all over it."""
+    axis = flat_axis(mesh)
+    low, high = (np.asarray(corner, float) for corner in mesh.bounds)
+    centre = (low + high) / 2
+    if axis is None:
+        return centre[None]
+    steps = (np.arange(GRID) + 0.5) / GRID
+    across = np.stack([aside.reshape(3) for aside in basis(axis[None])], axis=1)
+    flat = mesh.positions @ across
+    at = flat.min(axis=0) + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * np.ptp(flat, axis=0)
+    over = at @ across.T + axis * (axis @ centre)
+    return np.stack([_above(mesh, place, axis, middle, without) for place in (centre, *over)])
 
 
 def _moved_out(centre: Array, solids: SolidTest, without: Any) -> Array:

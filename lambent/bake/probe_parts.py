@@ -57,7 +57,11 @@ def seen_from(mesh: Mesh, without: Any, count: int = RAYS) -> Seen:
     t = normalize(np.cross(aside, normals))
     directions = local[:, :1] * t + local[:, 1:2] * np.cross(normals, t) + local[:, 2:] * normals
     size = float(np.ptp(mesh.positions, axis=0).max())
-    origins = points + normals * (1e-4 * size)
+    return seen_along(points + normals * (1e-4 * size), directions, without)
+
+
+def seen_along(origins: Array, directions: Array, without: Any) -> Seen:
+    """What rays (n, 3) meet first in a Mitsuba scene."""
     distance = _distances(without, origins, directions)
     valid = np.isfinite(distance)
     return Seen(origins, directions, origins + directions * np.where(valid, distance, 0.0)[:, None], valid)

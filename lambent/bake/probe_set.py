@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lambent.bake.groundwork import Groundwork
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe import MIRROR_DEPTH, LightMapCache, Surroundings, bake_probe
-from lambent.bake.probe_centre import encloses, probe_centre
+from lambent.bake.probe_centre import encloses, flat_axis, places_above, probe_centre
 from lambent.bake.probe_modes import (
     CLOSE,
     OWN,
@@ -23,7 +23,7 @@ from lambent.bake.probe_modes import (
     judged,
     mirrored,
 )
-from lambent.bake.probe_parts import family, hidden_share, parallax_deg, seen_from, spread
+from lambent.bake.probe_parts import HIDDEN, family, hidden_share, parallax_deg, seen_along, seen_from, spread
 from lambent.bake.quality import Quality
 from lambent.bake.solids import SolidTest
 
@@ -68,6 +68,27 @@ class ProbeSet:
             lifted, normals, self._ground.places, material, self._whole, self._cache, MIRROR_DEPTH, own, seed
         )
 
+    def _centre(self, name: str, without: Any, rays: Mirrored | None, seed: int) -> Array:
+        """Where the probe stands: of a flat object, where it shows best what viewers see mirrored.
+
+        Over the middle where little is hidden from there; else one of the places which see more, if it shows it better.
+        """
+        scene = self._builder.scene
+        mesh = scene.object(name).mesh
+        if name in scene.probe_centres or rays is None or self._transmits(name) or flat_axis(mesh) is None:
+            return probe_centre(self._builder, name, without, self._solids.within(without))
+        seen = seen_along(rays.origins, rays.directions, without)
+        places = places_above(mesh, np.mean(scene.bounds, axis=0), without)
+        first, *hidden = (hidden_share(seen, place, without) for place in places)
+        if first <= HIDDEN:
+            return np.asarray(places[0])
+        tried = [0, *(i for i, share in enumerate(hidden, 1) if share < WORTH * first)]
+        around = Surroundings(without, self._whole, self._cache, MIRROR_DEPTH)
+        trials = (bake_probe(around, places[i], TRIAL_TEXELS, TRIAL_SAMPLES, seed) for i in tried)
+        errors = [judged(rays, trial, places[i]).best for i, trial in zip(tried, trials, strict=True)]
+        best = int(np.argmin(errors))
+        return np.asarray(places[tried[best] if errors[best] < WORTH * errors[0] else 0])
+
     def _transmits(self, name: str) -> bool:
         scene = self._builder.scene
         return scene.materials[scene.object(name).material].transmits
@@ -90,9 +111,9 @@ class ProbeSet:
         Planes that the scene gives are taken as they are; others are found from what the probe sees.
         """
         without = self._without(frozenset(family(self._builder.scene.parts, name)))
-        centre = probe_centre(self._builder, name, without, self._solids.within(without))
-        left_out = not encloses(self._builder, name, centre, self._whole)
         rays = self._mirrored(name, seed)
+        centre = self._centre(name, without, rays, seed)
+        left_out = not encloses(self._builder, name, centre, self._whole)
         if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
             left_out = not self._better_held(rays, centre, without, seed)
         seen = without if left_out else self._whole

@@ -17,8 +17,8 @@ from lambent.core.cubemap import face_directions, sample
 from lambent.core.frames import normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
-from lambent.scenes.geometry import box, patch, placed, sphere
-from lambent.scenes.scene import Camera, Scene, SceneObject
+from lambent.scenes.geometry import box, merge, patch, placed, sphere
+from lambent.scenes.scene import Camera, PointLight, Scene, SceneObject
 from lambent.store.contract import FAR
 from tests.bake.small_scenes import COLOURS, MIRROR, TINY, coloured_room, room_with_step
 
@@ -125,6 +125,21 @@ def test_the_floors_probe_stands_at_eye_height_in_the_room() -> None:
     assert np.allclose(centre_of((floor, walls), "floor"), (0, 1.6, 0), atol=1e-3)
     low = SceneObject("walls", placed(box((8, 2, 6)), (0, 1, 0)), "d")
     assert np.allclose(centre_of((floor, low), "floor"), (0, 1.0, 0), atol=2e-3), "half way to a low ceiling"
+
+
+def test_the_probe_of_a_floor_does_not_stand_below_the_table_in_its_middle(tmp_path: Path) -> None:
+    floor = SceneObject("floor", patch((-4, 0, -3), (0, 0, 6), (8, 0, 0)), "m")
+    walls = SceneObject("walls", placed(box((8, 3.1, 6)), (0, 1.45, 0)), "d")
+    table = SceneObject(
+        "table", merge([placed(box((2.4, 0.1, 2.4)), (0, 0.4, 0)), placed(box((0.1, 0.4, 0.1)), (0.3, 0.2, 0))]), "d"
+    )
+    cameras = (Camera("c", (3, 1.6, 2), (-1, 0, -1)), Camera("d", (-3, 1.6, -2), (1, 0, 1)))
+    lamp = PointLight((2.0, 2.8, 0.0), (9.0, 9.0, 9.0))
+    scene = Scene("s", (floor, walls, table), {"m": MIRROR, "d": Material(kd=0.5)}, cameras=cameras, lights=(lamp,))
+    meta = bake(scene, tmp_path / "s", quality=TINY).artefact("probe/floor/radiance").meta
+    x, y, z = meta["centre"]
+    assert max(abs(x), abs(z)) > 1 and 1 < y <= 1.6
+    assert meta["hidden_share"] < 0.3
 
 
 def test_the_probe_of_a_thing_within_another_is_moved_out() -> None:
