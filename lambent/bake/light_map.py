@@ -20,6 +20,7 @@ from lambent.bake.denoise import denoise_charts, fill
 from lambent.bake.quality import Quality
 from lambent.bake.seams import blend_seams
 from lambent.bake.texels import POINTS, Texels
+from lambent.bake.vectors import vectors
 from lambent.core.colour import luminance
 from lambent.core.sequences import hammersley, r2
 from lambent.store.contract import HALF_MAX
@@ -122,14 +123,9 @@ class _Points:
         choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
         t, take = sides.texels, np.take_along_axis
         self.count = len(mine)
-        self.position = _vectors(take(t.positions[mine], choice, axis=1))
-        self.normal = _vectors(take(t.normals[mine], choice, axis=1) * sides.sign)
-        self.flat = _vectors(take(t.flat[mine], choice, axis=1) * sides.sign)
-
-
-def _vectors(array: Array) -> Any:
-    """mi.Vector3f of an array (..., 3), component by component: a whole array's size would stand in the kernels."""
-    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(c, dtype=np.float32)) for c in array.reshape(-1, 3).T))
+        self.position = vectors(mi.Vector3f, take(t.positions[mine], choice, axis=1))
+        self.normal = vectors(mi.Vector3f, take(t.normals[mine], choice, axis=1) * sides.sign)
+        self.flat = vectors(mi.Vector3f, take(t.flat[mine], choice, axis=1) * sides.sign)
 
 
 def _sums_of_pass(scene: Any, points: _Points, seed: tuple[int, int], how: Sampling) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.probe import LightMapCache
+from lambent.bake.vectors import vectors
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe
 from lambent.scenes.scene import Scene, Triple
@@ -63,8 +64,8 @@ class ReflectionTracer:
         index = dr.arange(mi.UInt32, len(points) * spp)
         at, k = index // spp, index % spp
         starts = rng.integers(1 << 32, size=(2, len(points)), dtype=np.uint64)
-        view = dr.gather(mi.Vector3f, _vectors(wo), at)
-        origin = mi.Point3f(dr.gather(mi.Vector3f, _vectors(points), at))
+        view = dr.gather(mi.Vector3f, vectors(mi.Vector3f, wo), at)
+        origin = dr.gather(mi.Point3f, vectors(mi.Point3f, points), at)
         lamps = self._lamps if lobe.mx * lobe.my > WIDE else []
         cones = [_cone(origin, lamp) for lamp in lamps]
         h = _half_vectors(lobe, at, k, starts)
@@ -119,10 +120,6 @@ def _within(cone: tuple[mi.Vector3f, mi.Float], uv: tuple[mi.Float, mi.Float]) -
 def _cone_density(cone: tuple[mi.Vector3f, mi.Float], w: mi.Vector3f) -> mi.Float:
     """Density of `_within`, 1/sr."""
     return dr.select(0.5 * dr.squared_norm(w - cone[0]) <= cone[1], dr.inv_two_pi / cone[1], 0.0)
-
-
-def _vectors(values: Array) -> mi.Vector3f:
-    return mi.Vector3f(np.ascontiguousarray(values.T, np.float32))
 
 
 def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64]) -> mi.Vector3f:

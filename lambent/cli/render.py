@@ -151,14 +151,14 @@ def pictures(
         if look.part == NOISE and noise_name(SIDES[0]) not in store:
             hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
             raise UserError("the store does not say how exact its light map is", field="--show", got=NOISE, hint=hint)
-        named(integrator)  # an unknown one is said before the device is opened
+        progressive = named(integrator).progressive  # an unknown one is said before the device is opened
         check_planar(integrator, look.planar)
         renderer = Renderer(open_device(), store)
         for text in renderer.missing:
             say(f"note: {text}")
 
         def state(camera: CameraRecord) -> FrameState:
-            n = samples if integrator != "qmc" else None
+            n = None if progressive else samples
             return FrameState(
                 camera, width, height, integrator=integrator, n=n, exposure_ev=look.exposure_ev,
                 view_transform="filmic" if look.view == FALSE_COLOUR else look.view, show=look.part,
@@ -166,11 +166,11 @@ def pictures(
             )  # fmt: skip
 
         def radiance(camera: CameraRecord, progress: Progress) -> Any:
-            if integrator == "qmc":
+            if progressive:
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
             return renderer.still_radiance(state(camera), *((FILM_SUPERSAMPLES,) if film else ()))
 
-        if integrator != "qmc" and look.plain:
+        if look.plain and not progressive:
             show_frame = renderer.display_image if film else renderer.still
             return radiance, lambda camera, progress: show_frame(state(camera))
 

@@ -269,8 +269,12 @@ class Renderer:
         return _mean(self.image(part) for part in _subframes(state, supersamples))
 
     def converged(self, state: FrameState, spp: int, progress: Progress = silent) -> Floats:
-        """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe (`qmc`)."""
-        state = replace(state, integrator="qmc")
+        """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe.
+
+        By the state's integrator, if it is progressive, else by `qmc`.
+        """
+        if not integrator(state.integrator).progressive:
+            state = replace(state, integrator="qmc")
         per_frame = state.n or QMC_N
         frames = max(1, -(-spp // per_frame))
         radiance = None
