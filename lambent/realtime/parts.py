@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 PART_S = 0.05
-STEP_ROWS = 64  # of a band: the edge of a tile of Mesa's rasteriser in software
+KEPT = 0.95  # of a cost per pixel, from part to part
+STEP_ROWS = 16  # of a band; Mesa's rasteriser in software works on tiles of 64, and gains nothing by fewer, larger ones
 Steps = Generator[None, None, int]  # of a pass; returns its draw calls
 
 
@@ -64,11 +65,11 @@ class Cut:
     def bands(self, kind: str, size: tuple[int, int]) -> Iterator[Band]:
         """Bands of a picture of `size`, one after another."""
         width, height = size
-        begin = 0
+        begin, rows = 0, STEP_ROWS
         while begin < height:
-            rows = STEP_ROWS
             if kind in self.costs_s:
-                rows = max(1, int(PART_S / (self.costs_s[kind] * width * STEP_ROWS))) * STEP_ROWS
+                fitting = max(1, int(PART_S / (self.costs_s[kind] * width * STEP_ROWS))) * STEP_ROWS
+                rows = min(fitting, 2 * rows)  # by and by: below empty rows stands what costs most
             end = min(begin + rows, height)
             self._under_way = (kind, (end - begin) * width)
             yield Band(begin, end, width, height)
@@ -80,6 +81,6 @@ class Cut:
             return
         kind, pixels = self._under_way
         per_pixel = max(seconds, 1e-6) / max(pixels, 1)
-        # The dearest of late: a band that took longer than foreseen was waited for.
-        self.costs_s[kind] = max(per_pixel, 0.7 * self.costs_s.get(kind, 0.0))
+        # The dearest of late, over a frame or two: a band that took longer than foreseen was waited for.
+        self.costs_s[kind] = max(per_pixel, KEPT * self.costs_s.get(kind, 0.0))
         self._under_way = None

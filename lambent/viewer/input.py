@@ -20,7 +20,7 @@ LEFT, RIGHT, MIDDLE = 1, 2, 3
 SHORTCUTS = (
     ("W A S D, arrows", "walk; with Shift faster"),
     ("E, Space / Q, C", "up / down, while flying"),
-    ("F", "fly, or stand on the floor"),
+    ("F", "fly, or come down onto the floor"),
     ("O", "orbit the target, or walk"),
     ("left drag", "look around; in orbit turn about the target"),
     ("right, middle drag", "shift the view (orbit)"),
