@@ -61,8 +61,8 @@ class Effort:
 
 
 DRAFT = Quality("draft", 192, (16, 16), 0.5, 6, 128, 64, 8, gather_samples=64)
-FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (800, 500), 5.0, 20, (840, 525), 48, 256)
-QUICK = Effort(DRAFT, 3_000, (1120, 700), 1, (640, 400), 3.0, 10, (420, 262), 32, 128, 4)
+FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (720, 450), 5.0, 20, (840, 525), 48, 256)
+QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 3.0, 10, (420, 262), 32, 128, 4)
 
 
 class Flow:
