@@ -39,7 +39,7 @@ def test_help_shows_an_example_and_json(lambent, command):
     outcome = lambent(command, "--help")
     assert (outcome.code, outcome.err) == (0, "")
     assert f"Example: lambent {command}" in outcome.out
-    assert "--json" in outcome.out or command in ("walk", "edit", "demo")
+    assert "--json" in outcome.out or command in ("walk", "view", "edit", "demo")
 
 
 def test_no_command_shows_help(lambent):
@@ -75,6 +75,7 @@ def test_unknown_command(refused):
         ("bake", "builtin:rom", "-o", "out.store"),
         ("render", "absent.store", "-o", "a.png"),
         ("walk", "absent.store"),
+        ("view", "absent.store"),
         ("compare", "absent.png", "other.png"),
         ("bench", "absent"),
     ],
