@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -67,12 +69,37 @@ def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
     UserError
         Where the file cannot be read or written; it is as it was then.
     """
-    views = change(read_views(folder))
-    try:
-        write_text(Path(folder) / FILE, json.dumps(views.model_dump(mode="json"), indent=1) + "\n")
-    except OSError as error:
-        raise UserError(f"cannot be written ({error.strerror})", file=Path(folder) / FILE) from error
+    with _alone(Path(folder)):
+        views = change(read_views(folder))
+        try:
+            write_text(Path(folder) / FILE, json.dumps(views.model_dump(mode="json"), indent=1) + "\n")
+        except OSError as error:
+            raise UserError(f"cannot be written ({error.strerror})", file=Path(folder) / FILE) from error
     return views
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep others who change this folder's views waiting, so that what one of them adds is not replaced unread.
+
+    The folder itself is locked: a lock file would stay behind. Systems without such locks (Windows; some network
+    drives) go without.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise UserError(f"cannot be opened ({error.strerror})", file=folder) from error
+    try:
+        with suppress(OSError):  # a drive that knows no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)  # which ends the lock
 
 
 def with_views(record: SceneRecord, views: Views) -> SceneRecord:

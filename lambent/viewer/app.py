@@ -20,7 +20,7 @@ from lambent.store.store import Store
 from lambent.viewer.comparison import Comparison
 from lambent.viewer.filming import FilmOptions
 from lambent.viewer.input import Input, Rect
-from lambent.viewer.lost import kept
+from lambent.viewer.lost import keep_walk, kept
 from lambent.viewer.picking import Geometry
 from lambent.viewer.picture import CHOICES
 from lambent.viewer.pictures import Pictures
@@ -84,8 +84,7 @@ def run(
             window.run()
         finally:
             pictures.close(state)
-    for place in state.rescue_recording():
-        sys.stderr.write(f"lambent: note: the recorded walk is in {place}\n")
+    keep_walk(state)
     if state.unsaved:
         sys.stderr.write(f"lambent: note: {', '.join(state.unsaved)} changed and not saved\n")
 

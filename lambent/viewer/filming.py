@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.files import check_place
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted, sequence_file
 from lambent.realtime.frame import QMC_N, FrameState, Renderer
 from lambent.store.camera_paths import camera_at
@@ -43,8 +44,7 @@ def film_file(folder: Path, text: str) -> Path:
         raise UserError("no such folder", file=file.parent)
     if file.is_dir():
         raise UserError("is a folder", file=file)
-    if file.suffix.lower() != FILM:
-        sequence_file(file, 1)
+    check_place(file if file.suffix.lower() == FILM else sequence_file(file, 1))
     return file
 
 
@@ -95,7 +95,7 @@ class Filming:
                 next(self._work)
         except StopIteration:
             self.over = True
-        except UserError as error:
+        except (UserError, OSError) as error:
             self.error, self.over = str(error), True
         return self.over
 

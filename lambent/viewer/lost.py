@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
@@ -26,12 +26,21 @@ _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 def keep(state: ViewerState) -> None:
     """Write what was not saved to files of new names, and say where on stderr."""
-    for what, write in (("an unsaved material", state.rescue_materials), ("the recorded walk", state.rescue_recording)):
-        try:
-            for place in write():
-                sys.stderr.write(f"lambent: note: {what} is in {place}\n")
-        except (UserError, OSError) as error:
-            sys.stderr.write(f"lambent: note: {what} could not be kept: {error}\n")
+    _keep("an unsaved material", state.rescue_materials)
+    keep_walk(state)
+
+
+def keep_walk(state: ViewerState) -> None:
+    """Save what was recorded, or write it to a file of a new name, and say where on stderr."""
+    _keep("the recorded walk", state.rescue_recording)
+
+
+def _keep(what: str, write: Callable[[], Iterable[object]]) -> None:
+    try:
+        for place in write():
+            sys.stderr.write(f"lambent: note: {what} is in {place}\n")
+    except (UserError, OSError) as error:
+        sys.stderr.write(f"lambent: note: {what} could not be kept: {error}\n")
 
 
 @contextmanager

@@ -14,6 +14,7 @@ import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.colour import srgb_decode
+from lambent.core.errors import UserError
 from lambent.core.false_colour import Range, with_scale
 from lambent.core.images import write_image
 from lambent.materials.document import Material
@@ -205,7 +206,7 @@ class Picture:
             display = self._renderer.display_image(frame)
             display = scaled(display, frame)
             write_image(state.folder / f"{name}.png", srgb_decode(display.astype(np.float32) / 255))
-        except OSError as error:
+        except (UserError, OSError) as error:
             state.say(f"picture not saved: {error}")
             return None
         state.say(f"saved {name}.png and {name}.exr")

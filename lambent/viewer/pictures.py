@@ -97,7 +97,7 @@ class Pictures:
             return
         try:
             write_shown(state.folder / f"{name}-error.png", np.ascontiguousarray(self._errors.picture[..., :3]))
-        except OSError as error:
+        except (UserError, OSError) as error:
             state.say(f"error map not saved: {error}")
         else:
             state.say(f"saved {name}-error.png")

@@ -21,6 +21,7 @@ class Recorder:
     smooth_s: float = SMOOTH_S
     began_s: float = 0.0
     name: str = ""
+    suggested: str = ""  # the name as it stands before anything is typed
 
     @property
     def on(self) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from lambent.core.errors import UserError
 from lambent.core.false_colour import Range
 from lambent.materials.document import Material
-from lambent.store.camera_paths import camera_at
+from lambent.store.camera_paths import TimedPath, camera_at
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
 from lambent.viewer import cameras
 from lambent.viewer.metering import Meter
@@ -299,8 +299,7 @@ class ViewerState:
     def save_view(self) -> None:
         """Save where the camera stands, under the typed name or the next free one."""
         if self.views is not None:
-            name = self.view_name if self.view_name.strip() else self.views.free_camera_name()
-            added = self.views.add_camera(self.camera, name)
+            added = self.views.add_camera(self.camera, self.view_name if self.view_name.strip() else None)
             if added is not None:
                 self.view_name, self.camera = "", added
                 self.say(f"saved the view {added.name}")
@@ -314,17 +313,20 @@ class ViewerState:
                 self.path.playing = False
             self.recorder.begin(self.clock())
         elif (draft := self.recorder.stop()) is not None:
-            self.recorder.name = self.views.free_path_name()
+            self.recorder.name = self.recorder.suggested = self.views.free_path_name()
             self.path = PathPlay(draft, draft.seconds, playing=False)  # chosen, and ready to be played
             self.say(f"recorded {draft.seconds:.1f} s")
         else:
             self.say("nothing recorded: the camera did not move")
 
     def save_recording(self) -> None:
-        """Save the draft under the typed name."""
-        if self.views is None or self.recorder.draft is None:
-            return
-        added = self.views.add_path(self.recorder.draft, self.recorder.name)
+        """Save the draft under the typed name; nobody asked for the suggested one, the next free one is as good."""
+        recorder = self.recorder
+        if self.views is not None and recorder.draft is not None:
+            name = None if recorder.name == recorder.suggested else recorder.name
+            self._saved_recording(self.views.add_path(recorder.draft, name))
+
+    def _saved_recording(self, added: TimedPath | None) -> None:
         if added is not None:
             self.recorder.drop()
             self.scrub(added, 0.0)
@@ -337,12 +339,12 @@ class ViewerState:
         draft = self.recorder.draft
         if self.views is None or draft is None:
             return None
-        before = {path.name for path in self.views.all.paths}
-        if not self.recorder.name.strip() or self.recorder.name in before:
-            self.recorder.name = self.views.free_path_name()
-        self.save_recording()
-        added = [path.name for path in self.views.all.paths if path.name not in before]
-        return added[0] if added else None
+        typed = self.recorder.name if self.recorder.name.strip() not in ("", self.recorder.suggested) else None
+        added = self.views.add_path(draft, typed)
+        if added is None and typed is not None:  # the name is taken, or none: the walk is worth more
+            added = self.views.add_path(draft)
+        self._saved_recording(added)
+        return added.name if added is not None else None
 
     def drop_recording(self) -> None:
         """Forget the draft."""

@@ -57,18 +57,17 @@ class SavedViews:
         """The scene record with what was saved."""
         return with_views(self.scene, self._views)
 
-    def free_camera_name(self) -> str:
-        return free_name("view", {camera.name for camera in self.all.cameras})
-
     def free_path_name(self) -> str:
         return free_name("walk", {path.name for path in self.all.paths})
 
-    def add_camera(self, camera: CameraRecord, name: str) -> CameraRecord | None:
-        """Save where `camera` stands as `name`; None where that cannot be."""
+    def add_camera(self, camera: CameraRecord, name: str | None = None) -> CameraRecord | None:
+        """Save where `camera` stands as `name`, or under the next free one; None where that cannot be."""
         named: list[CameraRecord] = []
 
         def change(views: Views) -> Views:
-            named.append(camera.model_copy(update={"name": self._camera_name(views, name)}))
+            free = free_name("view", self._camera_names(views))  # another window may have saved some meanwhile
+            checked = free if name is None else self._camera_name(views, name)
+            named.append(camera.model_copy(update={"name": checked}))
             return views.model_copy(update={"cameras": (*views.cameras, named[0])})
 
         return named[0] if self._change(change) else None
@@ -86,12 +85,13 @@ class SavedViews:
             lambda views: views.model_copy(update={"cameras": tuple(c for c in views.cameras if c.name != name)})
         )
 
-    def add_path(self, path: TimedPath, name: str) -> TimedPath | None:
-        """Save a path as `name`; None where that cannot be."""
+    def add_path(self, path: TimedPath, name: str | None = None) -> TimedPath | None:
+        """Save a path as `name`, or under the next free one; None where that cannot be."""
         named: list[TimedPath] = []
 
         def change(views: Views) -> Views:
-            named.append(path.model_copy(update={"name": self._path_name(views, name)}))
+            free = free_name("walk", self._path_names(views))
+            named.append(path.model_copy(update={"name": free if name is None else self._path_name(views, name)}))
             return views.model_copy(update={"paths": (*views.paths, named[0])})
 
         return named[0] if self._change(change) else None
@@ -110,10 +110,16 @@ class SavedViews:
         )
 
     def _camera_name(self, views: Views, name: str, but: str | None = None) -> str:
-        return checked_name(name, {c.name for c in (*self.scene.cameras, *views.cameras)} - {but or ""})
+        return checked_name(name, self._camera_names(views) - {but or ""})
 
     def _path_name(self, views: Views, name: str, but: str | None = None) -> str:
-        return checked_name(name, {p.name for p in (*self.scene.paths, *views.paths)} - {but or ""})
+        return checked_name(name, self._path_names(views) - {but or ""})
+
+    def _camera_names(self, views: Views) -> set[str]:
+        return {camera.name for camera in (*self.scene.cameras, *views.cameras)}
+
+    def _path_names(self, views: Views) -> set[str]:
+        return {path.name for path in (*self.scene.paths, *views.paths)}
 
     def _change(self, change: Callable[[Views], Views]) -> bool:
         """Apply a change to the file; whether it is there now."""
@@ -123,8 +129,13 @@ class SavedViews:
         if not self.folder.is_dir():
             self.say(f"not saved: the store is gone: {self.folder}")  # and a folder with nothing but views is none
             return False
+
+        def seen(views: Views) -> Views:
+            self._take(views)  # what another window saved is shown even where this change is refused
+            return change(views)
+
         try:
-            self._take(change_views(self.folder, change))
+            self._take(change_views(self.folder, seen))
         except UserError as error:
             self.say(f"not saved: {error}")
             return False
@@ -135,5 +146,8 @@ class SavedViews:
 
 
 def write_alone(file: Path, path: TimedPath) -> None:
-    """A `views.json` of another name that holds one path, for a store that is not there."""
-    write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")
+    """A `views.json` of another name that holds one path, for a store that cannot take it."""
+    try:
+        write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")
+    except OSError as error:
+        raise UserError(f"cannot be written ({error.strerror})", file=file) from error

@@ -1,6 +1,7 @@
 """views.json: saved whole, read with suspicion, and never mixed up with what is baked."""
 
 import json
+from threading import Thread
 
 import pytest
 
@@ -87,3 +88,20 @@ def test_a_recorded_path_keeps_its_times():
     straight = tuple(A.model_copy(update={"position": (float(k), 0.0, 0.0)}) for k in range(4))
     even = TimedPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
     assert [camera_at(even, t).position[0] for t in (1.25, 1.5, 1.75)] == pytest.approx([1.25, 1.5, 1.75])
+
+
+def test_two_changes_at_once_wait_for_each_other(tmp_path):
+    def added(camera):
+        return lambda views: views.model_copy(update={"cameras": (*views.cameras, camera)})
+
+    other = Thread(target=change_views, args=(tmp_path, added(B)))
+
+    def slowly(views):
+        other.start()
+        other.join(0.5)  # time enough to write its own, were it not kept waiting
+        return added(A)(views)
+
+    change_views(tmp_path, slowly)
+    other.join()
+    assert {c.name for c in read_views(tmp_path).cameras} == {"a", "b"}
+    assert [p.name for p in tmp_path.iterdir()] == [FILE]

@@ -1,5 +1,6 @@
 """What is kept when the window is lost."""
 
+import errno
 import os
 import shutil
 import signal
@@ -9,7 +10,7 @@ import pytest
 from lambent.materials.document import load_material
 from lambent.store.contract import CameraRecord
 from lambent.store.views import Views
-from lambent.viewer.lost import kept
+from lambent.viewer.lost import keep_walk, kept
 from lambent.viewer.state import ViewerState
 from lambent.viewer.views import SavedViews
 from tests.viewer.small_store import write_small_store
@@ -93,3 +94,15 @@ def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
     rescued = load_material(tmp_path / "brass-rescued-001.json")
     assert rescued.model_dump(mode="json")["lobes"] == seen["edited"]["brass"]["lobes"]
     assert "brass-rescued-001.json" in session.log()
+
+
+def test_a_walk_that_can_be_kept_nowhere_is_said(state, capsys, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    walk_and_edit(state)
+    monkeypatch.setattr("tempfile.mkstemp", refused)
+    keep_walk(state)
+    said = capsys.readouterr().err
+    assert said.startswith("lambent: note: the recorded walk could not be kept: ") and said.count("\n") == 1
+    assert "walk 1-rescued-001.json: cannot be written (Permission denied)" in said

@@ -1,5 +1,6 @@
 """What the walk window draws besides the picture, on a real adapter, without a window."""
 
+import errno
 from dataclasses import replace
 
 import numpy as np
@@ -242,3 +243,24 @@ def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
     for _ in range(5):
         drawn(pictures, state)
     assert state.filming is None and "is a folder" in state.messages[-1].text
+
+
+def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
+    """As root every folder takes files: the system's refusal is put in its place."""
+
+    def refused(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    pictures = Pictures(renderer)
+    drawn(pictures, state)
+    monkeypatch.setattr("tempfile.TemporaryFile", refused)
+    monkeypatch.setattr("tempfile.mkstemp", refused)
+    pictures.save(state)
+    assert "picture not saved: " in state.messages[-1].text and "Permission denied" in state.messages[-1].text
+    for name in ("a.mp4", "a-##.png"):
+        film(pictures, state, name)
+        assert "no film: " in state.messages[-1].text and "Permission denied" in state.messages[-1].text
+        assert state.filming is None
+    monkeypatch.setattr("lambent.viewer.filming.check_place", lambda path: None)  # and is refused later
+    film(pictures, state, "b.mp4")
+    assert "no film: " in state.messages[-1].text and state.filming is None

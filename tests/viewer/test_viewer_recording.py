@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lambent.store.camera_paths import camera_at
+from lambent.store.camera_paths import TimedPath, camera_at
 from lambent.store.contract import CameraRecord
 from lambent.store.views import read_views
 from lambent.viewer.recording import KEY_S, Recording, smoothed
@@ -152,3 +152,21 @@ def test_two_windows_do_not_lose_views(state, tmp_path):
     state.save_view()
     other.add_camera(at(3), "other")
     assert [c.name for c in read_views(tmp_path).cameras] == ["view 1", "other"]
+
+
+def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
+    other = SavedViews(state.scene, tmp_path)
+    other.add_camera(at(3))
+    other.add_path(TimedPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0)))
+    state.record()
+    for k in range(1, 20):
+        state.now_s, state.camera = 0.1 * k, at(0.1 * k)
+        state.recorder.take(state.camera, state.now_s)
+    state.record()
+    state.save_view()
+    state.save_recording()
+    assert [m.text for m in state.messages[-2:]] == ["saved the view view 2", "saved the path walk 2"]
+    other.add_camera(at(4), "gate")
+    state.view_name = "gate"
+    state.save_view()
+    assert "the name is taken" in state.messages[-1].text and state.cameras[-1].name == "gate", "and is shown"
