@@ -74,6 +74,7 @@ class SavedViews:
 
     def rename_camera(self, old: str, new: str) -> bool:
         def change(views: Views) -> Views:
+            _check_there(old, self._camera_names(views))
             name = self._camera_name(views, new, but=old)
             renamed = (c.model_copy(update={"name": name}) if c.name == old else c for c in views.cameras)
             return views.model_copy(update={"cameras": tuple(renamed)})
@@ -98,6 +99,7 @@ class SavedViews:
 
     def rename_path(self, old: str, new: str) -> bool:
         def change(views: Views) -> Views:
+            _check_there(old, self._path_names(views))
             name = self._path_name(views, new, but=old)
             renamed = (p.model_copy(update={"name": name}) if p.name == old else p for p in views.paths)
             return views.model_copy(update={"paths": tuple(renamed)})
@@ -143,6 +145,11 @@ class SavedViews:
 
     def _take(self, views: Views) -> None:
         self._views = views
+
+
+def _check_there(name: str, names: set[str]) -> None:
+    if name not in names:
+        raise UserError("is no longer there: another window deleted or renamed it", got=name)
 
 
 def write_alone(file: Path, path: TimedPath) -> None:

@@ -170,3 +170,14 @@ def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
     state.view_name = "gate"
     state.save_view()
     assert "the name is taken" in state.messages[-1].text and state.cameras[-1].name == "gate", "and is shown"
+
+
+def test_what_another_window_deleted_cannot_be_renamed(state, tmp_path):
+    way = TimedPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0))
+    state.views.add_path(way, "walk 1")
+    state.views.add_camera(at(0), "door")
+    other = SavedViews(state.scene, tmp_path)
+    assert other.delete_path("walk 1") and other.delete_camera("door")
+    assert not state.views.rename_path("walk 1", "there") and "walk 1" in state.messages[-1].text
+    assert not state.views.rename_camera("door", "gate") and "door" in state.messages[-1].text
+    assert [p.name for p in state.paths] == ["tour"] and [c.name for c in state.cameras] == ["front", "side"]
