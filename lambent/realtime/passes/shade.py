@@ -113,7 +113,7 @@ class ShadePass:
 
     def _pipeline(self, draw: Draw, format: str) -> Any:
         constants = constants_of(draw)
-        key = (draw.integrator.shader, draw.planar, format, *constants.values())
+        key = (draw.integrator.shader, draw.planar, format, *constants.items())
         if key not in self._pipelines:
             module = self._module(draw)
             self._pipelines[key] = self._device.create_render_pipeline(
