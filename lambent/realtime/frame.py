@@ -98,7 +98,7 @@ class FrameState:
     antialias : bool
         Edges of the display image are blended, or, when accumulating, frames are jittered.
     jitter_px : tuple of float
-        Where light is looked up in each pixel: right of and above its centre, within (-.5, .5).
+        Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
     """
 
     camera: CameraRecord

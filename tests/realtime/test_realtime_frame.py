@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
+from lambent.realtime.camera import clip_from_world
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.scenes.geometry import patch, sphere
 from lambent.store.contract import CameraRecord
@@ -190,6 +191,15 @@ def test_progressive_frames_average(device) -> None:
     converged = renderer.converged(replace(state, antialias=False), 4 * 64)
     frames = renderer.converged(replace(state, antialias=False, n=64), 4 * 64)
     np.testing.assert_allclose(converged, frames, rtol=2e-4, atol=1e-5)  # the same samples in other frames
+
+
+def test_jitter_looks_right_of_and_below_the_middle_of_a_pixel() -> None:
+    width, height, right_px, below_px = 48, 36, 0.25, 0.375
+    per_px = 2 * 2.0 * np.tan(np.radians(FORWARD.fov_y_deg) / 2) / height  # metres in the target's plane
+    there = clip_from_world(FORWARD, width, height, 0.01, (right_px, below_px)) @ (
+        right_px * per_px, -below_px * per_px, 0.0, 1.0
+    )  # fmt: skip
+    np.testing.assert_allclose(there[:2], 0, atol=1e-9)
 
 
 def test_jitter_antialiases(device) -> None:
