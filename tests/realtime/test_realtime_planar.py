@@ -17,7 +17,9 @@ from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.mirror import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, mirror_views
 from lambent.realtime.mirror_integrators import interleaved_table, multi_ring_table
+from lambent.realtime.passes.near import FIRST_PX
 from lambent.realtime.patterns import radius
+from lambent.realtime.shader_source import assemble
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.floor_plan import floor_plan
 from lambent.scenes.geometry import box, patch, placed, sphere
@@ -208,6 +210,10 @@ def test_mirror_view_projects_and_clips() -> None:
         assert depths[0] <= 1.001
         below = clip @ [*(eye + 0.9 * to_floor * ray), 1]
         assert below[2] > below[3]  # before the near plane
+
+
+def test_cells_of_a_mirror_picture_have_one_size() -> None:
+    assert f"const NEAR_PX = {FIRST_PX};" in assemble("planar_mirror.wgsl")
 
 
 def test_covered_share_of_a_square_that_fills_half_the_picture() -> None:

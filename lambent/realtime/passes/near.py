@@ -12,7 +12,8 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer
 
 FORMAT = "rgba32float"
-FIRST_PX, MOST_LEVELS = 4, 7  # side of the finest cells; the coarsest have 256
+FIRST_PX = 4  # side of the finest cells, NEAR_PX of shaders/planar_mirror.wgsl
+MOST_LEVELS = 7  # the coarsest have 256
 
 
 class NearPass:

@@ -12,8 +12,8 @@ fn exit_distance(q: vec3f, w: vec3f) -> f32 {
     return clamp(0.999 * min(min(t.x, t.y), min(t.z, t.w)), 1e-3, FARTHEST);
 }
 
-// What a ray meets that passes a wall, or behind something, before anything is found: the surface that the picture shows where the ray
-// was last before all, as the sky beside the frame of a window.
+// What a ray meets that passes a wall, or behind something, before anything is found: the surface that the picture shows
+// where the ray was last before all, as the sky beside the frame of a window.
 fn hit_behind(place: Place, w: vec3f, free: f32) -> Hit {
     let projected = project(place.q + free * w);
     let plane = plane_at(projected.xy);

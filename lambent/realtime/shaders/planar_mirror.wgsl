@@ -1,5 +1,7 @@
 // A mirror picture, as its readers know it.
 
+const NEAR_PX = 4; // side of the finest cells of planar_near.wgsl, FIRST_PX of passes/near.py
+
 struct Mirror { // MIRROR_DTYPE in mirror.py
     eye: vec4f,
     row_x: vec4f, // q to clip x, y and w

@@ -1,5 +1,5 @@
-// What is nearest in each cell of a mirror picture, for searches: cells of 4 x 4 pixels from the planes seen, and each
-// further level from 2 x 2 cells of the one before. A texel: the normal's octahedral form, N.q and 1/depth.
+// What is nearest in each cell of a mirror picture, for searches: cells of NEAR_PX pixels a side from the planes seen,
+// and each further level from 2 x 2 cells of the one before. A texel: the normal's octahedral form, N.q and 1/depth.
 
 #include "screen.wgsl"
 #include "planar_mirror.wgsl"
@@ -14,11 +14,11 @@ fn octahedral(n: vec3f) -> vec2f {
 }
 
 @fragment fn near_first_main(screen: Screen) -> @location(0) vec4f {
-    let corner = vec2i(screen.position.xy) * 4;
+    let corner = vec2i(screen.position.xy) * NEAR_PX;
     var found = vec4f(0.0, 0.0, 1.0, -1e4);
     var nearest = 0.0; // 1/depth
-    for (var i = 0; i < 16; i++) {
-        let at = corner + vec2i(i & 3, i >> 2u);
+    for (var i = 0; i < NEAR_PX * NEAR_PX; i++) {
+        let at = corner + vec2i(i % NEAR_PX, i / NEAR_PX);
         let plane = textureLoad(finer, at, 0);
         let clip = (vec2f(at) + 0.5) / mirror.size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
         let w = mirror.forward.xyz + clip.x * mirror.across.xyz + clip.y * mirror.up.xyz;

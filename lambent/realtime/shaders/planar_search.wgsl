@@ -8,7 +8,7 @@ const CELLS = 10.0; // along the rows of the mirror picture, up to twice as many
 // The plane of what is nearest in the cell about a texel of the mirror picture.
 fn cell_plane(texel: vec2f, level: u32) -> vec4f {
     let last = vec2i(textureDimensions(mirror_near, level)) - 1;
-    let cell = vec2i(floor(texel / 4.0)) >> vec2u(level);
+    let cell = vec2i(floor(texel / f32(NEAR_PX))) >> vec2u(level);
     let found = textureLoad(mirror_near, clamp(cell, vec2i(0), last), level);
     let z = 1.0 - abs(found.x) - abs(found.y);
     let fold = max(-z, 0.0) * select(vec2f(-1.0), vec2f(1.0), found.xy >= vec2f(0.0));
@@ -46,8 +46,8 @@ fn search(place: Place, w: vec3f, jitter: f32) -> Hit {
     let from_px = project(place.q).xy;
     let way_px = project(place.q + t_last * w).xy - from_px;
     let step_px = max(abs(way_px.x), abs(way_px.y)) / f32(CELL_STEPS);
-    let cell_px = clamp(8.0 * step_px, 4.0, max(mirror.size.x / CELLS, 4.0));
-    let level = min(u32(log2(cell_px / 4.0)), textureNumLevels(mirror_near) - 1u);
+    let cell_px = clamp(8.0 * step_px, f32(NEAR_PX), max(mirror.size.x / CELLS, f32(NEAR_PX)));
+    let level = min(u32(log2(cell_px / f32(NEAR_PX))), textureNumLevels(mirror_near) - 1u);
     let moved = 0.999 * jitter;
     var before = 0.0;
     var nearest = -1.0;

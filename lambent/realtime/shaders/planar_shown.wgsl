@@ -1,6 +1,6 @@
 // Specular light of an object that has pixels on planar reflectors: what these reflect was found before; other pixels, and
-// lobes of transmission, have the probe's light. Interleaved light is cleaned here, along columns, as far as the lobe is wider than the pixels it is mixed
-// from.
+// lobes of transmission, have the probe's light. Interleaved light is cleaned here, along columns, as far as the lobe is
+// wider than the pixels it is mixed from.
 
 #include "lobe_width.wgsl"
 
