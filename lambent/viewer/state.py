@@ -419,8 +419,10 @@ class ViewerState:
         file_name, material = self.file_name(name), self.edits.current(name)
         try:
             with_account(material, self.scene.materials[name], None, {}).save(file_in(self.folder, file_name))
-        except (UserError, OSError) as error:
+        except UserError as error:
             self.say(f"not saved: {error}")
+        except OSError as error:  # its own words name a file that was to become this one
+            self.say(f"not saved: {self.folder / file_name}: cannot be written ({error.strerror})")
         else:
             self.saved[name] = material
             self.say(f"saved {file_name}")

@@ -1,5 +1,7 @@
 """The state of the window: edits with undo, selection, messages, saving."""
 
+import errno
+
 import pytest
 
 from lambent.materials.document import load_material
@@ -167,3 +169,14 @@ def test_who_grows_is_lifted(state):
     assert state.camera.position[1] == pytest.approx(before.position[1] + 0.3)
     state.set_fov(20.0)
     assert state.camera.fov_y_deg == 20
+
+
+def test_a_material_that_cannot_be_written_is_said_by_its_name(state, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(errno.EACCES, "Permission denied", ".brass.x1.json")
+
+    monkeypatch.setattr("tempfile.mkstemp", refused)
+    state.save_material("brass")
+    said = state.messages[-1].text
+    assert said == f"not saved: {state.folder / 'brass.json'}: cannot be written (Permission denied)"
+    assert "brass" not in state.saved
