@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.mitsuba_scene import SceneBuilder
+from lambent.bake.surface_points import face_areas, points_in
 from lambent.bake.vectors import array_of, vectors
 from lambent.core.colour import luminance
-from lambent.core.frames import normalize
 from lambent.scenes.scene import Scene
 
 Array = NDArray[np.floating]
@@ -59,8 +59,5 @@ def _surface_points(scene: Scene, count: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(0)
     corners = scene.corners
     scale = np.concatenate([np.full(len(o.mesh.faces), o.light_map_scale) for o in scene.objects])
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1) * scale**2
-    face = rng.choice(len(area), size=count, p=area / area.sum())
-    weights = rng.dirichlet((1, 1, 1), size=count)
-    return np.einsum("kcx,kc->kx", corners[face], weights), normalize(cross[face])
+    area = face_areas(corners) * scale**2
+    return points_in(corners, rng.choice(len(area), size=count, p=area / area.sum()), rng)

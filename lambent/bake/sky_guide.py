@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from lambent.bake import paths
 from lambent.bake.sky_bins import BIN_SR, BINS, COLUMNS, ROWS, SkyBins, middles
+from lambent.bake.surface_points import face_areas, points_in
 from lambent.bake.vectors import vectors
 from lambent.bake.work import seed_of
 from lambent.core.frames import normalize
@@ -131,7 +132,7 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> Sky
     size_m = CELL_M
     while True:
         groups = groups_of(scene, size_m)
-        pilot = _Pilot(whole, bins, _both_sides(whole, *surface_points(scene, SURFACE_POINTS)), groups)
+        pilot = _Pilot(whole, bins, _both_sides(whole, *_surface_points(scene, SURFACE_POINTS)), groups)
         if len(pilot.group) <= 4 * MOST_TABLES:
             break
         size_m = groups.size_m * 1.5
@@ -209,18 +210,17 @@ class _Pilot:
         return np.asarray((np.where(cosine > 0, brought, 0) @ light) >= OPEN * (cosine @ light))
 
 
-def surface_points(scene: Scene, count: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _surface_points(scene: Scene, count: int) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Points (count, 3) on a scene's surfaces, normals of their triangles, and whether light crosses there."""
     rng = np.random.default_rng(0)
     corners = scene.corners
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
+    area = face_areas(corners)
     share = np.sqrt(area / area.sum())  # between area and number: small things are not forgotten
     face = np.sort(rng.choice(len(area), size=count, p=share / share.sum()))
-    weights = rng.dirichlet((1, 1, 1), size=count)
+    position, normal = points_in(corners, face, rng)
     crossed = [o.material in scene.measured or scene.materials[o.material].transmits for o in scene.objects]
     crossed_there = np.repeat(crossed, [len(o.mesh.faces) for o in scene.objects])[face]
-    return np.einsum("kcx,kc->kx", corners[face], weights), normalize(cross[face]), crossed_there
+    return position, normal, crossed_there
 
 
 def _both_sides(
