@@ -2,8 +2,8 @@
 
 - Where the scene says so; else
 - above a flat object (floor, mirror, table top), on the side of the middle of the scene: half the object's length,
-  half the free way and EYE_HEIGHT are upper bounds of the height. Over its middle, or, where something hides from there
-  much of what its viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
+  half the free way and EYE_HEIGHT_M are upper bounds of the height. Over its middle, or, where something hides from
+  there much of what its viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
 - in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
 """
 
@@ -24,10 +24,10 @@ from lambent.core.frames import basis, normalize
 from lambent.scenes.scene import Mesh
 
 Array = NDArray[np.floating]
-EYE_HEIGHT = 1.6  # metres
+EYE_HEIGHT_M = 1.6
 GRID = 5  # points along each side of a flat object that a probe may stand over
 FLAT_SHARE = 0.9  # of an object's area with normals along one axis
-CLEARANCE = 0.02  # metres beyond the surface of the solid that a centre is moved out of
+CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of
 MOVES = 4
 ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides
 
@@ -68,7 +68,7 @@ def _above(mesh: Mesh, centre: Array, axis: Array, middle: Array, without: Any) 
     top = centre + axis * ((mesh.positions - centre) @ axis).max()
     size = float(np.ptp(mesh.positions, axis=0).max())
     free = float(_distances(without, top + axis * 1e-3, axis[None])[0])
-    return np.asarray(top + axis * min(EYE_HEIGHT, size / 2, free / 2))
+    return np.asarray(top + axis * min(EYE_HEIGHT_M, size / 2, free / 2))
 
 
 def places_above(mesh: Mesh, middle: Array, without: Any) -> Array:
@@ -94,7 +94,7 @@ def _moved_out(centre: Array, solids: SolidTest, without: Any) -> Array:
         if not both.all():
             break
         t = _distances(without, centre, directions)
-        centre = centre + directions[np.argmin(t)] * (t.min() + CLEARANCE)
+        centre = centre + directions[np.argmin(t)] * (t.min() + CLEARANCE_M)
     return centre
 
 
