@@ -45,7 +45,7 @@ def evaluate(
     """Of aim.wgsl, with a table and planes of its own."""
     source = assemble("aim.wgsl").replace("@group(2) @binding(4) var<storage, read> aim: array<vec4f>;", "")
     declarations = (
-        f"const PLANES = {len(planes)}u;\nconst LOOKUP = 1u;\n"
+        f"const PLANES = {len(planes)}u;\nconst LOOKUP = 1u;\nconst PLANE_ACTIVE_M = 1e-6;\n"
         "fn max_norm(v: vec3f) -> f32 { let a = abs(v); return max(a.x, max(a.y, a.z)); }\n"
         "fn density_at(x: vec3f, w: vec3f) -> f32 {\n"
         "    let found = aimed_lookup(x, w);\n    return aim_probability(found.direction) * found.density;\n}\n"

@@ -10,7 +10,6 @@
 
 const AIM_NODES = 3u;
 const BELOW_ONE = 0.99999994;
-const AIM_ACTIVE = 1e-6; // m: planes_lookup leaves out planes that a point is nearer to or behind
 
 // Places of one direction: that in the probe, and the solid angle of the cube's square [-1, 1]^2 there, at the surface.
 struct Aimed {
@@ -97,7 +96,7 @@ fn aim_draw(given: vec2f) -> vec4f {
 // Whether the probe's centre is inside of every plane that x is inside of.
 fn aim_maps(x: vec3f) -> bool {
     for (var i = 0u; i < PLANES; i++) {
-        if (dot(planes[i].xyz, x) + planes[i].w > AIM_ACTIVE && planes[i].w <= AIM_ACTIVE) { return false; }
+        if (dot(planes[i].xyz, x) + planes[i].w > PLANE_ACTIVE_M && planes[i].w <= PLANE_ACTIVE_M) { return false; }
     }
     return LOOKUP != 2u;
 }
@@ -109,7 +108,7 @@ fn aimed_lookup(x: vec3f, w: vec3f) -> Aimed {
     var heights = 1.0;
     for (var i = 0u; i < PLANES; i++) {
         let height = dot(planes[i].xyz, x) + planes[i].w;
-        let near = -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > AIM_ACTIVE);
+        let near = -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > PLANE_ACTIVE_M);
         heights = select(heights, planes[i].w / height, near > nearness);
         nearness = max(nearness, near);
     }
@@ -133,7 +132,7 @@ fn aim_towards(x: vec3f, q: vec3f) -> Towards {
     var heights = 1.0;
     for (var i = 0u; i < PLANES; i++) {
         let height = dot(planes[i].xyz, x) + planes[i].w;
-        let near = select(0.0, -dot(planes[i].xyz, q) / planes[i].w, height > AIM_ACTIVE);
+        let near = select(0.0, -dot(planes[i].xyz, q) / planes[i].w, height > PLANE_ACTIVE_M);
         heights = select(heights, planes[i].w / height, near > nearness);
         nearness = max(nearness, near);
     }

@@ -74,6 +74,8 @@ fn max_norm(v: vec3f) -> f32 {
     return max(a.x, max(a.y, a.z));
 }
 
+const PLANE_ACTIVE_M = 1e-6; // planes that a point is nearer to, or behind, are left out
+
 // Nearest hit with the bounding planes, as seen from the probe's centre (thesis 4.4.1). 1/t is the largest
 // approach/height over the planes; the reciprocal height is the same for all samples of a pixel, so it is hoisted.
 fn planes_lookup(x: vec3f, w: vec3f) -> Lookup {
@@ -81,7 +83,7 @@ fn planes_lookup(x: vec3f, w: vec3f) -> Lookup {
     for (var i = 0u; i < PLANES; i++) {
         let plane = planes[i];
         let height = dot(plane.xyz, x) + plane.w;
-        nearness = max(nearness, -dot(plane.xyz, w) * select(0.0, 1.0 / height, height > 1e-6));
+        nearness = max(nearness, -dot(plane.xyz, w) * select(0.0, 1.0 / height, height > PLANE_ACTIVE_M));
     }
     if (nearness < 1e-6) { return Lookup(w, 1.0); }
     return Lookup(x + w / nearness, 1.0 / nearness);
