@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.surface_points import face_areas
+
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]
 CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested in one go: some 200 MB
@@ -39,8 +41,7 @@ def corners_of(geometry: dict[str, Array], width: int, height: int) -> Array:
 
 def density_of(geometry: dict[str, Array], corners: Array) -> Array:
     """Square metres per texel (T,) of triangles, 0 where one has no area in the map."""
-    p = geometry["positions"][geometry["faces"]].astype(float)
-    world = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    world = face_areas(geometry["positions"][geometry["faces"]].astype(float))
     in_map = np.abs(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) / 2
     return np.divide(world, in_map, out=np.zeros(len(world)), where=in_map > 0)
 
