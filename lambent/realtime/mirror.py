@@ -23,7 +23,7 @@ Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
 MOST_MARGIN = 0.1  # of the picture's longer side: what a wide lobe sees beyond is left to the probe
 STEP_PX = 64  # sizes are multiples of this: six MIP levels without remainder
-CLEARANCE_M = 2e-4  # over the reflector's highest vertex: what lies in its plane is not mirrored
+CLEARANCE = 1e-5  # over the reflector's highest vertex, of the largest coordinate: what lies below is not mirrored
 LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
 
@@ -83,7 +83,8 @@ def mirror_views(
         above = float(plane[:3] @ frame["eye"][:3] + plane[3])
         if above < 0 and reflector.two_sided:
             plane, above = -plane, -above
-        share = covered_share(frame, np.asarray(reflector.outline, float)) if above > 2 * CLEARANCE_M else 0.0
+        in_front = above > 2 * clearance_m(reflector, frame["eye"][:3])
+        share = covered_share(frame, np.asarray(reflector.outline, float)) if in_front else 0.0
         if share >= LEAST_SHARE:
             seen.append((share, reflector, plane))
     seen.sort(key=lambda one: -one[0])
@@ -93,6 +94,14 @@ def mirror_views(
         _view(frame, plane, r, share, (width, height), place, i) for i, (share, r, plane) in enumerate(seen[:most])
     )
     return [view for view in views if view is not None]
+
+
+def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
+    """How far over a reflector its mirror picture begins, m: some 80 roundings of float32.
+
+    Light from outside comes in through it, below what stands on the reflector.
+    """
+    return CLEARANCE * max(float(np.abs(reflector.outline).max()), float(np.abs(eye).max()))
 
 
 def covered_share(frame: NDArray[np.void], outline: Floats) -> float:
@@ -146,7 +155,8 @@ def _view(
     steepest = max(float(corner @ n) for corner in corners)
     if steepest <= 0:
         return None
-    near = np.array([*n, d - reflector.deviation_m - CLEARANCE_M])
+    clearance = clearance_m(reflector, frame["eye"][:3])
+    near = np.array([*n, d - reflector.deviation_m - clearance])
     clip[2] = clip[3] - 0.999 / steepest * near
 
     seen = frame.copy()
@@ -163,7 +173,7 @@ def _view(
     for name in ("across", "up", "forward"):
         uniform[name][:3] = seen[name][:3]
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
-    uniform["tolerance"] = reflector.deviation_m + 2 * CLEARANCE_M
+    uniform["tolerance"] = reflector.deviation_m + 2 * clearance
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)
     uniform["levels"], uniform["number"] = levels_of((int(wide[0]), int(wide[1]))), number
     size_px, plan = (int(wide[0]), int(wide[1])), _plan(reflector.plan, plane, eye) if upright else None

@@ -4,7 +4,8 @@ Seen from below its floor, a room ends at the foot of its walls; past it the mir
 that the floor mirrors lies. Past the edge of a table it sees what the table's points see, too. So edges are told apart,
 along the true outline, bays and all: a plan is a grid of signed distances, positive on the reflector and past its open
 edges, negative past a wall. Where a point beyond the reflector belongs is told by the nearest point of its edge:
-something stands there, or nothing does.
+something stands there, or nothing does. Floors reach under skirtings and into walls: what of a reflector is cut off by
+the foot of what stands on it, a strip along the edge, is no part of it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion, distance_transform_edt, maximum_filter, uniform_filter
+from scipy.ndimage import binary_erosion, distance_transform_edt, label, maximum_filter, uniform_filter
 
 from lambent.core.frames import basis
 
@@ -22,6 +23,7 @@ Mask = NDArray[np.bool_]
 CELLS = 600  # per size of the reflector, the root of its area
 MOST_CELLS = 2048  # along one side
 HEIGHTS = (0.01, 0.03)  # over the reflector, of its size, at which a wall is looked for
+FOOT = 0.0005  # over the reflector, of its size, where the foot of things is looked for
 SHARE = 0.6  # of a stretch of edge and of the heights, on which something stands
 BORDER = 4  # cells around the reflector; beyond, the plan goes on as it ends
 NEAR = 0.02  # of the size, from an edge to what stands on it
@@ -61,9 +63,12 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | No
     corner = low - BORDER * cell
     columns, rows = (np.ceil((high - low) / cell).astype(int) + 2 * BORDER).tolist()
     fine = _filled(((flat - corner) / cell + 0.5) * FINE - 0.5, (rows * FINE, columns * FINE))
+    height = float((faces @ normal).mean())
+    foot = _cut((corners @ normal) - height - FOOT * size, corners)
+    standing = _drawn(((foot @ axes - corner) / cell + 0.5) * FINE - 0.5, fine.shape)
+    fine = _without_strips(fine, standing, NEAR * size / cell * FINE)
     share_of = fine.reshape(rows, FINE, columns, FINE).mean(axis=(1, 3))
     covered = share_of >= 0.5
-    height = float((faces @ normal).mean())
     share = np.zeros((rows, columns))
     for over in HEIGHTS:
         cut = _cut((corners @ normal) - height - over * size, corners)
@@ -83,6 +88,18 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | No
     signed = np.where(past, outwards[tuple(nearest)] - beyond, before - inwards[tuple(wall)])
     steps = np.clip(np.floor((signed - MARGIN) * STEPS), -127, 127).astype(np.int8)
     return FloorPlan(corner @ axes.T + height * normal, across, along, cell, steps)
+
+
+def _without_strips(covered: Mask, standing: Mask, width: float) -> Mask:
+    """`covered` without what `standing` cuts off along its edge, in strips up to `width` cells wide on the mean."""
+    pieces, count = label(covered & ~standing)
+    inner = binary_erosion(pieces > 0)
+    cells = np.bincount(pieces.ravel(), minlength=count + 1)
+    border = np.bincount(pieces[~inner], minlength=count + 1)
+    at_edge = np.bincount(pieces[~binary_erosion(covered)], minlength=count + 1) > 0
+    strip = at_edge & (2 * cells <= width * border)
+    strip[0] = False
+    return np.asarray(covered & ~strip[pieces])
 
 
 def _edge_from(share: Floats, covered: Mask) -> Floats:

@@ -67,6 +67,24 @@ def test_the_foot_of_a_wall_is_met_within_a_cell(degrees: float) -> None:
         assert (sign * distance_m(found, *points) > 0).all()
 
 
+@pytest.mark.parametrize("degrees", [0, 30])
+def test_a_floor_ends_at_the_foot_of_walls_that_stand_on_it(degrees: float) -> None:
+    """It reaches 3 cm under them, which is a strip along its edge; a room beside, .5 m wide, is more than that."""
+    how = turn("y", degrees)
+    floor = patch((-0.03, 0, -0.03), (0, 0, 4.06), (4.06, 0, 0))
+    room = [patch((0, -0.01, 0), (4, 0, 0), (0, 2, 0)), patch((0, -0.01, 0), (0, 0, 4), (0, 2, 0))]
+    room += [patch((4, -0.01, 0), (0, 0, 4), (0, 2, 0)), patch((0, -0.01, 4), (4, 0, 0), (0, 2, 0))]
+    room += [patch((3.5, -0.01, 0), (0, 0, 4), (0, 2, 0)), placed(box((0.1, 1, 0.1)), (1, 0.4, 1.7))]
+    found = plan(placed(floor, (0, 0, 0), how), placed(merge(room), (0, 0, 0), how))
+    turned = np.asarray(how)[:3, :3].T
+    assert found is not None
+    along = np.stack([np.linspace(0.1, 3.9, 50), np.zeros(50), np.zeros(50)], axis=1)
+    for behind, sign in ((-0.7 * found.cell_m, 1), (0.3 * found.cell_m, -1), (0.02, -1), (0.1, -1)):
+        assert (sign * distance_m(found, *((along - (0, 0, behind)) @ turned)) > 0).all()
+    inside = np.array([(1, 0, 1.7), (3.49, 0, 2), (3.51, 0, 2), (3.98, 0, 2), (3.75, 0, 3.98)])
+    assert (distance_m(found, *(inside @ turned)) > 0).all()
+
+
 def test_walls_are_told_from_open_sides() -> None:
     """A room of three walls, one over part of its side, one that begins above the floor; a screen in the middle."""
     room = merge(

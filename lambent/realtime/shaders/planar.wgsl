@@ -14,6 +14,7 @@ override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the mirror picture s
 
 const FARTHEST = 2e4; // m
 const FADE_PX = 24.0; // beyond the edges of the mirror picture
+const BESIDE = 8u;    // neighbours, up to two pixels away
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
 struct Place {
@@ -56,16 +57,32 @@ fn inside_picture(projected: vec3f) -> f32 {
     return select(0.0, 1.0 - smoothstep(0.0, FADE_PX, max(beyond.x, beyond.y)), projected.z > 1e-6);
 }
 
-fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
-    let q = v.p_world - mirror.eye.xyz;
-    let seen = plane_at(v.position.xy + mirror.offset);
-    let t = meet(seen, q, w_mirror, FARTHEST);
-    return Place(q, seen, t, s.x);
-}
-
 // Whether the picture shows anything there: the mirror eye sees nothing past the foot of a wall.
 fn is_shown(plane: vec4f) -> bool {
     return dot(plane.xyz, plane.xyz) > 0.5;
+}
+
+// The point of the reflector at a texel of the mirror picture.
+fn reflector_at(texel: vec2f) -> vec3f {
+    let clip = texel / mirror.size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
+    let w = mirror.forward.xyz + clip.x * mirror.across.xyz + clip.y * mirror.up.xyz;
+    return w * (-(dot(mirror.plane.xyz, mirror.eye.xyz) + mirror.plane.w) / dot(mirror.plane.xyz, w));
+}
+
+// Pixels at the very foot of a wall, which the plan counts as past it, look from beside: the probe's light there would be
+// that of windows behind the wall.
+fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
+    var q = v.p_world - mirror.eye.xyz;
+    let texel = v.position.xy + mirror.offset;
+    var seen = plane_at(texel);
+    for (var i = 0u; i < BESIDE && !is_shown(seen); i++) {
+        let step = (1.0 + f32(i >> 2u)) * select(-1.0, 1.0, (i & 1u) == 0u);
+        let beside = texel + select(vec2f(step, 0.0), vec2f(0.0, step), (i & 2u) == 0u);
+        seen = plane_at(beside);
+        if (is_shown(seen)) { q = reflector_at(beside); }
+    }
+    let t = meet(seen, q, w_mirror, FARTHEST);
+    return Place(q, seen, t, s.x);
 }
 
 // Depth of what the picture shows at a point's place, relative to the point's.

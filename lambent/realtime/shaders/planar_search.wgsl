@@ -30,6 +30,7 @@ fn unhindered(place: Place, w: vec3f, t_out: f32) -> Met {
     let t_shown = meet(shown, place.q, w, FARTHEST);
     let outermost = plane_at(project(place.q + t_out * w).xy);
     let t_outermost = meet(outermost, place.q, w, t_out);
+    if (!is_shown(shown) && is_shown(place.seen)) { return Met(t_first, place.seen); } // past the foot of a wall
     let passes = is_shown(outermost) && abs(t_shown - t) >= 0.03 * t;
     let farther = max(min(meet(shown, place.q, w, t_out), t_out), t_outermost);
     var found = plane;
