@@ -21,10 +21,9 @@ from lambent.bake.solids import SolidTest
 from lambent.bake.vectors import array_of, rays_from
 from lambent.core.cubemap import face_directions
 from lambent.core.frames import basis, normalize
-from lambent.scenes.scene import Mesh
+from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
 Array = NDArray[np.floating]
-EYE_HEIGHT_M = 1.6
 GRID = 5  # points along each side of a flat object that a probe may stand over
 FLAT_SHARE = 0.9  # of an object's area with normals along one axis
 CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of

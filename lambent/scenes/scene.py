@@ -18,6 +18,7 @@ from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
 Triple = tuple[float, float, float]
+EYE_HEIGHT_M = 1.6  # of a person who stands
 
 
 @dataclass(frozen=True)

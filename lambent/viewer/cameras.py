@@ -13,11 +13,11 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
+from lambent.scenes.scene import EYE_HEIGHT_M
 from lambent.store.contract import CameraRecord, Triple
 
 Bounds = tuple[Triple, Triple]
 
-EYE_HEIGHT_M = 1.6
 WALK_M_S, FAST = 1.4, 3.0
 PITCH_LIMIT_RAD = math.radians(85)
 TURN_RAD_PX = math.radians(0.3)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from lambent.core.errors import UserError
 from lambent.core.false_colour import Range
 from lambent.materials.document import Material
+from lambent.scenes.scene import EYE_HEIGHT_M
 from lambent.store.camera_paths import TimedPath, camera_at
 from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
 from lambent.viewer import cameras
@@ -194,7 +195,7 @@ class ViewerState:
     noise_scale: Range = field(default_factory=lambda: NOISE_SCALE)  # of the noise of the light map
     light_map_noise: bool = False  # whether the store says how exact its light map is
     near_m: float | None = None  # nearer things are cut away; None: by the scene's size
-    walker: Walker = field(default_factory=lambda: Walker(cameras.WALK_M_S, cameras.EYE_HEIGHT_M))
+    walker: Walker = field(default_factory=lambda: Walker(cameras.WALK_M_S, EYE_HEIGHT_M))
     views: SavedViews | None = None
     view_name: str = ""  # typed for the next saved view
     renaming: tuple[str, str] | None = None  # "camera" or "path", and its name
