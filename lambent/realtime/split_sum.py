@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lambent.core.sequences import hammersley
 from lambent.materials.document import Lobe
 from lambent.realtime.patterns import radius, relative_density
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.shader_source import assemble
 
 Floats = NDArray[np.floating]
@@ -95,13 +96,7 @@ def prefiltered_cube(device: Any, source: Any, sampler: Any) -> Any:
             view = target.create_view(
                 dimension="2d", base_mip_level=level, mip_level_count=1, base_array_layer=face, array_layer_count=1
             )
-            draw = encoder.begin_render_pass(
-                color_attachments=[{"view": view, "load_op": "clear", "store_op": "store"}]
-            )
-            draw.set_pipeline(pipeline)
-            draw.set_bind_group(0, group)
-            draw.draw(3)
-            draw.end()
+            cover(encoder, view, pipeline, [group], {})
     device.queue.submit([encoder.finish()])
     return target
 

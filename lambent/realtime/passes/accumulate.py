@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import wgpu
 
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.shader_source import assemble
 
 MEAN_FORMAT = "rgba32float"
@@ -40,14 +41,7 @@ class AccumulatePass:
         into = index % 2
         weight = np.array([1 / (index + 1), 0, 0, 0], np.float32)
         self._device.queue.write_buffer(self._weight, 0, weight)
-        draw = encoder.begin_render_pass(
-            color_attachments=[{"view": self._means[into].create_view(), "load_op": "clear", "store_op": "store"}],
-            **timestamps,
-        )
-        draw.set_pipeline(self._pipeline)
-        draw.set_bind_group(0, self._groups[into])
-        draw.draw(3)
-        draw.end()
+        cover(encoder, self._means[into].create_view(), self._pipeline, [self._groups[into]], timestamps)
         return self._means[into]
 
     def _fit(self, frame: Any) -> None:

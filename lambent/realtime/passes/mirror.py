@@ -13,6 +13,7 @@ from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.mirror import MIRROR_DTYPE, MirrorView, levels_of
 from lambent.realtime.parts import Cut, Steps, Whole
 from lambent.realtime.passes.depth import DEPTH_FORMAT, DepthPass
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.passes.shade import Draw, ShadePass, Stage
 from lambent.realtime.passes.walls import WallsPass
 from lambent.realtime.resources import Layouts, SceneResources
@@ -118,13 +119,7 @@ class MirrorPass:
             target.end()
             yield
         for group, into in zip(picture.mip_groups, picture.level_views[1:], strict=True):
-            level = part.encoder.begin_render_pass(
-                color_attachments=[{"view": into, "load_op": "clear", "store_op": "store"}], **timer.writes("mips")
-            )
-            level.set_pipeline(self._mips)
-            level.set_bind_group(0, group)
-            level.draw(3)
-            level.end()
+            cover(part.encoder, into, self._mips, [group], timer.writes("mips"))
         return calls
 
     def picture(self, size: tuple[int, int]) -> MirrorPicture:

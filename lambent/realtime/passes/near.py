@@ -7,6 +7,7 @@ from typing import Any
 import wgpu
 
 from lambent.realtime.passes.mirror import MirrorPicture
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer
@@ -51,13 +52,8 @@ class NearPass:
         self.view(picture.size)
         finer = picture.planes_view
         for level, into in enumerate(self._levels):
-            render = encoder.begin_render_pass(
-                color_attachments=[{"view": into, "load_op": "clear", "store_op": "store"}], **timer.writes("mips")
-            )
-            render.set_pipeline(self._next if level else self._first)
-            render.set_bind_group(0, self._layouts.group(self._layout, uniform, finer))
-            render.draw(3)
-            render.end()
+            group = self._layouts.group(self._layout, uniform, finer)
+            cover(encoder, into, self._next if level else self._first, [group], timer.writes("mips"))
             finer = into
 
     def _pipeline(self, entry: str) -> Any:

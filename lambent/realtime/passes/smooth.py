@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from lambent.realtime.parts import Cut, Steps, Whole
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
@@ -28,14 +29,6 @@ class SmoothPass:
         """Draw the texture `shown` into the view `target`."""
         group = self._layouts.group(self._layouts.shown, shown.create_view(), self._sampler)
         for band in part.bands("smooth", shown.size[:2]):
-            draw = part.encoder.begin_render_pass(
-                color_attachments=[{"view": target, "load_op": band.load_op, "store_op": "store"}],
-                **timer.writes("smooth"),
-            )
-            band.cut(draw)
-            draw.set_pipeline(self._pipeline)
-            draw.set_bind_group(0, group)
-            draw.draw(3)
-            draw.end()
+            cover(part.encoder, target, self._pipeline, [group], timer.writes("smooth"), band)
             yield
         return 0

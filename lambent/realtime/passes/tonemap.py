@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import wgpu
 
 from lambent.realtime.parts import Cut, Steps, Whole
+from lambent.realtime.passes.screen import cover
 from lambent.realtime.resources import Layouts
 from lambent.realtime.shader_source import assemble
 
@@ -45,15 +46,6 @@ class TonemapPass:
             layout=self._group_layout, entries=[{"binding": i, "resource": view} for i, view in enumerate(views)]
         )
         for band in part.bands("tonemap", seen.size[:2]):
-            draw = part.encoder.begin_render_pass(
-                color_attachments=[{"view": target, "load_op": band.load_op, "store_op": "store"}],
-                **timer.writes("tonemap"),
-            )
-            band.cut(draw)
-            draw.set_pipeline(self._pipeline)
-            draw.set_bind_group(0, frame_group)
-            draw.set_bind_group(1, group)
-            draw.draw(3)
-            draw.end()
+            cover(part.encoder, target, self._pipeline, [frame_group, group], timer.writes("tonemap"), band)
             yield
         return 0
