@@ -35,8 +35,6 @@ from lambent.store.contract import (
     LEAN,
     SIDES,
     TIMINGS,
-    CameraRecord,
-    PathRecord,
     ReflectorPart,
     ReflectorRecord,
     SceneRecord,
@@ -442,16 +440,13 @@ def _tell_if_too_few(name: str, meta: dict[str, Any]) -> None:
 def scene_record_of(scene: Scene) -> SceneRecord:
     """What the store says of the scene besides its arrays."""
 
-    def camera(c: Any) -> CameraRecord:
-        return CameraRecord(name=c.name, position=c.position, target=c.target, up=c.up, fov_y_deg=c.fov_y_deg)
-
     low, high = (tuple(float(x) for x in corner) for corner in scene.bounds)
     return SceneRecord(
         name=scene.name,
         objects=atlases.object_records(scene),
         materials=dict(scene.materials),
-        cameras=tuple(camera(c) for c in scene.cameras),
-        paths=tuple(PathRecord(name=p.name, keys=tuple(map(camera, p.keys)), seconds=p.seconds) for p in scene.paths),
+        cameras=scene.cameras,
+        paths=scene.paths,
         reflectors=tuple(_reflector_record(r) for r in find_reflectors(scene)),
         exposure_ev=scene.exposure_ev,
         bounds=(low, high),  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from lambent.bake.mitsuba_scene import environment_dict
 from lambent.bake.sky import SUN_RADIUS_RAD
 from lambent.bake.vectors import array_of, vectors
 from lambent.core.cubemap import directions_at, face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.scenes.scene import Environment, SunSky
 from lambent.store.contract import HALF_MAX
 

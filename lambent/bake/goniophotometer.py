@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.engine import engine
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.measured.gonio import GonioTable

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lambent.bake.material_plugin import material_dict, register_material_plugin
 from lambent.bake.mitsuba_scene import environment_dict, mesh_of
 from lambent.bake.table_plugin import table_dict
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.core.metrics import display_pair, flip, psnr, tile_means
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.texels import Texels
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 
 Array = NDArray[np.floating]
 KERNEL, WIDE = 0.3, 0.7  # texels: standard deviation along the surface, and that of texels that are mostly off it

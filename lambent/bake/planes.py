@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.store.contract import FAR
 
 Array = NDArray[np.floating]

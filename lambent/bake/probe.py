@@ -21,7 +21,7 @@ from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
 from lambent.bake.vectors import array_of, vectors
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 from lambent.store.contract import FAR, HALF_MAX

@@ -20,7 +20,7 @@ from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.solids import SolidTest
 from lambent.bake.vectors import array_of, rays_from
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import basis, normalize
+from lambent.core.directions import basis, normalize
 from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
 Array = NDArray[np.floating]

@@ -29,7 +29,7 @@ from lambent.bake.probe import LightMapCache, Probe
 from lambent.bake.vectors import array_of, rays_from
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]

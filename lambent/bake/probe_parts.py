@@ -22,7 +22,7 @@ from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.probe_centre import centre_of, flat_axis
 from lambent.bake.solids import SolidTest
 from lambent.bake.vectors import rays_from
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere, r2
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject

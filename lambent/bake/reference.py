@@ -13,12 +13,11 @@ from lambent.bake import paths
 from lambent.bake.emitters import balance_emitters
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.work import seed_of
-from lambent.core.frames import normalize
+from lambent.core.camera import Camera, camera_axes
 from lambent.core.progress import Progress, silent
-from lambent.scenes.scene import Camera, Scene
+from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 
-Array = NDArray[np.floating]
 PATHS_AT_ONCE = 1 << 20
 MAX_DEPTH = 16
 
@@ -65,14 +64,9 @@ def render_reference(
     return mean.reshape(shape).astype(np.float32), variance.reshape(shape).astype(np.float32)
 
 
-def camera_axes(camera: Camera) -> tuple[Array, Array, Array]:
-    """Unit vectors to the right, up and forward in world space."""
-    forward = normalize(np.subtract(camera.target, camera.position).astype(float))
-    right = normalize(np.cross(forward, camera.up))
-    return right, np.cross(right, forward), forward
-
-
-def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, seed: int, max_depth: int) -> Array:
+def _pass(
+    scene: object, camera: Camera, size: tuple[int, int], samples: int, seed: int, max_depth: int
+) -> NDArray[np.floating]:
     """Sums and sums of squares (2, pixels, 3) over `samples` paths per pixel."""
     width, height = size
     count = width * height * samples

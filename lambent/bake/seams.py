@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.texels import BEYOND, Texels
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 
 Array = NDArray[np.floating]
 BORDER = 4.0  # texels from the border at which nothing is averaged any more

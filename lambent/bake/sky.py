@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.vectors import array_of, vectors
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.scenes.scene import SunSky
 
 Array = NDArray[np.floating]

@@ -22,7 +22,7 @@ from lambent.bake.sky_bins import BIN_SR, BINS, COLUMNS, ROWS, SkyBins, middles
 from lambent.bake.surface_points import face_areas, points_in
 from lambent.bake.vectors import vectors
 from lambent.bake.work import seed_of
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.scenes.scene import Scene
 
 Array = NDArray[np.floating]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 
 Array = NDArray[np.floating]
 

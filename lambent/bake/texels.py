@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.coverage import Pieces, corners_of, cross, density_of, in_cell, pieces_of, placed
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.texels import BEYOND, POINTS, Texels
 from lambent.bake.vectors import array_of, rays_from, vectors
-from lambent.core.frames import basis
+from lambent.core.directions import basis
 from lambent.core.sequences import cosine_hemisphere, r2
 from lambent.scenes.scene import Scene
 

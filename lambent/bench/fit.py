@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from lambent.bench.known_answers import KNOWN, setup_of
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.frames import direction
 from lambent.core.progress import Cancelled, Progress
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera
 from lambent.core.cubemap import sample
 from lambent.core.images import write_image
 from lambent.materials.document import Material
-from lambent.scenes.scene import Camera, ImageEnvironment, Mesh, Scene, SceneObject
-from lambent.store.contract import CameraRecord
+from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 
 Floats = NDArray[np.floating]
 
@@ -27,7 +27,7 @@ def to_lat_long(cube: Floats, height: int = 512) -> Floats:
 
 
 def path_traced(
-    meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: CameraRecord, size: int, spp: int
+    meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: Camera, size: int, spp: int
 ) -> Floats:
     """Radiance (size, size, 3) of `meshes` in `material` under `environment` (6, N, N, 3), the sky behind them."""
     from lambent.bake.reference import render_reference

@@ -12,22 +12,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
+from lambent.core.camera import Camera, pixel_rays
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.camera import image_plane
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
 from lambent.scenes.scene import Mesh, Scene, SceneObject
-from lambent.store.contract import CameraRecord, ReflectorPart, ReflectorRecord, Triple
+from lambent.store.contract import ReflectorPart, ReflectorRecord, Triple
 
 Floats = NDArray[np.floating]
 FLOOR, PAINT, REACH = "floor", "paint", 4.0
 SKY: Triple = (0.25, 0.3, 0.4)
 LAMP: Triple = (12.0, 10.0, 8.0)
-CAMERA = CameraRecord(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
-SECOND = CameraRecord(name="second", position=(-1.6, 0.9, 3.4), target=(0.2, 0.3, -0.4), fov_y_deg=46.0)
+CAMERA = Camera(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
+SECOND = Camera(name="second", position=(-1.6, 0.9, 3.4), target=(0.2, 0.3, -0.4), fov_y_deg=46.0)
 COLOURS: Mapping[str, Triple] = {
     "wall": (0.75, 0.7, 0.6), "cube": (0.8, 0.25, 0.15), "cylinder": (0.2, 0.5, 0.75), "ball": (0.3, 0.7, 0.3),
     "pole": (0.1, 0.1, 0.12), "lamp": (0.0, 0.0, 0.0),
@@ -96,7 +95,7 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 
 
 def exact_reflection(
-    lobe: Lobe, camera: CameraRecord, width: int, height: int, spp: int, progress: Progress = silent
+    lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Radiance (height, width, 3) of the floor by ray casting, and where the floor is (height, width) bool.
 
@@ -114,9 +113,7 @@ def exact_reflection(
     scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
     tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(), FLOOR, SKY)
 
-    across, up, forward = image_plane(camera, width, height)
-    x, y = (np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2
-    rays = normalize((forward + x[None, :, None] * across + y[:, None, None] * up).reshape(-1, 3))
+    rays = pixel_rays(camera, width, height).reshape(-1, 3)
     eye = np.asarray(camera.position, float)
     to_floor = -eye[1] / np.minimum(rays[:, 1], -1e-9)
     place = eye + rays * to_floor[:, None]

@@ -16,15 +16,15 @@ import numpy as np
 
 from lambent.bench import specular_scene
 from lambent.bench.machine import inputs_of, machine
+from lambent.core.camera import Camera
+from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import normalize
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import open_device
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.scenes.geometry import grid
 from lambent.scenes.scene import Mesh
-from lambent.store.contract import CameraRecord
 
 NAME = "walk-cube"
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19)
@@ -32,7 +32,7 @@ BY_N = ("rings", "lobe-4.25", "fis")  # split-sum and diffuse do not know n
 ROUNDS = 5
 SIZES = {True: (560, 350), False: (1680, 1050)}  # by quick
 MATERIAL = Material(name="shown", lobes=(Lobe(mx=0.1, my=0.1, r0=(0.9, 0.9, 0.9), alpha=0.4),))
-CAMERA = CameraRecord(name="front", position=(0.0, 0.0, 1.5), target=(0.0, 0.0, 0.0), fov_y_deg=45.0)
+CAMERA = Camera(name="front", position=(0.0, 0.0, 1.5), target=(0.0, 0.0, 0.0), fov_y_deg=45.0)
 ROOM = np.array([[x, y, z, 3.0] for x, y, z in np.concatenate([np.eye(3), -np.eye(3)])], np.float32)
 
 

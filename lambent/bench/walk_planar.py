@@ -14,19 +14,19 @@ from lambent.bench import planar_scene
 from lambent.bench.machine import inputs_of, machine
 from lambent.bench.planar_quality import lobe_of
 from lambent.bench.walk_cube import SIZES, Measured, measure, row_of, scaled_size, summary_of
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.realtime.device import open_device
 from lambent.realtime.frame import FrameState, Renderer
-from lambent.store.contract import CameraRecord
 
 NAME = "walk-planar"
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19)
 BY_N = ("rings", "lobe-4.25", "fis")  # split-sum leaves planes to the probes, diffuse knows no light of them
 # From above, so that the floor fills the picture; and lower, so that the wall fills the upper half.
 CAMERAS = {
-    "full": CameraRecord(name="full", position=(-2.4, 1.6, 3.2), target=(-2.4, 0.0, 2.2), fov_y_deg=40.0),
-    "half": CameraRecord(name="half", position=(-2.0, 1.2, 3.2), target=(-2.0, -0.05, -1.0), fov_y_deg=40.0),
+    "full": Camera(name="full", position=(-2.4, 1.6, 3.2), target=(-2.4, 0.0, 2.2), fov_y_deg=40.0),
+    "half": Camera(name="half", position=(-2.0, 1.2, 3.2), target=(-2.0, -0.05, -1.0), fov_y_deg=40.0),
 }
 
 

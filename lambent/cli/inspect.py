@@ -82,7 +82,7 @@ def inspect_material(file: str, plot: Path | None) -> Facts:
     """A material document: its numbers, its albedo, where it comes from."""
     import numpy as np
 
-    from lambent.core.frames import direction
+    from lambent.core.directions import direction
     from lambent.materials.bsdf import MaterialBSDF
     from lambent.materials.document import load_material
 

@@ -14,9 +14,10 @@ from lambent.cli.console import Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
+    from lambent.core.camera import Camera
     from lambent.core.false_colour import Range
     from lambent.core.progress import Progress
-    from lambent.store.contract import CameraRecord, SceneRecord
+    from lambent.store.contract import SceneRecord
     from lambent.store.store import Store
 
 PATH_TRACER = "path"
@@ -24,7 +25,7 @@ DEFAULT_SPP = {PATH_TRACER: 64, "qmc": 256}
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 FILM_SUPERSAMPLES = 4  # of the radiance in a picture sequence
-Picture = Callable[["CameraRecord", "Progress"], Any]
+Picture = Callable[["Camera", "Progress"], Any]
 
 
 def command(
@@ -157,7 +158,7 @@ def pictures(
         for text in renderer.missing:
             say(f"note: {text}")
 
-        def state(camera: CameraRecord) -> FrameState:
+        def state(camera: Camera) -> FrameState:
             n = None if progressive else samples
             return FrameState(
                 camera, width, height, integrator=integrator, n=n, exposure_ev=look.exposure_ev,
@@ -165,7 +166,7 @@ def pictures(
                 planar=look.planar,
             )  # fmt: skip
 
-        def radiance(camera: CameraRecord, progress: Progress) -> Any:
+        def radiance(camera: Camera, progress: Progress) -> Any:
             if progressive:
                 return renderer.converged(state(camera), samples or DEFAULT_SPP["qmc"], progress)
             return renderer.still_radiance(state(camera), *((FILM_SUPERSAMPLES,) if film else ()))
@@ -210,14 +211,9 @@ class Look:
     def shown(self, radiance: Any) -> Any:
         """uint8 (H, W, 3), encoded."""
         from lambent.core.colour import shown
-        from lambent.core.false_colour import (
-            Range,
-            false_colour,
-            fitting_range,
-            photometric,
-            with_scale,
-        )
+        from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
         from lambent.core.images import to_bytes
+        from lambent.core.photometry import photometric
 
         if self.plain:
             return to_bytes(shown(radiance, self.view, self.exposure_ev))
@@ -242,13 +238,12 @@ def _path_traced(store: Store, width: int, height: int, spp: int, place: str | N
     engine()
     from lambent.bake.reference import render_reference
 
-    # A CameraRecord has the fields of a scene's Camera.
-    return lambda camera, progress: render_reference(scene, camera, width, height, spp, progress=progress)[0]  # type: ignore[arg-type]
+    return lambda camera, progress: render_reference(scene, camera, width, height, spp, progress=progress)[0]
 
 
 def _write_film(
     output: Path,
-    views: list[CameraRecord],
+    views: list[Camera],
     pictures: tuple[Picture, Picture],
     form: tuple[int, int, int],
     progress: Progress,
@@ -263,7 +258,7 @@ def _write_film(
             progress(index + 1, len(views), "frames")
 
 
-def _views(record: SceneRecord, camera: str | None, path: str | None, fps: int | None) -> list[CameraRecord]:
+def _views(record: SceneRecord, camera: str | None, path: str | None, fps: int | None) -> list[Camera]:
     """One camera, or, with `fps`, those along a path."""
     if fps is None:
         if path is not None:
@@ -271,7 +266,7 @@ def _views(record: SceneRecord, camera: str | None, path: str | None, fps: int |
         return [_named("camera", record.cameras, camera)]
     if camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
-    from lambent.store.camera_paths import camera_at
+    from lambent.scenes.camera_paths import camera_at
 
     way = _named("path", record.paths, path)
     return [camera_at(way, index / fps) for index in range(max(2, round(way.seconds * fps)))]

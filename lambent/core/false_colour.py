@@ -1,9 +1,4 @@
-"""Luminance in false colour, with a scale of numbers: for people who plan light.
-
-Photometry: cd/m^2 = 179 lm/W times the luminance Y of linear Rec.709 radiance in W/(sr m^2); lx = 179 lm/W times that
-of irradiance in W/m^2. 179 lm/W is the efficacy that Radiance (Ward 1994) gives white light over the visible range;
-spectral radiance weighted by V(lambda) would take 683 lm/W, but the three channels each stand for a broad band.
-"""
+"""Luminance in false colour, with a scale of numbers: for people who plan light."""
 
 from __future__ import annotations
 
@@ -14,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.colour import luminance
 from lambent.core.errors import UserError
+from lambent.core.photometry import LUMINANCE
 
 Floats = NDArray[np.floating[Any]]
 
-LM_PER_W = 179.0
 # Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
 STOPS = np.array(
     [
@@ -30,18 +24,6 @@ STOPS = np.array(
 BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 LEAST, MOST = 1e-4, 1e9  # numbers that a range can name
 DECADES = 3.0  # of a logarithmic range that is chosen by the picture
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What a picture's numbers are to people: its unit, and how many of it one of Y of linear Rec.709 is."""
-
-    unit: str
-    per_y: float
-
-
-LUMINANCE, ILLUMINANCE = Quantity("cd/m2", LM_PER_W), Quantity("lx", LM_PER_W)
-NOISE = Quantity("%", 100.0)  # of a relative standard error
 
 
 @dataclass(frozen=True)
@@ -81,11 +63,6 @@ class Range:
             found = [step * k for k in range(first, math.floor(self.high / step) + 1)]
         inside = [x for x in found if self.low * (1 - 1e-9) <= x <= self.high * (1 + 1e-9)]
         return inside or [self.low, self.high]
-
-
-def photometric(radiance: Floats, quantity: Quantity = LUMINANCE) -> Floats:
-    """cd/m^2 (...) of linear radiance (..., 3); lx of irradiance; or another quantity."""
-    return np.asarray(quantity.per_y * luminance(radiance))
 
 
 def fitting_range(values: Floats, *, log: bool = True) -> Range:

@@ -1,11 +1,13 @@
-"""Plain values: results as JSON knows them, words that are numbers."""
+"""Plain values: results as JSON knows them, words that are numbers, three floats, names that files can have."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
+
+Triple = tuple[float, float, float]
 
 
 def plain(value: Any) -> Any:
@@ -28,3 +30,14 @@ def is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def triple(values: Iterable[Any]) -> Triple:
+    """Three numbers of an array as plain floats."""
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+def plain_name(name: str, otherwise: str = "material") -> str:
+    """A file's name for any name that a user or a file gave; `otherwise` where nothing of it is left."""
+    return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise

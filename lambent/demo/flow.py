@@ -160,7 +160,7 @@ class Flow:
         from lambent.core.images import write_shown
         from lambent.realtime.device import adapter_info
         from lambent.realtime.frame import FrameState
-        from lambent.store.camera_paths import camera_at
+        from lambent.scenes.camera_paths import camera_at
 
         renderer = self._renderer()
         path = renderer.scene.record.paths[0]

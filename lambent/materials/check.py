@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.chi_square import ChiSquare, adapted_cells, chi_square, integrate_cells

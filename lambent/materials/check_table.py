@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere
 from lambent.materials.check import (

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere
 from lambent.materials.bsdf import MaterialBSDF

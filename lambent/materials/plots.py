@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import direction
 from lambent.core.files import atomic_path
-from lambent.core.frames import direction
 from lambent.materials.fitting.disks import measured_disk
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredTable

@@ -15,15 +15,16 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.false_colour import ILLUMINANCE, LUMINANCE, NOISE, Quantity, Range
+from lambent.core.false_colour import Range
 from lambent.core.images import to_bytes
+from lambent.core.photometry import ILLUMINANCE, LUMINANCE, NOISE, Quantity
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import hammersley, radical_inverse
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, read_baked
-from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.integrators import INTEGRATORS, integrator
@@ -41,7 +42,6 @@ from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.resources import Layouts, SceneResources
 from lambent.realtime.targets import PassTimer, Targets
 from lambent.realtime.textures import bits_that_show
-from lambent.store.contract import CameraRecord
 from lambent.store.store import Store
 
 Floats = NDArray[np.float32]
@@ -64,7 +64,7 @@ class FrameState:
 
     Attributes
     ----------
-    camera : CameraRecord
+    camera : Camera
         Or anything with its fields.
     width, height : int
         Pixels.
@@ -101,7 +101,7 @@ class FrameState:
         Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
     """
 
-    camera: CameraRecord
+    camera: Camera
     width: int = 1680
     height: int = 1050
     integrator: str = "rings"

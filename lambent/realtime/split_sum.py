@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from lambent.core.sequences import hammersley
 from lambent.materials.document import Lobe
-from lambent.realtime.patterns import radius, relative_density
 from lambent.realtime.passes.screen import cover
+from lambent.realtime.patterns import radius, relative_density
 from lambent.realtime.shader_source import assemble
 
 Floats = NDArray[np.floating]

@@ -12,18 +12,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
+from lambent.core.camera import Camera
+from lambent.core.directions import normalize
+from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import exact_solid_angles, finite, mip_chain
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
-from lambent.store.contract import CameraRecord, ObjectRecord, SceneRecord, Triple
+from lambent.store.contract import ObjectRecord, SceneRecord, Triple
 
 Floats = NDArray[np.floating]
 
 COARSE = 16  # texels along a face of the environment that diffuse light is summed from
-CAMERA = CameraRecord(name="front", position=(0.0, 0.0, 4.2), target=(0.0, 0.0, 0.0), fov_y_deg=36.0)
+CAMERA = Camera(name="front", position=(0.0, 0.0, 4.2), target=(0.0, 0.0, 0.0), fov_y_deg=36.0)
 
 
 def unbaked_scene(
@@ -46,14 +48,14 @@ def unbaked_scene(
         records.append(
             ObjectRecord(
                 name=key, material=material.name, first_face=first, face_count=len(mesh.faces),
-                bounds=(_triple(low), _triple(high)), probe=True,
+                bounds=(triple(low), triple(high)), probe=True,
             )
         )  # fmt: skip
         first += len(mesh.faces)
     low, high = whole.bounds
     record = SceneRecord(
         name=name, objects=tuple(records), materials={material.name: material}, cameras=(CAMERA,),
-        bounds=(_triple(low), _triple(high)),
+        bounds=(triple(low), triple(high)),
     )  # fmt: skip
     probe = Probe((0.0, 0.0, 0.0), environment, distance, np.zeros((0, 4), np.float32) if planes is None else planes)
     return BakedScene(
@@ -106,7 +108,3 @@ def irradiance(environment: Floats, normals: Floats) -> Floats:
     light = (cube * exact_solid_angles(n)[..., None]).reshape(-1, 3)
     cosines = np.maximum(normals @ normalize(face_directions(n)).reshape(-1, 3).T, 0)
     return np.asarray(cosines @ light, np.float32)
-
-
-def _triple(v: Floats) -> Triple:
-    return float(v[0]), float(v[1]), float(v[2])

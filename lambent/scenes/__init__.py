@@ -1,7 +1,7 @@
 """What is there: scenes, their loaders, the built-in ones, and the ways of cameras through them."""
 
+from lambent.scenes.camera_paths import sample_path
 from lambent.scenes.loaders.load import load_scene
-from lambent.scenes.paths import sample_path
 from lambent.scenes.validation import validate
 
 __all__ = ["load_scene", "sample_path", "validate"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.cubemap import face_directions, texel_solid_angles
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 
 Floats = NDArray[np.floating]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt, label, maximum_filter, uniform_filter
 
-from lambent.core.frames import basis
+from lambent.core.directions import basis
 
 Floats = NDArray[np.floating]
 Mask = NDArray[np.bool_]

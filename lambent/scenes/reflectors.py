@@ -19,7 +19,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import basis
+from lambent.core.directions import basis
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.floor_plan import FloorPlan, floor_plan
 from lambent.scenes.geometry import areas

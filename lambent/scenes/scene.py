@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
-Triple = tuple[float, float, float]
 EYE_HEIGHT_M = 1.6  # of a person who stands
 
 
@@ -134,26 +135,6 @@ class DirectionalLight:
 
 Light = PointLight | DirectionalLight
 Environment = SunSky | ImageEnvironment | ConstantEnvironment
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Pinhole. `fov_y_deg` is the full vertical field of view; up is +y unless said."""
-
-    name: str
-    position: Triple
-    target: Triple
-    up: Triple = (0.0, 1.0, 0.0)
-    fov_y_deg: float = 45.0
-
-
-@dataclass(frozen=True)
-class CameraPath:
-    """Key cameras, passed at constant speed per segment along a smooth curve."""
-
-    name: str
-    keys: tuple[Camera, ...]
-    seconds: float = 20.0
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.geometry import areas
 from lambent.scenes.scene import Mesh, Scene
 

@@ -31,7 +31,9 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.store.store import Store
 
@@ -41,7 +43,6 @@ SCENE = "scene"
 TIMINGS = "timings"
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 LEAN = "light_map/lean"
-Triple = tuple[float, float, float]
 
 
 class _Record(BaseModel):
@@ -65,24 +66,6 @@ class TexturesRecord(_Record):
 
     parts: dict[str, tuple[Triple, Triple]]
     cutoff: float = 0.5
-
-
-class CameraRecord(_Record):
-    """See scenes.scene.Camera."""
-
-    name: str
-    position: Triple
-    target: Triple
-    up: Triple = (0.0, 1.0, 0.0)
-    fov_y_deg: float = 45.0
-
-
-class PathRecord(_Record):
-    """See scenes.scene.CameraPath."""
-
-    name: str
-    keys: tuple[CameraRecord, ...]
-    seconds: float
 
 
 class ReflectorPart(_Record):
@@ -127,8 +110,8 @@ class SceneRecord(_Record):
     name: str
     objects: tuple[ObjectRecord, ...]
     materials: dict[str, Material]
-    cameras: tuple[CameraRecord, ...]
-    paths: tuple[PathRecord, ...] = ()
+    cameras: tuple[Camera, ...]
+    paths: tuple[CameraPath, ...] = ()
     reflectors: tuple[ReflectorRecord, ...] = ()
     exposure_ev: float = 0.0
     bounds: tuple[Triple, Triple]

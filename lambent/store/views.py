@@ -17,10 +17,10 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes, write_text
-from lambent.store.camera_paths import TimedPath
-from lambent.store.contract import CameraRecord, SceneRecord
+from lambent.store.contract import SceneRecord
 
 FILE = "views.json"
 LIMIT_BYTES = 64 << 20
@@ -34,8 +34,8 @@ class Views(BaseModel):
 
     format: Literal["lambent-views"] = "lambent-views"
     version: Literal[1] = 1
-    cameras: tuple[CameraRecord, ...] = ()
-    paths: tuple[TimedPath, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    paths: tuple[CameraPath, ...] = ()
 
 
 def read_views(folder: Path) -> Views:
@@ -141,7 +141,7 @@ def _check(views: Views, path: Path) -> None:
             if not all(map(math.isfinite, numbers)) or not 0 < camera.fov_y_deg < 180:
                 raise UserError("a camera is not finite, or sees no angle", file=path, field=f"{kind}.{camera.name}")
     for way in views.paths:
-        times = way.times_s
+        times = way.times_s or ()
         if not way.keys or len(times) != len(way.keys):
             raise UserError("a path needs one time per key", file=path, field=way.name, got=len(times))
         if times[0] != 0 or times[-1] != way.seconds or any(b <= a for a, b in pairwise(times)):

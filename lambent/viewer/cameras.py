@@ -13,8 +13,9 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
+from lambent.core.camera import Camera
 from lambent.scenes.scene import EYE_HEIGHT_M
-from lambent.store.contract import CameraRecord, Triple
+from lambent.store.contract import Triple
 
 Bounds = tuple[Triple, Triple]
 
@@ -34,20 +35,20 @@ KEYS = {
 }  # fmt: skip
 
 
-def yaw_pitch(camera: CameraRecord) -> tuple[float, float]:
+def yaw_pitch(camera: Camera) -> tuple[float, float]:
     """Heading (0 looks along -z, positive to the right) and elevation of the line of sight."""
     x, y, z = _sight(camera)
     return math.atan2(x, -z), math.atan2(y, math.hypot(x, z))
 
 
-def orbit(camera: CameraRecord, dx_px: float, dy_px: float) -> CameraRecord:
+def orbit(camera: Camera, dx_px: float, dy_px: float) -> Camera:
     """Turned about the target: the picture follows the mouse."""
     yaw, pitch = yaw_pitch(camera)
     sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
     return _placed(camera, np.array(camera.target) - sight * _distance(camera), camera.target)
 
 
-def pan(camera: CameraRecord, dx_px: float, dy_px: float, height_px: float) -> CameraRecord:
+def pan(camera: Camera, dx_px: float, dy_px: float, height_px: float) -> Camera:
     """Shifted in the picture plane, so that the target stays under the mouse."""
     yaw, pitch = yaw_pitch(camera)
     right = np.array([math.cos(yaw), 0, math.sin(yaw)])
@@ -57,14 +58,14 @@ def pan(camera: CameraRecord, dx_px: float, dy_px: float, height_px: float) -> C
     return _placed(camera, np.array(camera.position) + shift, np.array(camera.target) + shift)
 
 
-def zoom(camera: CameraRecord, steps: float, bounds: Bounds) -> CameraRecord:
+def zoom(camera: Camera, steps: float, bounds: Bounds) -> Camera:
     """`steps` of the wheel nearer to the target (negative: away), never past it nor out of sight of the scene."""
     farthest = 20 * math.dist(*bounds)
     distance = min(max(_distance(camera) * ZOOM_PER_STEP**steps, NEAREST_M), farthest)
     return _placed(camera, np.array(camera.target) - _direction(*yaw_pitch(camera)) * distance, camera.target)
 
 
-def look(camera: CameraRecord, dx_px: float, dy_px: float) -> CameraRecord:
+def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
     """Turned on the spot, in the direction the mouse is dragged."""
     yaw, pitch = yaw_pitch(camera)
     sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
@@ -72,7 +73,7 @@ def look(camera: CameraRecord, dx_px: float, dy_px: float) -> CameraRecord:
 
 
 def walk(
-    camera: CameraRecord,
+    camera: Camera,
     keys: AbstractSet[str],
     dt_s: float,
     *,
@@ -83,7 +84,7 @@ def walk(
     pace_m_s: float | None = None,
     height_m: float | None = None,
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
-) -> CameraRecord:
+) -> Camera:
     """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
     On foot the eye moves level, as far as `allowed(eye, step)` gives way, and settles at eye height above `floor_y`
@@ -113,7 +114,7 @@ def walk(
     return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))
 
 
-def standing(camera: CameraRecord, bounds: Bounds, floor_y: float | None, height_m: float) -> CameraRecord:
+def standing(camera: Camera, bounds: Bounds, floor_y: float | None, height_m: float) -> Camera:
     """The camera with its eye `height_m` above `floor_y` (the scene's lowest point where it is None)."""
     down = np.array([0.0, (bounds[0][1] if floor_y is None else floor_y) + height_m - camera.position[1], 0.0])
     eye, target = np.array(camera.position) + down, np.array(camera.target) + down
@@ -138,11 +139,11 @@ def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
     return np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before))
 
 
-def _sight(camera: CameraRecord) -> np.ndarray:
+def _sight(camera: Camera) -> np.ndarray:
     return np.subtract(camera.target, camera.position)
 
 
-def _distance(camera: CameraRecord) -> float:
+def _distance(camera: Camera) -> float:
     return max(math.dist(camera.target, camera.position), NEAREST_M)
 
 
@@ -151,8 +152,8 @@ def _direction(yaw: float, pitch: float) -> np.ndarray:
     return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), -math.cos(yaw) * math.cos(pitch)])
 
 
-def _placed(camera: CameraRecord, position: np.ndarray | Triple, target: np.ndarray | Triple) -> CameraRecord:
+def _placed(camera: Camera, position: np.ndarray | Triple, target: np.ndarray | Triple) -> Camera:
     (px, py, pz), (tx, ty, tz) = map(float, position), map(float, target)
-    return CameraRecord(
+    return Camera(
         name="free", position=(px, py, pz), target=(tx, ty, tz), up=(0.0, 1.0, 0.0), fov_y_deg=camera.fov_y_deg
     )

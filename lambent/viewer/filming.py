@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lambent.core.camera import CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import check_place
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted, sequence_file
 from lambent.realtime.frame import QMC_N, FrameState, Renderer
-from lambent.store.camera_paths import camera_at
-from lambent.store.contract import PathRecord
+from lambent.scenes.camera_paths import camera_at
 from lambent.viewer.picture import scaled
 
 SIZES = {"1280 x 720": (1280, 720), "1920 x 1080": (1920, 1080), "3840 x 2160": (3840, 2160), "640 x 360": (640, 360)}
@@ -62,7 +62,7 @@ class Filming:
     """
 
     def __init__(
-        self, renderer: Renderer, file: Path, path: PathRecord, frame: FrameState, fps: int, quality: int = 0
+        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0
     ) -> None:
         width, height = even_size(frame.width, frame.height)
         self.file, self.path = file, path

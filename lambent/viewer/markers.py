@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera, camera_axes, image_plane
 from lambent.core.colour import shown
 from lambent.core.cubemap import sample
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.core.images import to_bytes
 from lambent.realtime.baked import Probe
-from lambent.realtime.camera import camera_axes, image_plane
 from lambent.realtime.cube_mips import finite, halved
-from lambent.store.contract import CameraRecord
 
 Floats = NDArray[np.floating[Any]]
 BALL_M = 0.12  # radius of a ball in the scene
@@ -55,7 +54,7 @@ class Markers:
         self.images: dict[str, NDArray[np.uint8]] = {}
         self.balls: tuple[Ball, ...] = ()
 
-    def update(self, camera: CameraRecord, aspect: float, height_px: float, view: str, exposure_ev: float) -> None:
+    def update(self, camera: Camera, aspect: float, height_px: float, view: str, exposure_ev: float) -> None:
         """Balls as this camera sees them, farthest first."""
         key = (camera, aspect, height_px, view, exposure_ev)
         if key == self._made_for:
@@ -75,7 +74,7 @@ class Markers:
         """Show none."""
         self._made_for, self.images, self.balls = (), {}, ()
 
-    def _ball(self, name: str, probe: Probe, camera: CameraRecord, aspect: float, height_px: float) -> Ball | None:
+    def _ball(self, name: str, probe: Probe, camera: Camera, aspect: float, height_px: float) -> Ball | None:
         (place,), (depth,) = projected(camera, np.array([probe.centre]), aspect)
         half = np.tan(np.radians(camera.fov_y_deg) / 2)
         if depth < NEAR_M or not (-0.1 < place[0] < 1.1 and -0.1 < place[1] < 1.1):
@@ -92,7 +91,7 @@ class Markers:
         return self._cubes[name]
 
 
-def projected(camera: CameraRecord, points: Floats, aspect: float) -> tuple[Floats, Floats]:
+def projected(camera: Camera, points: Floats, aspect: float) -> tuple[Floats, Floats]:
     """Places (P, 2) in shares of the picture from its upper left, and depths (P,) in metres, of points (P, 3)."""
     right, up, forward = camera_axes(camera)
     across, above, _ = image_plane(camera, round(1000 * aspect), 1000)
@@ -104,7 +103,7 @@ def projected(camera: CameraRecord, points: Floats, aspect: float) -> tuple[Floa
     return np.stack([(x + 1) / 2, (1 - y) / 2], axis=-1), depth
 
 
-def outline(name: str, corners: Floats, camera: CameraRecord, aspect: float) -> Line | None:
+def outline(name: str, corners: Floats, camera: Camera, aspect: float) -> Line | None:
     """A polygon (P, 3) on the screen, cut at the eye; None where all of it is behind."""
     _, _, forward = camera_axes(camera)
     depth = (corners - np.asarray(camera.position)) @ forward
@@ -122,7 +121,7 @@ def outline(name: str, corners: Floats, camera: CameraRecord, aspect: float) -> 
 
 
 def mirror_ball(
-    cube: Floats, camera: CameraRecord, centre: tuple[float, float, float], size: int, view: str, exposure_ev: float
+    cube: Floats, camera: Camera, centre: tuple[float, float, float], size: int, view: str, exposure_ev: float
 ) -> NDArray[np.uint8]:
     """RGBA (size, size, 4) of a perfect mirror ball at `centre` that shows what the probe sees."""
     _, up, ahead = camera_axes(camera)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.false_colour import LM_PER_W, LUMINANCE, Quantity, Range, fitting_range, photometric
+from lambent.core.false_colour import Range, fitting_range
+from lambent.core.photometry import LM_PER_W, LUMINANCE, Quantity, photometric
 
 Floats = NDArray[np.floating[Any]]
 KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)

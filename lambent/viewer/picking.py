@@ -8,21 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
-from lambent.realtime.camera import image_plane
-from lambent.store.contract import CameraRecord, ObjectRecord
+from lambent.core.camera import Camera, rays_through
+from lambent.store.contract import ObjectRecord
 from lambent.viewer.walls import Walls
 
 Floats = NDArray[np.floating]
 STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 
 
-def ray_through(camera: CameraRecord, x: float, y: float, width: int, height: int) -> tuple[Floats, Floats]:
+def ray_through(camera: Camera, x: float, y: float, width: int, height: int) -> tuple[Floats, Floats]:
     """Origin and unit direction of the ray through the picture point (x, y) in pixels, y downwards."""
-    across, up, forward = image_plane(camera, width, height)
-    return np.array(camera.position, float), normalize(
-        forward + (2 * x / width - 1) * across + (1 - 2 * y / height) * up
-    )
+    return np.array(camera.position, float), rays_through(camera, x, y, width, height)
 
 
 class Geometry:

@@ -270,7 +270,7 @@ def scaled(display: NDArray[np.uint8], frame: FrameState) -> NDArray[np.uint8]:
 def frame_state(state: ViewerState, width: int, height: int) -> FrameState:
     """The frame that shows the state at full size."""
     return FrameState(
-        state.camera.model_copy(update={"name": ""}),  # another name is no other picture
+        replace(state.camera, name=""),  # another name is no other picture
         width,
         height,
         integrator=state.integrator,

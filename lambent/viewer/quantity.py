@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lambent.core.false_colour import Quantity, Range
+from lambent.core.false_colour import Range
+from lambent.core.photometry import Quantity
 from lambent.realtime.frame import LIGHT_MAP_NOISE, quantity_of
 from lambent.realtime.passes.tonemap import FALSE_COLOUR
 

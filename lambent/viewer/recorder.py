@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lambent.store.camera_paths import TimedPath
-from lambent.store.contract import CameraRecord
+from lambent.core.camera import Camera, CameraPath
 from lambent.viewer.recording import LONGEST_S, SMOOTH_S, Recording
 
 DRAFT = "recorded"
@@ -17,7 +16,7 @@ class Recorder:
 
     recording: Recording | None = None
     taken: Recording | None = None
-    draft: TimedPath | None = None
+    draft: CameraPath | None = None
     smooth_s: float = SMOOTH_S
     began_s: float = 0.0
     name: str = ""
@@ -32,14 +31,14 @@ class Recorder:
         self.drop()
         self.recording, self.began_s = Recording(), now_s
 
-    def take(self, camera: CameraRecord, now_s: float) -> bool:
+    def take(self, camera: Camera, now_s: float) -> bool:
         """The camera at this moment; whether the recording has become too long to go on."""
         if self.recording is None:
             return False
         self.recording.take(camera, now_s - self.began_s)
         return now_s - self.began_s > LONGEST_S
 
-    def stop(self) -> TimedPath | None:
+    def stop(self) -> CameraPath | None:
         """Make a draft of what was recorded; None where nothing moved."""
         self.taken, self.recording = self.recording, None
         self.smooth(self.smooth_s)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.store.camera_paths import TimedPath
-from lambent.store.contract import CameraRecord
+from lambent.core.camera import Camera, CameraPath
 
 Floats = NDArray[np.floating]
 KEY_S = 0.1  # between two keys of a path
@@ -22,9 +21,9 @@ class Recording:
     """Cameras and their times in seconds, as they were drawn."""
 
     times_s: list[float] = field(default_factory=list)
-    cameras: list[CameraRecord] = field(default_factory=list)
+    cameras: list[Camera] = field(default_factory=list)
 
-    def take(self, camera: CameraRecord, time_s: float) -> None:
+    def take(self, camera: Camera, time_s: float) -> None:
         """The camera at this moment. Frames in which nothing moves need not be told of."""
         if self.cameras and camera == self.cameras[-1]:
             return
@@ -47,7 +46,7 @@ class Recording:
         waited = len(self.cameras) > 1 and self.cameras[1] == self.cameras[0]
         return self.times_s[1] if waited else self.times_s[0]
 
-    def path(self, name: str, smooth_s: float = SMOOTH_S) -> TimedPath | None:
+    def path(self, name: str, smooth_s: float = SMOOTH_S) -> CameraPath | None:
         """The recorded way; None where nothing moved.
 
         Keys stand `KEY_S` apart. Positions, lines of sight and angles of view are averaged with a bell of standard
@@ -62,7 +61,7 @@ class Recording:
         even = np.stack([np.interp(times, at, column) for column in values.T], axis=-1)
         smooth = smoothed(even, smooth_s / (times[1] - times[0]))
         keys = tuple(_camera(row, name) for row in smooth)
-        return TimedPath(name=name, keys=keys, seconds=float(times[-1]), times_s=tuple(map(float, times)))
+        return CameraPath(name=name, keys=keys, seconds=float(times[-1]), times_s=tuple(map(float, times)))
 
 
 def smoothed(values: Floats, sigma: float) -> Floats:
@@ -80,10 +79,10 @@ def smoothed(values: Floats, sigma: float) -> Floats:
     return np.stack([np.convolve(column, bell, mode="valid") for column in padded.T], axis=-1)
 
 
-def _numbers(camera: CameraRecord) -> tuple[float, ...]:
+def _numbers(camera: Camera) -> tuple[float, ...]:
     return (*camera.position, *camera.target, camera.fov_y_deg)
 
 
-def _camera(row: Floats, name: str) -> CameraRecord:
+def _camera(row: Floats, name: str) -> Camera:
     px, py, pz, tx, ty, tz, fov = map(float, row)
-    return CameraRecord(name=name, position=(px, py, pz), target=(tx, ty, tz), fov_y_deg=fov)
+    return Camera(name=name, position=(px, py, pz), target=(tx, ty, tz), fov_y_deg=fov)

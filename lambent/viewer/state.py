@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from lambent.core.camera import Camera, CameraPath, overview
 from lambent.core.errors import UserError
 from lambent.core.false_colour import Range
+from lambent.core.plain import plain_name
 from lambent.materials.document import Material
+from lambent.scenes.camera_paths import camera_at
 from lambent.scenes.scene import EYE_HEIGHT_M
-from lambent.store.camera_paths import TimedPath, camera_at
-from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+from lambent.store.contract import ObjectRecord, SceneRecord
 from lambent.viewer import cameras
 from lambent.viewer.metering import Meter
 from lambent.viewer.recorder import Recorder
@@ -104,7 +106,7 @@ class MaterialEdits:
 class PathPlay:
     """A camera path being shown."""
 
-    path: PathRecord
+    path: CameraPath
     time_s: float = 0.0
     playing: bool = True
 
@@ -167,7 +169,7 @@ class ViewerState:
     """See the module. `folder` is where pictures and materials are saved; `clock` gives seconds."""
 
     scene: SceneRecord
-    camera: CameraRecord
+    camera: Camera
     edits: MaterialEdits
     choices: Choices
     mode: Mode
@@ -205,7 +207,7 @@ class ViewerState:
     comparison: Comparison | None = None  # where the picture can be compared with another integrator's
     marks: Marks = field(default_factory=Marks)
     film: FilmOptions | None = None  # where films can be made
-    film_wanted: PathRecord | None = None
+    film_wanted: CameraPath | None = None
     filming: Filming | None = None
     notes: tuple[str, ...] = ()  # on the light map
     saved: dict[str, Material] = field(default_factory=dict)  # materials as they were saved last
@@ -224,19 +226,19 @@ class ViewerState:
 
         Every choice starts at its first value.
         """
-        camera = scene.cameras[0] if scene.cameras else overview(scene)
+        camera = scene.cameras[0] if scene.cameras else overview(*scene.bounds)
         first = (choices.view_transforms[0], choices.integrators[0], choices.shows[0], choices.lookups[0])
         state = cls(scene, camera, MaterialEdits(scene.materials), choices, mode, scene.exposure_ev, *first, **options)  # type: ignore[arg-type]
         state.walker = Walker(cameras.speed_m_s(scene.bounds, False), cameras.eye_height_m(scene.bounds))
         return state
 
     @property
-    def cameras(self) -> tuple[CameraRecord, ...]:
+    def cameras(self) -> tuple[Camera, ...]:
         """The scene's, and those that were saved."""
         return self.scene.cameras if self.views is None else self.views.all.cameras
 
     @property
-    def paths(self) -> tuple[PathRecord, ...]:
+    def paths(self) -> tuple[CameraPath, ...]:
         """The scene's, those that were saved, and the one just recorded."""
         paths = self.scene.paths if self.views is None else self.views.all.paths
         return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
@@ -249,7 +251,7 @@ class ViewerState:
         now = self.clock()
         self.messages = [m for m in self.messages if m.until_s > now]
 
-    def jump(self, camera: CameraRecord) -> None:
+    def jump(self, camera: Camera) -> None:
         self.camera, self.path = camera, None
 
     def close_editor(self) -> None:
@@ -292,7 +294,7 @@ class ViewerState:
             return ()
         name = self.recorder.name.strip() or self.views.free_path_name()
         path = rescue_file(self.folder, name)
-        write_alone(path, draft.model_copy(update={"name": name}))
+        write_alone(path, replace(draft, name=name))
         return (f"{path}, a views.json for a store",)
 
     # views and recordings
@@ -327,7 +329,7 @@ class ViewerState:
             name = None if recorder.name == recorder.suggested else recorder.name
             self._saved_recording(self.views.add_path(recorder.draft, name))
 
-    def _saved_recording(self, added: TimedPath | None) -> None:
+    def _saved_recording(self, added: CameraPath | None) -> None:
         if added is not None:
             self.recorder.drop()
             self.scrub(added, 0.0)
@@ -360,11 +362,11 @@ class ViewerState:
         if self.mode == "walk" and not self.flying and lift:
             (px, py, pz), (tx, ty, tz) = self.camera.position, self.camera.target
             places = {"position": (px, py + lift, pz), "target": (tx, ty + lift, tz)}
-            self.move(self.camera.model_copy(update={"name": "free", **places}))
+            self.move(replace(self.camera, name="free", **places))
 
     def set_fov(self, fov_y_deg: float) -> None:
         """Another field of view."""
-        self.move(self.camera.model_copy(update={"name": "free", "fov_y_deg": fov_y_deg}))
+        self.move(replace(self.camera, name="free", fov_y_deg=fov_y_deg))
 
     @property
     def playing(self) -> bool:
@@ -378,18 +380,18 @@ class ViewerState:
         self.path.playing = self.path.time_s < self.path.path.seconds
         self.camera = camera_at(self.path.path, self.path.time_s)
 
-    def scrub(self, path: PathRecord, time_s: float) -> None:
+    def scrub(self, path: CameraPath, time_s: float) -> None:
         """Stand where `path` leads at `time_s`."""
         self.path, self.camera = PathPlay(path, time_s, playing=False), camera_at(path, time_s)
 
-    def toggle(self, path: PathRecord) -> None:
+    def toggle(self, path: CameraPath) -> None:
         """Pause a path that plays; play one that is paused, from its start when it is over."""
         if self.path is None or self.path.path != path or self.path.time_s >= path.seconds:
             self.path = PathPlay(path)
         else:
             self.path.playing = not self.path.playing
 
-    def move(self, camera: CameraRecord) -> None:
+    def move(self, camera: Camera) -> None:
         """Take a camera the user moved; that ends a path being shown."""
         if camera != self.camera:
             self.jump(camera)
@@ -429,11 +431,6 @@ class ViewerState:
             self.say(f"saved {file_name}")
 
 
-def plain_name(name: str) -> str:
-    """A name of a file for any name of a material."""
-    return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or "material"
-
-
 def rescue_file(folder: Path, name: str) -> Path:
     """A file that is not there yet, for what would else be lost."""
     stem, number = plain_name(name), 1
@@ -447,11 +444,3 @@ def file_in(folder: Path, file_name: str) -> Path:
     if not file_name.endswith(".json") or file_name == ".json" or Path(file_name).name != file_name:
         raise UserError("not a file name", got=file_name, expected="a name like walnut.json")
     return folder / file_name
-
-
-def overview(scene: SceneRecord) -> CameraRecord:
-    """A camera in front of the scene that sees all of it."""
-    (x0, y0, z0), (x1, y1, z1) = scene.bounds
-    centre = ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2)
-    away = 1.3 * max(x1 - x0, y1 - y0) + (z1 - z0) / 2
-    return CameraRecord(name="overview", position=(centre[0], centre[1], centre[2] + away), target=centre)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.store.camera_paths import TimedPath
-from lambent.store.contract import CameraRecord, SceneRecord
+from lambent.store.contract import SceneRecord
 from lambent.store.views import Views, change_views, checked_name, free_name, read_views, with_views
 
 
@@ -45,11 +45,11 @@ class SavedViews:
         return None
 
     @property
-    def cameras(self) -> tuple[CameraRecord, ...]:
+    def cameras(self) -> tuple[Camera, ...]:
         return self._views.cameras
 
     @property
-    def paths(self) -> tuple[TimedPath, ...]:
+    def paths(self) -> tuple[CameraPath, ...]:
         return self._views.paths
 
     @property
@@ -60,14 +60,14 @@ class SavedViews:
     def free_path_name(self) -> str:
         return free_name("walk", {path.name for path in self.all.paths})
 
-    def add_camera(self, camera: CameraRecord, name: str | None = None) -> CameraRecord | None:
+    def add_camera(self, camera: Camera, name: str | None = None) -> Camera | None:
         """Save where `camera` stands as `name`, or under the next free one; None where that cannot be."""
-        named: list[CameraRecord] = []
+        named: list[Camera] = []
 
         def change(views: Views) -> Views:
             free = free_name("view", self._camera_names(views))  # another window may have saved some meanwhile
             checked = free if name is None else self._camera_name(views, name)
-            named.append(camera.model_copy(update={"name": checked}))
+            named.append(replace(camera, name=checked))
             return views.model_copy(update={"cameras": (*views.cameras, named[0])})
 
         return named[0] if self._change(change) else None
@@ -76,7 +76,7 @@ class SavedViews:
         def change(views: Views) -> Views:
             _check_there(old, self._camera_names(views))
             name = self._camera_name(views, new, but=old)
-            renamed = (c.model_copy(update={"name": name}) if c.name == old else c for c in views.cameras)
+            renamed = (replace(c, name=name) if c.name == old else c for c in views.cameras)
             return views.model_copy(update={"cameras": tuple(renamed)})
 
         return self._change(change)
@@ -86,13 +86,13 @@ class SavedViews:
             lambda views: views.model_copy(update={"cameras": tuple(c for c in views.cameras if c.name != name)})
         )
 
-    def add_path(self, path: TimedPath, name: str | None = None) -> TimedPath | None:
+    def add_path(self, path: CameraPath, name: str | None = None) -> CameraPath | None:
         """Save a path as `name`, or under the next free one; None where that cannot be."""
-        named: list[TimedPath] = []
+        named: list[CameraPath] = []
 
         def change(views: Views) -> Views:
             free = free_name("walk", self._path_names(views))
-            named.append(path.model_copy(update={"name": free if name is None else self._path_name(views, name)}))
+            named.append(replace(path, name=free if name is None else self._path_name(views, name)))
             return views.model_copy(update={"paths": (*views.paths, named[0])})
 
         return named[0] if self._change(change) else None
@@ -101,7 +101,7 @@ class SavedViews:
         def change(views: Views) -> Views:
             _check_there(old, self._path_names(views))
             name = self._path_name(views, new, but=old)
-            renamed = (p.model_copy(update={"name": name}) if p.name == old else p for p in views.paths)
+            renamed = (replace(p, name=name) if p.name == old else p for p in views.paths)
             return views.model_copy(update={"paths": tuple(renamed)})
 
         return self._change(change)
@@ -152,7 +152,7 @@ def _check_there(name: str, names: set[str]) -> None:
         raise UserError("is no longer there: another window deleted or renamed it", got=name)
 
 
-def write_alone(file: Path, path: TimedPath) -> None:
+def write_alone(file: Path, path: CameraPath) -> None:
     """A `views.json` of another name that holds one path, for a store that cannot take it."""
     try:
         write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")

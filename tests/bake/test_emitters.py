@@ -11,7 +11,8 @@ import pytest
 from lambent.bake.emitters import FLOOR, balance_emitters
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.reference import render_reference
-from lambent.scenes.scene import Camera, PointLight, Scene
+from lambent.core.camera import Camera
+from lambent.scenes.scene import PointLight, Scene
 from tests.bake.small_scenes import GREY, plane
 
 

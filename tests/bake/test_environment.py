@@ -11,7 +11,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.environment import environment_cube
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.core.images import write_image
 from lambent.scenes.scene import ImageEnvironment, SunSky
 from tests.bake.small_scenes import TINY, plane

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.goniophotometer import SPECIMENS, measure
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.models import model_named
 from lambent.materials.models.cook_torrance import conductor
 from tests.tools.in_mitsuba import f_cos

@@ -13,12 +13,13 @@ from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.planes import bounding_planes
 from lambent.bake.probe_centre import flat_axis, probe_centre
 from lambent.bake.reference import render_reference
+from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions, sample
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, merge, patch, placed, sphere
-from lambent.scenes.scene import Camera, PointLight, Scene, SceneObject
+from lambent.scenes.scene import PointLight, Scene, SceneObject
 from lambent.store.contract import FAR
 from tests.bake.small_scenes import COLOURS, MIRROR, TINY, coloured_room, room_with_step
 

@@ -10,11 +10,12 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.probe_modes import Mirrored, basis_of, by_distance, by_planes, error, irradiance_of, open_share
+from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import merge, patch, sphere
-from lambent.scenes.scene import Camera, ImageEnvironment, Scene, SceneObject
+from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
 from tests.bake.small_scenes import TINY, constant_picture
 
 PAINT = Material(kd=0.5, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.04),))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.reference import render_reference
+from lambent.core.camera import Camera
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import Camera, Scene, SceneObject
+from lambent.scenes.scene import Scene, SceneObject
 from tests.bake.small_scenes import BLACK, furnace
 
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake, changed_inputs
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
-from lambent.scenes.scene import Camera, Scene
+from lambent.scenes.scene import Scene
 from lambent.store.contract import scene_record
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.table_plugin import table_dict
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.chi_square import chi_square
 from lambent.materials.document import Lobe, Material

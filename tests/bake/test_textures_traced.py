@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lambent.core.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import Camera, DirectionalLight, MaterialTextures, PointLight, Scene, SceneObject, Texture
+from lambent.scenes.scene import DirectionalLight, MaterialTextures, PointLight, Scene, SceneObject, Texture
 from tests.bake.small_scenes import TINY
 
 LETTER = np.array(

@@ -13,9 +13,10 @@ from lambent.bake.bake import bake
 from lambent.bake.mitsuba_scene import SceneBuilder
 from lambent.bake.texels import BEYOND, POINTS, Texels
 from lambent.bake.viewers import seen, viewing_places, without_hidden
+from lambent.core.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import Camera, ImageEnvironment, Scene, SceneObject
+from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
 from tests.bake.small_scenes import TINY, constant_picture
 
 OVER = 0.5  # metres that walls go on above the ceiling, and ceiling and floor beyond the walls

@@ -12,8 +12,8 @@ from lambent.bench import quality, walk_cube
 from lambent.bench.quality_inputs import read_inputs
 from lambent.bench.specular_scene import CAMERA, baked_scene, dusk, from_lat_long, night, studio
 from lambent.core.cubemap import face_directions
+from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import normalize
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame import FrameState, Renderer

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.false_colour import Range, false_colour, photometric
+from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import read_encoded, read_image
+from lambent.core.photometry import photometric
 from tests.viewer.small_store import write_small_store
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from lambent.core.colour import neutral, shown
 from lambent.core.errors import UserError
-from lambent.core.false_colour import STOPS, Range, false_colour, fitting_range, number, photometric, with_scale
+from lambent.core.false_colour import STOPS, Range, false_colour, fitting_range, number, with_scale
+from lambent.core.photometry import photometric
 
 
 def test_white_of_one_watt_is_179_candela():

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials import check as module
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check import check, check_sampler, furnace

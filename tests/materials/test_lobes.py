@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.check import RECIPROCITY_LIMIT, reciprocity_error

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import components, under_fresnel
 from lambent.materials.document import Lobe

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.frames import direction
 from lambent.materials import check
 from lambent.materials.models import model_named, models
 from lambent.materials.models.model import PROPERTIES, Model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.models import model_named
 from lambent.materials.models.cook_torrance import conductor
 from lambent.materials.models.published import MERL_CHANNELS, Published

@@ -9,29 +9,20 @@ import pytest
 from numpy.typing import NDArray
 
 from lambent.bench.specular_scene import baked_scene, wall
+from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.camera import image_plane
 from lambent.realtime.device import open_device
-from lambent.store.contract import CameraRecord
 
 Floats = NDArray[np.floating]
-OBLIQUE = CameraRecord(name="oblique", position=(1.5, 0.8, 2.0), target=(0.2, 0.1, 0.0), fov_y_deg=30.0)
+OBLIQUE = Camera(name="oblique", position=(1.5, 0.8, 2.0), target=(0.2, 0.1, 0.0), fov_y_deg=30.0)
 
 
 @pytest.fixture(scope="session")
 def device(adapter: None) -> Any:
     return open_device()
-
-
-def pixel_rays(camera: CameraRecord, width: int, height: int) -> Floats:
-    """(height, width, 3) unit directions through the pixel centres."""
-    across, up, forward = image_plane(camera, width, height)
-    x = (np.arange(width) + 0.5) / width * 2 - 1
-    y = 1 - (np.arange(height) + 0.5) / height * 2
-    return normalize(forward + x[None, :, None] * across + y[:, None, None] * up)
 
 
 def smooth_light(w: Floats) -> Floats:

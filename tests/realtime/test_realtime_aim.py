@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from lambent.core.cubemap import face_directions
 from lambent.core.cubemap import sample as sample_cube
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.aim import aim_table, lamp_probabilities, prominence

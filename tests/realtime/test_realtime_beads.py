@@ -7,17 +7,17 @@ import pytest
 from scipy.ndimage import label
 
 from lambent.bench.specular_scene import baked_scene
+from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.patterns import rings_table
 from lambent.scenes.geometry import sphere
-from lambent.store.contract import CameraRecord
 
 LIMIT = {0.05: 0.1, 0.1: 0.05, 0.25: 0.15, 0.4: 0.13}  # by m
-CAMERA = CameraRecord(name="c", position=(0.3, 0.5, 3.2), target=(0.0, 0.0, 0.0), fov_y_deg=24.0)
+CAMERA = Camera(name="c", position=(0.3, 0.5, 3.2), target=(0.0, 0.0, 0.0), fov_y_deg=24.0)
 
 
 def lamp(radius: float = 0.05, n: int = 256) -> np.ndarray:

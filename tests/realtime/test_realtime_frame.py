@@ -9,17 +9,16 @@ import pytest
 from conftest import cube_of, pixel_rays, smooth_light, wall_scene
 
 from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
+from lambent.core.camera import Camera, clip_from_world
 from lambent.core.colour import filmic, srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.camera import clip_from_world
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.scenes.geometry import patch, sphere
-from lambent.store.contract import CameraRecord
 
-FORWARD = CameraRecord(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)
+FORWARD = Camera(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)
 PAPER = Material(name="m", kd=0.5)
 
 
@@ -60,7 +59,7 @@ def test_sky_shows_the_cube_map_unmirrored(device) -> None:
     renderer = Renderer(device, scene)
     for target in np.concatenate([np.eye(3), -np.eye(3)]):
         position = np.array([5.0, 5.0, 5.0])
-        camera = CameraRecord(name="c", position=tuple(position), target=tuple(position + target), fov_y_deg=70)
+        camera = Camera(name="c", position=tuple(position), target=tuple(position + target), fov_y_deg=70)
         image = renderer.image(FrameState(camera, 24, 18))
         np.testing.assert_allclose(image, smooth_light(pixel_rays(camera, 24, 18)), rtol=0.02)
 
@@ -93,7 +92,7 @@ def test_a_sheet_shows_on_each_side_what_falls_on_and_through_it(device) -> None
     sheet = Material(name="m", kd=(0.5, 0, 0), kt_d=(0, 0.25, 0))
     front, back = np.full((1, 1, 3), np.pi, np.float32), np.full((1, 1, 3), 3 * np.pi, np.float32)
     renderer = Renderer(device, with_light_map(square(sheet), front, back))
-    behind = CameraRecord(name="behind", position=(0, 0, -2), target=(0, 0, 0))
+    behind = Camera(name="behind", position=(0, 0, -2), target=(0, 0, 0))
     for camera, expected in ((FORWARD, (0.5, 0.75, 0)), (behind, (1.5, 0.25, 0))):
         np.testing.assert_allclose(renderer.image(FrameState(camera, 9, 9))[4, 4], expected, rtol=1e-3, atol=1e-3)
 
@@ -103,7 +102,7 @@ def test_emission_goes_one_way(device) -> None:
     lamp = scene.record.objects[0].model_copy(update={"emission": (7.0, 5.0, 3.0)})
     scene = replace(scene, record=scene.record.model_copy(update={"objects": (lamp,)}))
     renderer = Renderer(device, scene)
-    behind = CameraRecord(name="behind", position=(0, 0, -2), target=(0, 0, 0))
+    behind = Camera(name="behind", position=(0, 0, -2), target=(0, 0, 0))
     np.testing.assert_allclose(renderer.image(FrameState(FORWARD, 9, 9))[4, 4], (7, 5, 3), rtol=1e-3)
     assert renderer.image(FrameState(behind, 9, 9))[4, 4].max() == 0
 
@@ -112,7 +111,7 @@ def test_back_of_a_reflector_reflects_its_own_side(device) -> None:
     mirror = Material(name="m", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
     renderer = Renderer(device, wall_scene(mirror, cube_of(smooth_light)))
     for z in (2.0, -2.0):
-        camera = CameraRecord(name="c", position=(0.3, 0.2, z), target=(0.1, 0.0, 0.0), fov_y_deg=40)
+        camera = Camera(name="c", position=(0.3, 0.2, z), target=(0.1, 0.0, 0.0), fov_y_deg=40)
         image = renderer.image(FrameState(camera, 16, 12, n=1, lookup="plain", antialias=False))
         expected = smooth_light(pixel_rays(camera, 16, 12) * [1, 1, -1])
         np.testing.assert_allclose(image, expected, rtol=0.02)
@@ -148,7 +147,7 @@ def test_show_splits_the_light(device) -> None:
 def test_coupled_diffuse_darkens_towards_grazing(device) -> None:
     """kd/pi E t(cos_o), with t of the numpy material."""
     coupled = Material(name="m", kd=(0.2, 0.4, 0.6), kd_coupled=True)
-    low = CameraRecord(name="low", position=(2.0, 0.2, 0.8), target=(0.0, 0.0, 0.0), fov_y_deg=30.0)
+    low = Camera(name="low", position=(2.0, 0.2, 0.8), target=(0.0, 0.0, 0.0), fov_y_deg=30.0)
     scene = wall_scene(coupled, np.zeros((6, 8, 8, 3)), irradiance=(1, 2, 3))
     image = Renderer(device, scene).image(FrameState(low, 12, 8, show="diffuse", antialias=False))
     cos_o = np.abs(pixel_rays(low, 12, 8)[..., 2:])
@@ -162,7 +161,7 @@ def test_coupled_diffuse_darkens_towards_grazing(device) -> None:
 def test_display_image_is_exposed_and_encoded(device, view_transform: str) -> None:
     scene = replace(square(), environment=cube_of(smooth_light))
     renderer = Renderer(device, scene)
-    away = CameraRecord(name="away", position=(0, 0, 2), target=(1, 1, 3), fov_y_deg=70)
+    away = Camera(name="away", position=(0, 0, 2), target=(1, 1, 3), fov_y_deg=70)
     state = FrameState(away, 24, 16, exposure_ev=-0.7, view_transform=view_transform)
     linear = renderer.image(state)
     exposed = filmic(linear, -0.7) if view_transform == "filmic" else linear * 2**-0.7
@@ -173,7 +172,7 @@ def test_neutral_keeps_colours_and_tames_highlights(device) -> None:
     """Khronos PBR Neutral: below .8 - .04 a colour loses only its .04 offset; above, it stays below 1."""
     scene = replace(square(), environment=np.broadcast_to(np.array([0.5, 0.3, 0.2]), (6, 2, 2, 3)))
     renderer = Renderer(device, scene)
-    away = CameraRecord(name="away", position=(0, 0, 2), target=(0, 0, 3))
+    away = Camera(name="away", position=(0, 0, 2), target=(0, 0, 3))
     state = FrameState(away, 4, 4, view_transform="neutral")
     expected = srgb_encode(np.array([0.46, 0.26, 0.16])) * 255
     np.testing.assert_allclose(renderer.display_image(state)[0, 0], expected, atol=0.6)

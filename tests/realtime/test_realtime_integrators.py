@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from conftest import OBLIQUE, cube_of, pixel_rays, smooth_light, wall_scene
 
+from lambent.core.camera import Camera
 from lambent.core.cubemap import sample as sample_cube
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.split_sum import albedo_table
-from lambent.store.contract import CameraRecord
 
 STATE = FrameState(OBLIQUE, 8, 8, antialias=False, show="specular", lookup="plain")
 # m -> mean white-furnace error of rings, n = 7, relative
@@ -34,7 +34,7 @@ def material(lobes: tuple[Lobe, ...]) -> Material:
     return Material(name="m", lobes=lobes)
 
 
-def wo_of(camera: CameraRecord, width: int, height: int) -> np.ndarray:
+def wo_of(camera: Camera, width: int, height: int) -> np.ndarray:
     """wo (height, width, 3) of the wall's pixels: its frame is world space."""
     return -pixel_rays(camera, width, height)
 
@@ -119,13 +119,13 @@ def box_hit(x: np.ndarray, w: np.ndarray) -> np.ndarray:
 def test_lookups_meet_the_room(device, lookup: str, tolerance: float) -> None:
     """A mirror in a box: where the reflected rays end, seen from the probe's centre."""
     from lambent.core.cubemap import face_directions
-    from lambent.core.frames import normalize
+    from lambent.core.directions import normalize
 
     mirror = material((Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
     texels = normalize(face_directions(128))
     distance = np.linalg.norm(box_hit(np.zeros(3), texels), axis=-1)
     scene = wall_scene(mirror, cube_of(smooth_light, 128), planes=box_planes(LOW, HIGH), distance=distance)
-    camera = CameraRecord(name="c", position=(0.4, 0.2, 2.0), target=(0.3, 0.1, 0.0), fov_y_deg=30.0)
+    camera = Camera(name="c", position=(0.4, 0.2, 2.0), target=(0.3, 0.1, 0.0), fov_y_deg=30.0)
     state = replace(STATE, camera=camera, width=24, height=16, n=1, lookup=lookup)
     image = Renderer(device, scene).image(state)
     rays = pixel_rays(camera, 24, 16)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.realtime.camera import clip_from_world
+from lambent.core.camera import Camera, clip_from_world
 from lambent.realtime.clusters import CLUSTER_FACES, Clusters
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.parts import PART_S, STEP_ROWS, Cut
 from lambent.scenes.geometry import sphere
-from lambent.store.contract import CameraRecord, ObjectRecord
+from lambent.store.contract import ObjectRecord
 from tests.realtime.test_realtime_planar import mirror, scene_of, state
 
 SIZE = (96, 8 * STEP_ROWS + 5)
@@ -42,7 +42,7 @@ def test_no_triangle_in_view_is_left_out(seed: int) -> None:
     weights = rng.dirichlet((1, 1, 1), 60)
     points = np.einsum("pk,fkc->fpc", weights, positions[faces])
     for _ in range(10):
-        camera = CameraRecord(
+        camera = Camera(
             name="c", position=tuple(rng.normal(0, 1.5, 3)), target=tuple(rng.normal(0, 1.5, 3)), fov_y_deg=40
         )
         matrix = clip_from_world(camera, 160, 120, 0.05)
@@ -68,7 +68,7 @@ def test_what_is_behind_is_left_out() -> None:
         name="ball", material="m", first_face=0, face_count=len(mesh.faces), bounds=((-1, -1, -1), (1, 1, 1))
     )
     clusters = Clusters(mesh.positions, mesh.faces, (record,))
-    camera = CameraRecord(name="c", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=40)
+    camera = Camera(name="c", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=40)
     away = camera.model_copy(update={"target": (0, 0, 9)})
     whole = clusters.seen(clip_from_world(camera, 64, 64, 0.01)).of(0, len(mesh.faces))
     assert whole == [(0, len(mesh.faces))]

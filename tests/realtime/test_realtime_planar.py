@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.camera import clip_from_world, image_plane
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.frame_data import FRAME_DTYPE
 from lambent.realtime.mirror import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, mirror_views
@@ -23,10 +23,10 @@ from lambent.realtime.shader_source import assemble
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.floor_plan import floor_plan
 from lambent.scenes.geometry import box, patch, placed, sphere
-from lambent.store.contract import CameraRecord, PlanRecord, ReflectorPart, ReflectorRecord
+from lambent.store.contract import PlanRecord, ReflectorPart, ReflectorRecord
 from lambent.store.plans import plan_record
 
-CAMERA = CameraRecord(name="c", position=(0.4, 1.3, 3.0), target=(0.1, 0.4, 0.0), fov_y_deg=50)
+CAMERA = Camera(name="c", position=(0.4, 1.3, 3.0), target=(0.1, 0.4, 0.0), fov_y_deg=50)
 FLOOR = ReflectorRecord(
     plane=(0, 1, 0, 0),
     outline=((-3, 0, -3), (-3, 0, 3), (3, 0, 3), (3, 0, -3)),
@@ -70,7 +70,7 @@ def state(**more: Any) -> FrameState:
     return FrameState(CAMERA, WIDTH, HEIGHT, antialias=False, **more)
 
 
-def frame_of(camera: CameraRecord, width: int = WIDTH, height: int = HEIGHT) -> np.void:
+def frame_of(camera: Camera, width: int = WIDTH, height: int = HEIGHT) -> np.void:
     data = np.zeros((), FRAME_DTYPE)
     data["clip_from_world"] = clip_from_world(camera, width, height, 0.01).T
     data["eye"][:3] = camera.position
@@ -104,7 +104,7 @@ def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(device: Any, se
 def test_what_stands_on_the_floor_meets_its_reflection(device: Any) -> None:
     """Where the box stands, both sides of the contact are red: no light leaks in between."""
     renderer = Renderer(device, scene_of(mirror(0.001)))
-    camera = CameraRecord(name="near", position=(-0.7, 0.25, 1.6), target=(-0.7, 0.0, 0.5), fov_y_deg=20)
+    camera = Camera(name="near", position=(-0.7, 0.25, 1.6), target=(-0.7, 0.0, 0.5), fov_y_deg=20)
     image = renderer.image(replace(state(n=3), camera=camera))
     middle = image[:, WIDTH // 2]
     assert (middle[:, 0] > 1.5).sum() >= 0.9 * HEIGHT
@@ -158,7 +158,7 @@ def test_no_light_comes_in_below_the_walls(device: Any, integrator: str) -> None
     plan = floor_plan(corners[-2:], np.array((0.0, 1.0, 0.0)), corners[:-2])
     assert plan is not None
     one = Probe((0.0, 1.0, 0.0), np.ones((6, 4, 4, 3), np.float32))
-    camera = CameraRecord(name="low", position=(0.5, 0.6, 1.6), target=(-0.2, 0.2, -2.0), fov_y_deg=50)
+    camera = Camera(name="low", position=(0.5, 0.6, 1.6), target=(-0.2, 0.2, -2.0), fov_y_deg=50)
 
     def seen(plan: PlanRecord | None) -> np.ndarray:
         reflector = FLOOR.model_copy(update={"outline": outline, "plan": plan})
@@ -217,7 +217,7 @@ def test_cells_of_a_mirror_picture_have_one_size() -> None:
 
 
 def test_covered_share_of_a_square_that_fills_half_the_picture() -> None:
-    camera = CameraRecord(name="c", position=(0, 0, 1), target=(0, 0, 0), fov_y_deg=90)
+    camera = Camera(name="c", position=(0, 0, 1), target=(0, 0, 0), fov_y_deg=90)
     aspect = WIDTH / HEIGHT
     square = np.array([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], float)
     assert covered_share(frame_of(camera), square) == pytest.approx(0.5, abs=1e-6)

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from conftest import cube_of, smooth_light, wall_scene
 
+from lambent.core.camera import Camera
 from lambent.core.colour import srgb_decode
 from lambent.materials.document import Lobe, Material
 from lambent.realtime import textures as on_gpu
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
-from lambent.scenes.scene import Camera, MaterialTextures, Scene, SceneObject, Texture
+from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
 from lambent.scenes.textures import doubled_angle, halved, slopes
-from lambent.store.contract import CameraRecord
 
 LETTER = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16)  # an F
-FRONT = CameraRecord(
+FRONT = Camera(
     name="c", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=float(np.degrees(2 * np.arctan(0.25)))
 )
 SQUARE = patch((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))

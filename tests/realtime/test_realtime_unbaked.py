@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lambent.core.cubemap import face_directions
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.document import Material
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.unbaked import CAMERA, irradiance, unbaked_scene, with_diffuse_light

@@ -7,8 +7,8 @@ import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, sample_path, validate
+from lambent.scenes.camera_paths import path_length
 from lambent.scenes.geometry import signed_volume
-from lambent.scenes.paths import path_length
 from lambent.scenes.scene import Scene
 
 OPEN = {"floor", "floor_tiles_light", "floor_tiles_dark", "grout", "walls", "window_reveal", "ceiling", "shell",

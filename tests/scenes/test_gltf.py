@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
+from lambent.core.photometry import ILLUMINANCE, photometric
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes import load_scene, validate
@@ -135,8 +136,13 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     half = np.sqrt(0.5)  # a quarter turn about x: -z becomes... -y is looked at with -90 degrees
     down = [-half, 0, 0, half]
     lights = [
-        {"type": "directional", "intensity": 683, "color": [1, 0.5, 0.25]},
-        {"type": "spot", "intensity": 1366, "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}},
+        {"type": "directional", "intensity": 1000, "color": [1, 1, 1]},
+        {
+            "type": "spot",
+            "intensity": 358,
+            "color": [1, 0.5, 0.25],
+            "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5},
+        },
     ]
     content = document(
         nodes=[
@@ -152,8 +158,10 @@ def test_lights_and_cameras(tmp_path: Path) -> None:
     scene = loaded(tmp_path, content)
     sun, spot = scene.lights
     assert isinstance(sun, DirectionalLight) and isinstance(spot, PointLight) and spot.direction is not None
-    assert sun.direction == pytest.approx((0, -1, 0)) and sun.irradiance == pytest.approx((1, 0.5, 0.25))
-    assert spot.intensity == pytest.approx((2, 2, 2)) and spot.position == (0, 3, 0)
+    assert sun.direction == pytest.approx((0, -1, 0)) and photometric(
+        np.array(sun.irradiance), ILLUMINANCE
+    ) == pytest.approx(1000)
+    assert spot.intensity == pytest.approx((2, 1, 0.5)) and spot.position == (0, 3, 0)
     assert spot.direction == pytest.approx((0, -1, 0)) and spot.outer_deg == pytest.approx(np.degrees(0.5))
     assert [c.name for c in scene.cameras] == ["view"]
     assert scene.cameras[0].position == (0, 1, 5) and scene.cameras[0].target == pytest.approx((0, 1, 4))

@@ -10,8 +10,8 @@ import pytest
 
 from lambent.bake.engine import engine
 from lambent.bake.mitsuba_scene import SceneBuilder, environment_dict
-from lambent.bake.reference import camera_axes
-from lambent.core.frames import normalize
+from lambent.core.camera import camera_axes
+from lambent.core.directions import normalize
 from lambent.core.images import write_image
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene, validate

@@ -1,18 +1,20 @@
 """views.json: saved whole, read with suspicion, and never mixed up with what is baked."""
 
 import json
+from dataclasses import replace
 from threading import Thread
 
 import pytest
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
-from lambent.store.camera_paths import TimedPath, camera_at
-from lambent.store.contract import CameraRecord, PathRecord, SceneRecord
+from lambent.scenes.camera_paths import camera_at
+from lambent.store.contract import SceneRecord
 from lambent.store.views import FILE, Views, change_views, checked_name, free_name, read_views, with_views
 
-A = CameraRecord(name="a", position=(0, 1, 0), target=(0, 1, -1))
-B = CameraRecord(name="b", position=(2, 1, 0), target=(2, 1, -1), fov_y_deg=60)
-WAY = TimedPath(name="w", keys=(A, A, B), seconds=3.0, times_s=(0.0, 2.0, 3.0))
+A = Camera(name="a", position=(0, 1, 0), target=(0, 1, -1))
+B = Camera(name="b", position=(2, 1, 0), target=(2, 1, -1), fov_y_deg=60)
+WAY = CameraPath(name="w", keys=(A, A, B), seconds=3.0, times_s=(0.0, 2.0, 3.0))
 
 
 def test_round_trip(tmp_path):
@@ -71,10 +73,10 @@ def test_names():
 
 def test_the_scene_hides_saved_names():
     scene = SceneRecord(
-        name="s", objects=(), materials={}, cameras=(A,), paths=(PathRecord(name="w", keys=(A, B), seconds=1),),
+        name="s", objects=(), materials={}, cameras=(A,), paths=(CameraPath(name="w", keys=(A, B), seconds=1),),
         bounds=((0, 0, 0), (1, 1, 1)),
     )  # fmt: skip
-    whole = with_views(scene, Views(cameras=(A.model_copy(update={"fov_y_deg": 9}), B), paths=(WAY,)))
+    whole = with_views(scene, Views(cameras=(replace(A, fov_y_deg=9), B), paths=(WAY,)))
     assert whole.cameras == (A, B) and whole.paths == scene.paths
 
 
@@ -85,8 +87,8 @@ def test_a_recorded_path_keeps_its_times():
     assert camera_at(WAY, 1.0).position[0] == pytest.approx(0, abs=0.2)
     assert 0.3 < camera_at(WAY, 2.5).position[0] < 1.5
     assert camera_at(WAY, 2.5).name == "w" and 45 < camera_at(WAY, 2.5).fov_y_deg < 60
-    straight = tuple(A.model_copy(update={"position": (float(k), 0.0, 0.0)}) for k in range(4))
-    even = TimedPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
+    straight = tuple(replace(A, position=(float(k), 0.0, 0.0)) for k in range(4))
+    even = CameraPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
     assert [camera_at(even, t).position[0] for t in (1.25, 1.5, 1.75)] == pytest.approx([1.25, 1.5, 1.75])
 
 

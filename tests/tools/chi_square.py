@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.check import Scatters
 from lambent.materials.chi_square import ChiSquare, chi_square
 

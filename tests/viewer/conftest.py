@@ -2,8 +2,9 @@
 
 import pytest
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
-from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord
+from lambent.store.contract import ObjectRecord, SceneRecord
 from lambent.viewer.state import Choices
 
 
@@ -11,8 +12,8 @@ from lambent.viewer.state import Choices
 def scene():
     plaster = Material(name="plaster", kd=0.6)
     brass = Material(name="brass", kd=0.05, lobes=(Lobe(k=(0.9, 0.7, 0.3), mx=0.1, my=0.3, r0=(0.9, 0.7, 0.4)),))
-    front = CameraRecord(name="front", position=(0, 1.6, 3), target=(0, 1, 0))
-    side = CameraRecord(name="side", position=(3, 1.6, 0), target=(0, 1, 0))
+    front = Camera(name="front", position=(0, 1.6, 3), target=(0, 1, 0))
+    side = Camera(name="side", position=(3, 1.6, 0), target=(0, 1, 0))
     room = ((-4.0, 0.0, -4.0), (4.0, 2.6, 4.0))
     return SceneRecord(
         name="test room",
@@ -22,7 +23,7 @@ def scene():
         ),
         materials={"plaster": plaster, "brass": brass},
         cameras=(front, side),
-        paths=(PathRecord(name="tour", keys=(front, side), seconds=4),),
+        paths=(CameraPath(name="tour", keys=(front, side), seconds=4),),
         exposure_ev=1.5,
         bounds=room,
     )

@@ -3,17 +3,18 @@
 import numpy as np
 
 from lambent.bench.specular_scene import studio
+from lambent.core.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import merge, patch, placed, sphere
-from lambent.store.contract import CameraRecord, ObjectRecord, PathRecord, SceneRecord, write_scene_record
+from lambent.store.contract import ObjectRecord, SceneRecord, write_scene_record
 from lambent.store.store import Store
 
 MATERIALS = {
     "plaster": Material(name="plaster", kd=(0.6, 0.55, 0.5)),
     "brass": Material(name="brass", kd=0.02, lobes=(Lobe(mx=0.1, my=0.1, r0=(0.9, 0.7, 0.4)),)),
 }
-FRONT = CameraRecord(name="front", position=(0, 1.6, 3), target=(0, 1, 0), fov_y_deg=60)
-SIDE = CameraRecord(name="side", position=(3, 1.6, 0.5), target=(0, 1, 0), fov_y_deg=60)
+FRONT = Camera(name="front", position=(0, 1.6, 3), target=(0, 1, 0), fov_y_deg=60)
+SIDE = Camera(name="side", position=(3, 1.6, 0.5), target=(0, 1, 0), fov_y_deg=60)
 
 
 def write_small_store(folder):
@@ -51,7 +52,7 @@ def write_small_store(folder):
         store,
         SceneRecord(
             name="small room", objects=tuple(objects), materials=MATERIALS, cameras=(FRONT, SIDE),
-            paths=(PathRecord(name="tour", keys=(FRONT, SIDE), seconds=3),),
+            paths=(CameraPath(name="tour", keys=(FRONT, SIDE), seconds=3),),
             bounds=((-4.0, 0.0, -4.0), (4.0, 2.6, 4.0)),
         ),
     )  # fmt: skip

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.disks import disk_directions

@@ -1,17 +1,18 @@
 """The camera answers the mouse and the keys as docs/window.md says."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.store.contract import CameraRecord
+from lambent.core.camera import Camera
 from lambent.viewer import cameras
 
 ROOM = ((-3.0, 0.0, -4.0), (3.0, 2.6, 4.0))
-EYE = CameraRecord(name="eye", position=(0, 1.6, 2), target=(0, 1.6, -1), fov_y_deg=50)
+EYE = Camera(name="eye", position=(0, 1.6, 2), target=(0, 1.6, -1), fov_y_deg=50)
 PIXELS = st.floats(-3000, 3000)
 
 
@@ -23,7 +24,7 @@ def walked(camera, keys, seconds, steps, **options):
 
 
 def test_heading_and_elevation():
-    right_up = EYE.model_copy(update={"target": (1, 2.6, 2)})
+    right_up = replace(EYE, target=(1, 2.6, 2))
     assert cameras.yaw_pitch(EYE) == pytest.approx((0, 0))
     assert cameras.yaw_pitch(right_up) == pytest.approx((math.pi / 2, math.pi / 4))
 
@@ -73,7 +74,7 @@ def test_zoom_goes_to_the_target_and_never_past_it():
 
 @pytest.mark.parametrize("flying", [False, True])
 def test_walking_does_not_depend_on_the_frame_rate(flying):
-    start = cameras.look(EYE.model_copy(update={"position": (0, 1.2, 2)}), 40, -20)
+    start = cameras.look(replace(EYE, position=(0, 1.2, 2)), 40, -20)
     slow = walked(start, {"w", "d"}, 0.6, 3, flying=flying)
     fast = walked(start, {"w", "d"}, 0.6, 60, flying=flying)
     assert slow.position == pytest.approx(fast.position, abs=1e-6)
@@ -104,7 +105,7 @@ def test_nobody_walks_through_the_bounds(keys, dx, flying):
 
 
 def test_who_starts_outside_may_come_in_but_not_go_farther_out():
-    outside = EYE.model_copy(update={"position": (0, 1.6, 9)})
+    outside = replace(EYE, position=(0, 1.6, 9))
     assert walked(outside, {"s"}, 3, 10).position[2] == pytest.approx(9)
     assert walked(outside, {"w"}, 3, 10).position[2] == pytest.approx(9 - 2.5 * cameras.WALK_M_S)
 

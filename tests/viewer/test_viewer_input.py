@@ -1,6 +1,7 @@
 """Mouse and keys over the picture change the state; over the panels they do not."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -179,7 +180,7 @@ def test_the_walkers_own_pace(mouse, state):
 def test_who_stops_flying_comes_down(mouse, state):
     send(mouse, state, "key_down", key="f")
     mouse.walk(state, 0.0)
-    state.camera = state.camera.model_copy(update={"position": (2.0, 2.4, 2.0), "target": (2.0, 2.4, 1.0)})
+    state.camera = replace(state.camera, position=(2.0, 2.4, 2.0), target=(2.0, 2.4, 1.0))
     mouse.walk(state, 0.0)
     assert state.camera.position[1] == 2.4
     send(mouse, state, "key_down", key="f")

@@ -7,8 +7,8 @@ import signal
 
 import pytest
 
+from lambent.core.camera import Camera
 from lambent.materials.document import load_material
-from lambent.store.contract import CameraRecord
 from lambent.store.views import Views
 from lambent.viewer.lost import keep_walk, kept
 from lambent.viewer.state import ViewerState
@@ -33,7 +33,7 @@ def walk_and_edit(state):
     state.record()
     for k in range(1, 20):
         state.now_s = 0.1 * k
-        state.camera = CameraRecord(name="free", position=(0.1 * k, 1.6, 0), target=(0.1 * k, 1.6, -1))
+        state.camera = Camera(name="free", position=(0.1 * k, 1.6, 0), target=(0.1 * k, 1.6, -1))
         state.recorder.take(state.camera, state.now_s)
 
 

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
+from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.false_colour import LM_PER_W
 from lambent.core.metrics import flip_error
+from lambent.core.photometry import LM_PER_W
 from lambent.core.progress import Cancelled, silent
 from lambent.realtime.baked import Probe
-from lambent.store.contract import CameraRecord
 from lambent.viewer.comparison import Comparison, Errors, difference
 from lambent.viewer.filming import film_file
 from lambent.viewer.flip_worker import flip_beside
 from lambent.viewer.markers import Markers, mirror_ball, outline, projected
 from lambent.viewer.metering import KEY, read
 
-CAMERA = CameraRecord(name="c", position=(0, 1, 5), target=(0, 1, 0), fov_y_deg=90)
+CAMERA = Camera(name="c", position=(0, 1, 5), target=(0, 1, 0), fov_y_deg=90)
 
 
 def test_a_reading_by_hand():

@@ -221,7 +221,7 @@ def test_a_walk_is_recorded_in_the_panel(whole, tmp_path):
     for k in range(10):
         state.now_s = 0.2 * k
         x = 0.1 * k
-        state.recorder.take(state.camera.model_copy(update={"position": (x, 1.6, 3.0)}), state.now_s)
+        state.recorder.take(replace(state.camera, position=(x, 1.6, 3.0)), state.now_s)
     whole.frame()
     whole.click(next(label for label in whole.rects if label.endswith("###record")))
     whole.frame()

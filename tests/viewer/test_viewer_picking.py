@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lambent.store.contract import CameraRecord
+from lambent.core.camera import Camera
 from lambent.viewer.picking import Geometry, first_hit, ray_through
 
-TOP = CameraRecord(name="top", position=(0, 3, 0), target=(0, 0, 0), up=(0, 0, -1), fov_y_deg=90)
+TOP = Camera(name="top", position=(0, 3, 0), target=(0, 0, 0), up=(0, 0, -1), fov_y_deg=90)
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def test_the_nearest_object_is_picked(geometry):
 
 
 def test_picture_points_are_right_side_up():
-    eye = CameraRecord(name="eye", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
+    eye = Camera(name="eye", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
     _, right = ray_through(eye, 200, 50, 200, 100)
     _, top = ray_through(eye, 100, 0, 200, 100)
     assert right == pytest.approx(np.array([2, 0, -1]) / np.sqrt(5))

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.core.false_colour import Range, false_colour, photometric
+from lambent.core.camera import CameraPath
+from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import read_encoded, read_image
+from lambent.core.photometry import photometric
 from lambent.realtime.device import open_device
 from lambent.realtime.frame import FrameState, Renderer
-from lambent.store.contract import PathRecord
 from lambent.store.store import Store
 from lambent.viewer.comparison import Comparison
 from lambent.viewer.filming import FilmOptions
@@ -150,7 +151,7 @@ def test_a_movement_drops_the_frame_at_rest(at_rest, state):
 
 
 def test_a_picture_is_saved_in_the_midst_of_a_frame(at_rest, state):
-    state.camera = state.camera.model_copy(update={"name": "another name is no other picture"})
+    state.camera = replace(state.camera, name="another name is no other picture")
     at_rest.save(state)
     assert "saved" in state.messages[-1].text
     drawn(at_rest, state)
@@ -200,7 +201,7 @@ def test_an_integrator_agrees_with_itself(renderer, state):
 
 def film(pictures, state, name):
     state.film.file_name, state.film.size = name, "640 x 360"
-    state.film_wanted = PathRecord(name="short", keys=(FRONT, SIDE), seconds=0.1)
+    state.film_wanted = CameraPath(name="short", keys=(FRONT, SIDE), seconds=0.1)
     drawn(pictures, state)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lambent.store.camera_paths import TimedPath, camera_at
-from lambent.store.contract import CameraRecord
+from lambent.core.camera import Camera, CameraPath
+from lambent.scenes.camera_paths import camera_at
 from lambent.store.views import read_views
 from lambent.viewer.recording import KEY_S, Recording, smoothed
 from lambent.viewer.state import ViewerState
@@ -12,7 +12,7 @@ from lambent.viewer.views import SavedViews
 
 
 def at(x):
-    return CameraRecord(name="free", position=(x, 1.6, 0), target=(x, 1.6, -1))
+    return Camera(name="free", position=(x, 1.6, 0), target=(x, 1.6, -1))
 
 
 def walked(seconds, waited_s=0.0, jitter=0.0):
@@ -157,7 +157,7 @@ def test_two_windows_do_not_lose_views(state, tmp_path):
 def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
     other = SavedViews(state.scene, tmp_path)
     other.add_camera(at(3))
-    other.add_path(TimedPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0)))
+    other.add_path(CameraPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0)))
     state.record()
     for k in range(1, 20):
         state.now_s, state.camera = 0.1 * k, at(0.1 * k)
@@ -173,7 +173,7 @@ def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
 
 
 def test_what_another_window_deleted_cannot_be_renamed(state, tmp_path):
-    way = TimedPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0))
+    way = CameraPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0))
     state.views.add_path(way, "walk 1")
     state.views.add_camera(at(0), "door")
     other = SavedViews(state.scene, tmp_path)

@@ -6,6 +6,7 @@ python -m tests.viewer.watched_window MEASUREMENT OUT WIDTHxHEIGHT edit:MATERIAL
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -39,7 +40,7 @@ class WatchedWindow(app.Window):
             "frames": self.frames_drawn,
             "marks": self.marks_seen,
             "settled": self._extra_frames == 0,
-            "camera": state.camera.model_dump(),
+            "camera": asdict(state.camera),
             "mode": state.mode,
             "selected": state.selected,
             "edited": {name: material.model_dump(mode="json") for name, material in state.edits.edited.items()},

@@ -20,8 +20,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats
 from lambent.core.files import atomic_path
-from lambent.core.frames import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject

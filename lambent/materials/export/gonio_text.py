@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject

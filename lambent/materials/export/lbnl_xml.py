@@ -13,9 +13,9 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.core.frames import Floats, direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.files import atomic_path
-from lambent.core.frames import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.files import write_text
-from lambent.core.frames import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import sums

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Material

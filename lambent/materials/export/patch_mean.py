@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.core.progress import Progress
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.lobes import COS_MIN

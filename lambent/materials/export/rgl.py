@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.colour import luminance
+from lambent.core.directions import Floats, direction, normalize, reflect
 from lambent.core.files import atomic_path
-from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.core.progress import Progress, silent
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of

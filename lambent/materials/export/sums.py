@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import angles, direction
+from lambent.core.directions import angles, direction
 from lambent.materials.fitting.incidence import Incidence
 
 Floats = NDArray[np.floating]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import angles, direction
+from lambent.core.directions import angles, direction
 from lambent.materials.measured.protocol import MeasuredSamples
 
 Floats = NDArray[np.floating]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import direction
 from lambent.core.files import atomic_path
-from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting.disks import (

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.materials.measured.columns import assemble, layout_of, rows_of
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.text_numbers import head_text, read_text, without_comments

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, direction
 from lambent.core.plain import is_number
 from lambent.materials.measured import gonio_text
 from lambent.materials.measured.gonio_rows import (

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, direction
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured
 from lambent.materials.measured.table import isotropic_brdf, require_values

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.colour import RGB_TO_XYZ, WHITE_XYZ, XYZ_TO_RGB, luminance
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 
 _WHITE_Y = WHITE_XYZ / WHITE_XYZ[1]
 

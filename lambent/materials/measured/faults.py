@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from lambent.core.frames import Floats, angles, direction, normalize
+from lambent.core.directions import Floats, angles, direction, normalize
 from lambent.core.sequences import r2
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable

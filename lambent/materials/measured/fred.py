@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.gonio_rows import Rows, check_angles, table_of
 from lambent.materials.measured.text_numbers import head_text, numbers, read_text, without_comments

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from lambent.core.frames import Floats, angles, direction, normalize, reflect
+from lambent.core.directions import Floats, angles, direction, normalize, reflect
 from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, bracket
 from lambent.materials.measured.table import IntegratedTable, require_values

@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.frames import Floats, direction
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, AnySheet, GonioTable, Sheets, Symmetry
 from lambent.materials.measured.protocol import Flags
 from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, specular_frame

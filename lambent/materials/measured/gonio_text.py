@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, angles
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
-from lambent.core.frames import Floats, angles
 from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
 from lambent.materials.measured.gonio_rows import QUANTITIES, Quantity, Rows, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.sheets import Sheet

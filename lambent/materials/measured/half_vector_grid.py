@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lambent.core.frames import Floats, direction, normalize, reflect
+from lambent.core.directions import Floats, direction, normalize, reflect
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import COS_MIN, Vector, dot, half_vector
 from lambent.materials.measured.protocol import MeasuredTable

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.measured import faults
 from lambent.materials.measured.faults import Symmetry
 from lambent.materials.measured.gonio import GonioTable

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats, angles, direction
+from lambent.core.directions import Floats, angles, direction
 
 Indices = NDArray[np.int64]
 

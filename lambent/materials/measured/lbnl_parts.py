@@ -8,8 +8,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.materials.measured.equal_energy import rgb_of_xyz, within_rec709
 from lambent.materials.measured.klems import BUILT_IN, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_document import Basis, Block, Document

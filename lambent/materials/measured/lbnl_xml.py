@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.materials.measured import lbnl_document, lbnl_parts
 from lambent.materials.measured.lbnl_parts import Part, Side, Way
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 
 Indices = NDArray[np.int64]
 

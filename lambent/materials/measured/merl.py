@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats, direction, normalize, reflect
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, collect
 from lambent.materials.measured.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
 

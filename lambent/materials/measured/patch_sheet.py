@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import COS_MIN, Vector
 from lambent.materials.measured.half_vector_grid import (

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats, direction, normalize, reflect
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, direction, normalize, reflect
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats, angles, direction, normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, angles, direction, normalize
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components
 from lambent.materials.chi_square import ChiSquare, chi_square

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.measured.merl import half_difference_angles
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect

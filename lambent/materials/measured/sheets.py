@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats, angles, direction
+from lambent.core.directions import Floats, angles, direction
 from lambent.core.sequences import r2
 from lambent.materials.measured.protocol import Flags
 from lambent.materials.measured.table import fill_holes, sensible

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.colour import XYZ_TO_RGB, xyz_to_rgb
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.materials.measured.protocol import Flags
 
 

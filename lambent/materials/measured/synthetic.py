@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, direction
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material

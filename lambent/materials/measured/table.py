@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 
 Indices = NDArray[np.int64]
 Rank = Literal[3, 4]

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.materials.measured.equal_energy import rgb_of_xyz, within_rec709, xyz_of_yuv
 from lambent.materials.measured.tensor_tree import (
     Cells,

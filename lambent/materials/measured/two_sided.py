@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.materials.measured.protocol import MeasuredTable
 
 DOWN = np.array([1.0, 1.0, -1.0])

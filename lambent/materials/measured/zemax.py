@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.frames import Floats, direction
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheets, Symmetry
 from lambent.materials.measured.protocol import LARGEST_F, Flags
 from lambent.materials.measured.sheets import Sheet, specular_frame

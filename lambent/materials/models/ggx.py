@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.models.model import Floats, Model, Parameter
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import normalize
+from lambent.core.directions import normalize
 from lambent.materials.models.model import Floats
 
 LOWEST_COSINE = 1e-9  # keeps 1/cos finite; a pair this low is not worth more

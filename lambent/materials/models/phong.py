@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.frames import basis
+from lambent.core.directions import basis
 from lambent.materials.models.model import Floats, Model, Parameter
 
 MIRROR = np.array([-1.0, -1.0, 1.0])

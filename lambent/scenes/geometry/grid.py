@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lambent.core.frames import Floats, basis, normalize
+from lambent.core.directions import Floats, basis, normalize
 from lambent.scenes.scene import Mesh
 
 FLAT = 1e-10  # a triangle below this share of its sheet's extent squared has no area worth the name

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.frames import Floats, normalize
+from lambent.core.directions import Floats, normalize
 from lambent.scenes.geometry.grid import grid, merge, transformed
 from lambent.scenes.scene import Mesh
 

@@ -15,9 +15,9 @@ from urllib.parse import unquote
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.scenes.loaders.gltf_schema import GltfDocument
 from lambent.scenes.loaders.place import named
 

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera
+from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, normalize
+from lambent.core.photometry import radiometric
+from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.scenes.geometry import transformed
 from lambent.scenes.loaders import glb
@@ -21,20 +24,10 @@ from lambent.scenes.loaders.gltf_texture import Textures, main_uv_set
 from lambent.scenes.loaders.parts import Parts, unique_name
 from lambent.scenes.loaders.repair import mesh_of
 from lambent.scenes.loaders.surface import finished
-from lambent.scenes.scene import (
-    Camera,
-    DirectionalLight,
-    Light,
-    MaterialTextures,
-    Mesh,
-    PointLight,
-    SceneObject,
-    Triple,
-)
+from lambent.scenes.scene import DirectionalLight, Light, MaterialTextures, Mesh, PointLight, SceneObject, Triple
 
 TRIANGLES_MAX = 20_000_000
 FAR = 1e9  # metres
-LUMENS_PER_WATT = 683.0  # glTF lights are photometric; 683 lm/W is what exporters from radiometric units assume
 
 
 @dataclass
@@ -273,23 +266,18 @@ def _add_camera(reading: _Reading, node: Node, world: Floats) -> None:
     name = unique_name(wanted, reading.camera_names)
     position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
     fov_y_deg = math.degrees(camera.perspective.yfov)
-    reading.cameras.append(Camera(name, _triple(position), _triple(position + forward), _triple(up), fov_y_deg))
+    reading.cameras.append(Camera(name, triple(position), triple(position + forward), triple(up), fov_y_deg))
 
 
 def _add_light(reading: _Reading, index: int, world: Floats) -> None:
     gltf = reading.gltf
     light = gltf.pick(gltf.document.extensions.KHR_lights_punctual.lights, index, "lights")
-    power = _triple(np.asarray(light.color) * light.intensity / LUMENS_PER_WATT)
-    direction = _triple(-normalize(world[:3, 2]))
+    power = triple(radiometric(np.asarray(light.color) * light.intensity))
+    direction = triple(-normalize(world[:3, 2]))
     if light.type == "directional":
         reading.lights.append(DirectionalLight(direction, power))
     elif light.type == "point":
-        reading.lights.append(PointLight(_triple(world[:3, 3]), power))
+        reading.lights.append(PointLight(triple(world[:3, 3]), power))
     else:
         inner, outer = math.degrees(light.spot.innerConeAngle), math.degrees(light.spot.outerConeAngle)
-        reading.lights.append(PointLight(_triple(world[:3, 3]), power, direction, min(inner, outer), outer))
-
-
-def _triple(values: Floats) -> Triple:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
+        reading.lights.append(PointLight(triple(world[:3, 3]), power, direction, min(inner, outer), outer))

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.loaders.gltf_schema import MaterialDocument, SpecularGlossiness
 from lambent.scenes.loaders.gltf_texture import Textures, main_uv_set
 from lambent.scenes.loaders.metallic import metallic_roughness
 from lambent.scenes.loaders.pictures import Picture
-from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, coated, seen_through, triple
+from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, coated, rgb, seen_through
 from lambent.scenes.loaders.varying import UvTransform, Varying, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, Triple
 
@@ -155,7 +155,7 @@ def _emission(document: MaterialDocument, textures: Textures, uv_set: int, said:
     if picture is not None:
         said.append("its emission is averaged over its picture")
         glow = glow * picture.mean
-    return triple(glow)
+    return rgb(glow)
 
 
 def _with_alpha(

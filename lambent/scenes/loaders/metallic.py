@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.loaders.surface import Gloss, Surface
 from lambent.scenes.loaders.varying import Varying, combined, constant
 

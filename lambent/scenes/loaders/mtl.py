@@ -15,15 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.core.plain import is_number
 from lambent.materials.document import Material
 from lambent.scenes.loaders.metallic import metallic_roughness
 from lambent.scenes.loaders.pictures import Picture, Pictures
 from lambent.scenes.loaders.place import found
-from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, coated, finished, seen_through, triple
+from lambent.scenes.loaders.surface import ROUGHNESS_MIN, Gloss, Surface, coated, finished, rgb, seen_through
 from lambent.scenes.loaders.varying import IDENTITY, UvTransform, Varying, absolute, combined, constant, scaled
 from lambent.scenes.scene import MaterialTextures, Texture, Triple
 
@@ -240,7 +240,7 @@ class _Reading:
         if picture is not None:
             self._said.append("its emission is averaged over its picture")
             ke = (ke if ke.any() else np.ones(3)) * picture[0].rgb(srgb=True).mean(axis=(0, 1), dtype=float)
-        return triple(ke)
+        return rgb(ke)
 
     def _opaque(self, surface: Surface) -> Surface:
         """With its mask, or with the light that passes it."""

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats
 
 BLOCK_BYTES = 8 << 20
 INDICES_MAX = 240_000_000

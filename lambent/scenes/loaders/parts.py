@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from lambent.core.camera import Camera
 from lambent.materials.document import Material
-from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject, Triple
+from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject, Triple
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from lambent.core import exr, rgbe
 from lambent.core.colour import srgb_decode
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.core.images import read_image
 
 PIXELS_MAX = 1 << 26

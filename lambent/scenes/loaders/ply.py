@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.materials.document import Material
 from lambent.scenes.loaders.parts import Parts
 from lambent.scenes.loaders.polygons import Arrays, Ints, smooth_normals, triangulate

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import Floats, basis, normalize
+from lambent.core.directions import Floats, basis, normalize
 
 Ints = NDArray[np.int64]
 

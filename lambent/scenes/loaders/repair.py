@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.directions import Floats, basis, normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, basis, normalize
 from lambent.scenes.geometry import areas, tangents_along
 from lambent.scenes.geometry.grid import FLAT
 from lambent.scenes.scene import Mesh

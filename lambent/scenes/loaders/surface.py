@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
+from lambent.core.plain import triple
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.loaders.varying import Varying, combined, constant, relative, scaled
 from lambent.scenes.scene import MaterialTextures, Texture, Triple
@@ -94,10 +95,10 @@ def finished(name: str, surface: Surface, said: list[str]) -> tuple[Material, Ma
             Lobe(
                 side=gloss.side,
                 distribution=gloss.distribution,
-                k=triple(k * share),
+                k=rgb(k * share),
                 mx=mx,
                 my=my,
-                r0=triple(np.clip(gloss.r0, 0, 1)),
+                r0=rgb(np.clip(gloss.r0, 0, 1)),
                 alpha=alpha,
             )
         )
@@ -111,7 +112,7 @@ def finished(name: str, surface: Surface, said: list[str]) -> tuple[Material, Ma
         cutoff=surface.cutoff,
     )
     coupled = surface.coupled and any(kd)
-    material = Material(name=name, kd=triple(kd), kd_coupled=coupled, kt_d=triple(kt_d), lobes=tuple(lobes))
+    material = Material(name=name, kd=rgb(kd), kd_coupled=coupled, kt_d=rgb(kt_d), lobes=tuple(lobes))
     varies = textures != MaterialTextures(cutoff=textures.cutoff)
     return material, textures if varies else None
 
@@ -195,6 +196,6 @@ def _same(a: Texture, b: Texture) -> bool:
     return a.texels is b.texels or bool(np.array_equal(a.texels, b.texels))
 
 
-def triple(values: Floats) -> Triple:
-    r, g, b = (float(v) for v in np.broadcast_to(values, 3))
-    return r, g, b
+def rgb(values: Floats) -> Triple:
+    """(r, g, b) of three numbers, or of one for all."""
+    return triple(np.broadcast_to(values, 3))

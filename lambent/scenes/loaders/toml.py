@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.files import inside, read_bytes
 from lambent.materials.document import Material, load_material, material_from
@@ -30,8 +31,6 @@ from lambent.scenes.loaders.schema import (
     known_keys,
 )
 from lambent.scenes.scene import (
-    Camera,
-    CameraPath,
     ConstantEnvironment,
     DirectionalLight,
     Environment,

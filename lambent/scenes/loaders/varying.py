@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.scene import Texture
 
 UvTransform = tuple[tuple[float, float, float], tuple[float, float, float]]

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from lambent.core.errors import UserError
+from lambent.core.plain import plain_name
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material, load_material
 from lambent.viewer.editor.documents import kind_of, same_numbers, target_of, typed_path, with_account
@@ -96,7 +97,7 @@ class Editor:
     def __post_init__(self) -> None:
         self.loaded = self.material
         self.origins.append(self.loaded)
-        self.file_name = self.file_name or f"{_plain(self.material.name)}.json"
+        self.file_name = self.file_name or f"{plain_name(self.material.name)}.json"
         self.shown = Shown()
 
     # the materials
@@ -338,7 +339,3 @@ class Editor:
         for work in (self.fitting, self.loading, self.shown.exact_work):
             if work is not None:
                 work.cancel()
-
-
-def _plain(name: str) -> str:
-    return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or "material"

@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.camera import Camera
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, texel_solid_angles
+from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import normalize
 from lambent.core.images import read_image
 from lambent.materials.document import Material
 from lambent.scenes import environments
 from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
 from lambent.scenes.scene import Mesh
-from lambent.store.contract import CameraRecord, ObjectRecord, SceneRecord
+from lambent.store.contract import ObjectRecord, SceneRecord
 
 Floats = NDArray[np.floating]
 
@@ -27,7 +28,7 @@ LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.07, -0.08, -1.0), 6.0
 LAMP_SHARE = 0.06  # of the environment's light
 OBJECT = "preview"
 BOUNDS = ((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0))
-CAMERA = CameraRecord(name="front", position=(0.0, 0.75, 4.1), target=(0.0, 0.0, 0.0), fov_y_deg=32.0)
+CAMERA = Camera(name="front", position=(0.0, 0.75, 4.1), target=(0.0, 0.0, 0.0), fov_y_deg=32.0)
 
 BUILT_IN: dict[str, Callable[[], Floats]] = {
     "studio": environments.studio,

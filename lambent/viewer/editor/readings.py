@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF, components, evaluate
 from lambent.materials.document import Material

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from lambent.core.plain import plain_name
 from lambent.viewer.filming import FPS, QUALITIES, SIZES
 from lambent.viewer.panels.widgets import choice, explain, path_field
-from lambent.viewer.state import ViewerState, plain_name
+from lambent.viewer.state import ViewerState
 
 TITLE = "Film"
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.false_colour import STOPS, number, photometric
+from lambent.core.false_colour import STOPS, number
+from lambent.core.photometry import photometric
 from lambent.viewer.comparison import error_scale
 from lambent.viewer.input import Rect
 from lambent.viewer.panels.metering import unit_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from imgui_bundle import imgui
 
@@ -76,10 +77,10 @@ def _saving(state: ViewerState) -> None:
         return
     change = rename_or_delete(state, "camera", chosen)
     if change == "delete" and views.delete_camera(chosen):
-        state.jump(state.camera.model_copy(update={"name": "free"}))
+        state.jump(replace(state.camera, name="free"))
         state.say(f"deleted the view {chosen}")
     elif change == "rename" and views.rename_camera(chosen, state.typed_name):
-        state.jump(state.camera.model_copy(update={"name": state.typed_name.strip()}))
+        state.jump(replace(state.camera, name=state.typed_name.strip()))
         state.renaming = None
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.colour import srgb_decode, srgb_encode
+from lambent.core.plain import triple
 
 RGB = tuple[float, float, float]
 Word = TypeVar("Word", bound=str)
@@ -38,7 +39,7 @@ def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
     swatch_px = imgui.get_frame_height()
     imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
     changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, "%.3f", imgui.SliderFlags_.always_clamp)
-    value = _triple(moved) if changed else value
+    value = triple(moved) if changed else value
     scale = max(1.0, *value)
     shown = [float(x) for x in srgb_encode(np.array(value) / scale)]
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
@@ -47,7 +48,7 @@ def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
     if imgui.begin_popup("picker"):
         picked, colour = imgui.color_picker3("##picker", shown, imgui.ColorEditFlags_.no_side_preview)
         if picked:
-            value = _triple(srgb_decode(np.array(colour)) * scale)
+            value = triple(srgb_decode(np.array(colour)) * scale)
         imgui.end_popup()
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     imgui.text_unformatted(label)
@@ -85,7 +86,3 @@ def rows(pairs: Sequence[tuple[str, str]], name: str) -> None:
         imgui.table_next_column()
         imgui.text_wrapped(right)
     imgui.end_table()
-
-
-def _triple(values: Sequence[float] | np.ndarray) -> RGB:
-    return cast(RGB, tuple(max(0.0, float(v)) for v in values))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lambent.core.colour import luminance
+from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, direction
 from lambent.core.progress import Cancelled
 from lambent.core.sequences import r2
 from lambent.materials.bsdf import MaterialBSDF

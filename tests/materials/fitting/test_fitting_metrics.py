@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.frames import direction
 from lambent.materials.fitting.metrics import METRICS, errors_of, metric_named
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo
 

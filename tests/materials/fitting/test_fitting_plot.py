@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.document import Material
 from lambent.materials.fitting.incidence import incidences
 from lambent.materials.fitting.plot import save_plots

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import angles, direction
 from lambent.core.errors import UserError
-from lambent.core.frames import angles, direction
 from lambent.materials.measured.gonio_text import write_gonio
 from lambent.materials.measured.registry import load, readers
 from lambent.materials.measured.synthetic import Setup, synthesise

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.frames import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured import load
 from lambent.materials.measured.scattered import ScatteredTable, _place

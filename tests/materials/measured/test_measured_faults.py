@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
 from lambent.materials.measured.inspection import inspect_table

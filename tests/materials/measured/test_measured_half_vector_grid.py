@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import half_vector_grid

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.core.colour import WHITE_XYZ, luminance, rgb_to_xyz
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.materials.measured import load
 from lambent.materials.measured.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
 from lambent.materials.measured.lbnl_xml import LbnlTable, read

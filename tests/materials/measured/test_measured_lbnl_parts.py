@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.frames import Floats, direction
+from lambent.core.directions import Floats, direction
 from lambent.core.sequences import r2
 from lambent.materials.measured.klems import BUILT_IN, KLEMS_FULL, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable, read

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.core.frames import direction
+from lambent.core.directions import direction
 from lambent.materials.bsdf import components
 from lambent.materials.check import check_sampler
 from lambent.materials.measured import load

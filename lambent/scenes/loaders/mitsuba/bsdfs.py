@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from lambent.core.directions import Floats
 from lambent.core.errors import did_you_mean
-from lambent.core.frames import Floats
 from lambent.scenes.loaders.mitsuba.interfaces import (
     COS,
     fresnel,

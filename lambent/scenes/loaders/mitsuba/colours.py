@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.colour import XYZ_TO_RGB, srgb_decode
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats
 from lambent.scenes.loaders.mitsuba.document import Element
 from lambent.scenes.loaders.mitsuba.numbers import floats_of
 from lambent.scenes.loaders.place import named

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 
 COSINES, FACETS = 128, 48  # Gauss-Legendre points over cos theta_i; quadrature over facets, each way
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(COSINES)

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from lambent.core.frames import Floats, normalize
+from lambent.core.camera import Camera
+from lambent.core.directions import Floats, normalize
+from lambent.core.plain import triple
 from lambent.scenes.loaders.mitsuba.textures import colour
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surface import triple
+from lambent.scenes.loaders.surface import rgb
 from lambent.scenes.scene import (
-    Camera,
     ConstantEnvironment,
     DirectionalLight,
     Environment,
@@ -33,7 +34,7 @@ def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
     matrix = world @ plugin.transform()
     made: Environment | None
     if plugin.type == "constant":
-        made = ConstantEnvironment(triple(colour(plugin, "radiance", 1.0, emitted=True).mean))
+        made = ConstantEnvironment(rgb(colour(plugin, "radiance", 1.0, emitted=True).mean))
     elif plugin.type == "envmap":
         made = _picture(plugin, matrix)
     else:
@@ -98,12 +99,12 @@ def light_of(plugin: Plugin, world: Floats) -> Light | None:
     if plugin.type == "point":
         position = plugin.vector("position")
         at = matrix[:3, 3] if position is None else _point(matrix, position)
-        made = PointLight(triple(at), triple(scale * colour(plugin, "intensity", 1.0, emitted=True).mean))
+        made = PointLight(triple(at), rgb(scale * colour(plugin, "intensity", 1.0, emitted=True).mean))
     elif plugin.type == "spot":
         outer = min(max(plugin.number("cutoff_angle", 20.0), 0.01), 90.0)
         inner = min(max(plugin.number("beam_width", outer * 0.75), 0.0), outer)
         direction = triple(normalize(matrix[:3, 2]))
-        intensity = triple(scale * colour(plugin, "intensity", 1.0, emitted=True).mean)
+        intensity = rgb(scale * colour(plugin, "intensity", 1.0, emitted=True).mean)
         made = PointLight(triple(matrix[:3, 3]), intensity, direction, inner, outer)
     elif plugin.type == "directional":
         given = plugin.vector("direction")
@@ -111,7 +112,7 @@ def light_of(plugin: Plugin, world: Floats) -> Light | None:
         if not way.any():
             raise plugin.element.error("direction is zero")
         made = DirectionalLight(
-            triple(normalize(way)), triple(scale * colour(plugin, "irradiance", 1.0, emitted=True).mean)
+            triple(normalize(way)), rgb(scale * colour(plugin, "irradiance", 1.0, emitted=True).mean)
         )
     else:
         plugin.say("left out, an emitter of an unknown kind")
@@ -134,7 +135,7 @@ def emission_of(shape: Plugin) -> Triple:
         plugin.say("its radiance is averaged over its picture")
     scale = plugin.number("scale", 1.0)
     plugin.say_unread()
-    return triple(scale * radiance.mean)
+    return rgb(scale * radiance.mean)
 
 
 def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.loaders.mitsuba.document import Element
 
 ABSURD = 1e30

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.loaders.metallic import metallic_roughness
 from lambent.scenes.loaders.mitsuba.interfaces import normal_reflectance
 from lambent.scenes.loaders.mitsuba.textures import LUMINANCE, colour, number

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.camera import Camera
+from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
-from lambent.core.frames import Floats, normalize
 from lambent.materials.document import Material
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
@@ -22,7 +23,7 @@ from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.parts import Parts, unique_name
 from lambent.scenes.loaders.surface import finished
-from lambent.scenes.scene import Camera, Environment, Light, MaterialTextures, SceneObject
+from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject
 
 TRIANGLES_MAX = 20_000_000
 GROUPS = ("shapegroup", "instance", "merge")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, basis, normalize
 from lambent.core.files import read_bytes
-from lambent.core.frames import Floats, basis, normalize
 from lambent.scenes.geometry import grid, merge, transformed
 from lambent.scenes.loaders import obj, obj_text, ply
 from lambent.scenes.loaders.mitsuba import serialized

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.frames import Floats
+from lambent.core.directions import Floats
 from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.place import found
 from lambent.scenes.loaders.varying import UvTransform, Varying, combined, constant

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.directions import Floats, normalize
 from lambent.core.errors import did_you_mean
-from lambent.core.frames import Floats, normalize
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 from lambent.scenes.loaders.mitsuba.numbers import floats_of, triple_of

@@ -1,15 +1,18 @@
-"""Camera paths: constant speed, smooth, through the keys; of a scene's dataclass or any object alike."""
+"""Camera paths: constant speed, smooth, through the keys; by time, too."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from lambent.core.camera import Camera, CameraPath
 from lambent.scenes import sample_path
-from lambent.scenes.paths import path_length
-from lambent.scenes.scene import Camera, CameraPath
+from lambent.scenes.camera_paths import camera_at, path_length
 
 KEYS = (
     Camera("a", (0, 1.6, 0), (0, 1, -5), fov_y_deg=40),
@@ -51,3 +54,34 @@ def test_any_object_with_the_same_attributes_will_do() -> None:
 def test_a_path_that_stands_still_turns() -> None:
     keys = (Camera("a", (0, 1, 0), (1, 1, 0)), Camera("b", (0, 1, 0), (0, 1, 1)))
     assert sample_path(CameraPath("turn", keys), 0.5).target == pytest.approx((0.5, 1, 0.5))
+
+
+def key(position, fov=45.0):
+    return Camera(name="key", position=position, target=(0, 1, 0), fov_y_deg=fov)
+
+
+TOUR = CameraPath(name="tour", keys=(key((0, 1, 4)), key((3, 1, 3)), key((4, 1, 0), fov=60.0)), seconds=6)
+
+
+def test_it_begins_and_ends_at_its_keys_and_stays_there():
+    for time_s, end in ((0, 0), (-1, 0), (6, -1), (99, -1)):
+        camera = camera_at(TOUR, time_s)
+        assert camera.position == pytest.approx(TOUR.keys[end].position)
+        assert camera.fov_y_deg == pytest.approx(TOUR.keys[end].fov_y_deg)
+
+
+def test_it_is_the_scenes_curve_by_time():
+    camera, same = camera_at(TOUR, 1.5), sample_path(TOUR, 0.25)
+    assert isinstance(camera, Camera)
+    assert (camera.position, camera.target, camera.up) == (same.position, same.target, same.up)
+
+
+def test_the_pace_is_even():
+    points = [camera_at(TOUR, 0.5 * k).position for k in range(13)]
+    steps = [math.dist(a, b) for a, b in pairwise(points)]
+    assert max(steps) / min(steps) < 1.05
+
+
+def test_a_path_of_one_key_or_of_no_time_stands_still():
+    assert camera_at(CameraPath(name="still", keys=TOUR.keys[:1], seconds=3), 1.0) == TOUR.keys[0]
+    assert camera_at(replace(TOUR, seconds=0.0), 1.0) == TOUR.keys[0]
