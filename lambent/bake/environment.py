@@ -11,10 +11,10 @@ from lambent.bake.engine import engine
 from lambent.bake.mitsuba_scene import environment_dict
 from lambent.bake.sky import SUN_RADIUS_RAD
 from lambent.bake.vectors import array_of, vectors
+from lambent.core.colour import HALF_MAX
 from lambent.core.cubemap import directions_at, face_directions
 from lambent.core.directions import normalize
 from lambent.scenes.scene import Environment, SunSky
-from lambent.store.contract import HALF_MAX
 
 Array = NDArray[np.floating]
 GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine one where the sun may be

@@ -21,9 +21,8 @@ from lambent.bake.quality import Quality
 from lambent.bake.seams import blend_seams
 from lambent.bake.texels import POINTS, Texels
 from lambent.bake.vectors import vectors
-from lambent.core.colour import luminance
+from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.sequences import hammersley, r2
-from lambent.store.contract import HALF_MAX
 
 Array = NDArray[np.floating]
 GATHER_PASS = 64  # samples of a texel that are stratified among themselves

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.denoise import fill
-from lambent.core.colour import luminance
-from lambent.store.contract import HALF_MAX
+from lambent.core.colour import HALF_MAX, luminance
 
 Array = NDArray[np.floating]
 REACH = 2  # texels to each side: 5 x 5

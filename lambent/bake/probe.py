@@ -19,12 +19,12 @@ from lambent.bake import paths
 from lambent.bake.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.mitsuba_scene import UV2_ATTRIBUTE, SceneBuilder
 from lambent.bake.vectors import array_of, vectors
-from lambent.core.colour import luminance
+from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
-from lambent.store.contract import FAR, HALF_MAX
+from lambent.store.contract import FAR
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.integer]

@@ -17,6 +17,7 @@ RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.01
 XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
 WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
 _LAB_EDGE = 6 / 29
+HALF_MAX = 65504.0  # the largest half float: brighter light is cut there
 
 
 def luminance(rgb: Floats) -> Floats:

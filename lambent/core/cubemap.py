@@ -30,11 +30,11 @@ def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
 
 
 def texel_solid_angles(n: int) -> Floats:
-    """(n, n) solid angles of one face's texels in sr, approximated at the centre; the six faces sum to 4 pi."""
-    c = (np.arange(n) + 0.5) / n * 2 - 1
-    s, t = np.meshgrid(c, c)
-    omega = (2 / n) ** 2 / (1 + s * s + t * t) ** 1.5
-    return np.asarray(omega * (4 * np.pi / 6 / omega.sum()))
+    """(n, n) exact solid angles of one face's texels in sr; the six faces sum to 4 pi."""
+    edge = np.linspace(-1, 1, n + 1)
+    s, t = np.meshgrid(edge, edge)
+    corner = np.arctan2(s * t, np.sqrt(s * s + t * t + 1))
+    return np.asarray(corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1])
 
 
 def sample(cube: Floats, w: Floats) -> Floats:

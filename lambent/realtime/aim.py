@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.cubemap import texel_solid_angles
 from lambent.materials.document import Material
-from lambent.realtime.cube_mips import blurred, exact_solid_angles
+from lambent.realtime.cube_mips import blurred
 
 Floats = NDArray[np.floating]
 LEVELS = 6  # at most: 64 texels along a face
@@ -34,7 +35,7 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
     """
     n = cube.shape[1]
     m = 1 << min(LEVELS, max(1, n.bit_length() - 1))
-    omega = exact_solid_angles(n)
+    omega = texel_solid_angles(n)
     light = blurred(cube.mean(axis=-1, keepdims=True), INTERPOLATED)[..., 0] * omega
     edges, texel = np.linspace(0, n, m + 1), np.arange(n)
     part = np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1)

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.cubemap import directions_at, sample
-from lambent.store.contract import HALF_MAX
+from lambent.core.colour import HALF_MAX
+from lambent.core.cubemap import directions_at, sample, texel_solid_angles
 
 Floats = NDArray[np.floating]
 BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: variance 1 texel^2
@@ -22,26 +22,18 @@ BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: varia
 SMOOTH_AREA = 5.0
 
 
-def exact_solid_angles(n: int) -> Floats:
-    """(n, n) exact solid angles in sr of one face's texels; the six faces sum to 4 pi."""
-    edge = np.linspace(-1, 1, n + 1)
-    s, t = np.meshgrid(edge, edge)
-    corner = np.arctan2(s * t, np.sqrt(s * s + t * t + 1))
-    return np.asarray(corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1])
-
-
 def halved(cube: Floats) -> Floats:
     """The next level, (6, m, m, C) with m = n // 2, of a cube map (6, n, n, C)."""
     n = cube.shape[1]
     m = n // 2
     if n % 2 == 0:
-        omega = exact_solid_angles(n)[:, :, None].astype(cube.dtype)
+        omega = texel_solid_angles(n)[:, :, None].astype(cube.dtype)
         light = (cube * omega).reshape(6, m, 2, m, 2, -1).sum(axis=(2, 4))
         return np.asarray(light / omega.reshape(m, 2, m, 2, 1).sum(axis=(1, 3)))
     edges = np.linspace(0, n, m + 1)
     texel = np.arange(n)
     share = np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1)
-    omega = exact_solid_angles(n)
+    omega = texel_solid_angles(n)
     light = np.einsum("ij,fjkc,lk->filc", share, cube * omega[..., None], share, optimize=True)
     return np.asarray(light / (share @ omega @ share.T)[..., None], dtype=cube.dtype)
 

@@ -9,6 +9,7 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.colour import HALF_MAX
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
@@ -19,7 +20,7 @@ from lambent.realtime.frame_data import OBJECT_DTYPE, lobe_data, material_data, 
 from lambent.realtime.integrators import Cube, Integrator
 from lambent.realtime.split_sum import prefiltered_cube
 from lambent.realtime.textures import PARTS, MaterialPictures, Pictures, material_pictures
-from lambent.store.contract import HALF_MAX, ObjectRecord
+from lambent.store.contract import ObjectRecord
 
 Floats = NDArray[np.floating]
 LOOKUPS = {"plain": 0, "planes": 1, "distance": 2}

@@ -20,7 +20,7 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
-from lambent.core.colour import srgb_encode
+from lambent.core.colour import HALF_MAX, srgb_encode
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.scenes.textures import CHANNELS, doubled_angle, halved, parts, slopes
 
@@ -150,7 +150,7 @@ class Pictures:
 
 
 def _halves(levels: list[Floats]) -> list[NDArray[np.float16]]:
-    return [np.clip(level, -65504, 65504).astype(np.float16) for level in levels]
+    return [np.clip(level, -HALF_MAX, HALF_MAX).astype(np.float16) for level in levels]
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera
+from lambent.core.cubemap import texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.cube_mips import exact_solid_angles, finite, mip_chain
+from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import ObjectRecord, SceneRecord, Triple
@@ -105,6 +106,6 @@ def irradiance(environment: Floats, normals: Floats) -> Floats:
 
     cube = next(level for level in mip_chain(finite(environment)[0]) if level.shape[1] <= COARSE)
     n = cube.shape[1]
-    light = (cube * exact_solid_angles(n)[..., None]).reshape(-1, 3)
+    light = (cube * texel_solid_angles(n)[..., None]).reshape(-1, 3)
     cosines = np.maximum(normals @ normalize(face_directions(n)).reshape(-1, 3).T, 0)
     return np.asarray(cosines @ light, np.float32)

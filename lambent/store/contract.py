@@ -38,7 +38,6 @@ from lambent.materials.document import Material
 from lambent.store.store import Store
 
 FAR = 1.0e4  # metres: distance of what is not hit
-HALF_MAX = 65504.0  # the largest half float: brighter light is cut there
 SCENE = "scene"
 TIMINGS = "timings"
 SIDES = ("irradiance", "irradiance_back")  # of the light map

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,7 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
     from lambent.store.views import change_views
     from tests.viewer.small_store import SIDE
 
-    saved = SIDE.model_copy(update={"name": "my/view"})
+    saved = replace(SIDE, name="my/view")
     change_views(store, lambda views: views.model_copy(update={"cameras": (saved,)}))
     for name in ("my/view", "side"):
         lambent("render", store, "-o", tmp_path / f"{name[-4:]}.png", "--camera", name, "--size", "32x24")

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import OBLIQUE, pixel_rays, wall_scene
+from conftest import OBLIQUE, wall_scene
 from scipy.stats import chi2
 
-from lambent.core.cubemap import face_directions
+from lambent.core.camera import pixel_rays
+from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.cubemap import sample as sample_cube
 from lambent.core.directions import normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.aim import aim_table, lamp_probabilities, prominence
-from lambent.realtime.cube_mips import exact_solid_angles
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.shader_source import assemble
 from tests.tools.shader_parity import assert_parity, run_wgsl
@@ -95,7 +95,7 @@ def test_the_table_holds_lamps_and_nothing_else() -> None:
     # 4 x 4 texels, and those that bilinear look-ups reach
     assert (row.min(), row.max(), column.min(), column.max()) == (19, 24, 7, 12)
     assert probabilities[3, 20:24, 8:12].sum() > 0.9
-    omega = exact_solid_angles(128)[40:48, 16:24].sum()
+    omega = texel_solid_angles(128)[40:48, 16:24].sum()
     lamp, rest = 59.5 * omega, 0.5 * 4 * np.pi
     assert variance == pytest.approx(4 * np.pi / omega * (lamp / (lamp + rest)) ** 2, rel=0.15)
     assert prominence(variance) == 1
@@ -104,7 +104,7 @@ def test_the_table_holds_lamps_and_nothing_else() -> None:
 def test_uniform_light_has_no_lamps() -> None:
     probabilities, variance = lamp_probabilities(np.full((6, 8, 8, 3), 2.0))
     assert prominence(variance) == 0
-    np.testing.assert_allclose(probabilities[0], exact_solid_angles(8) / (4 * np.pi), rtol=1e-5)
+    np.testing.assert_allclose(probabilities[0], texel_solid_angles(8) / (4 * np.pi), rtol=1e-5)
     assert lamp_probabilities(np.full((6, 5, 5, 3), 2.0))[0].shape == (6, 4, 4)
     np.testing.assert_allclose(lamp_probabilities(np.zeros((6, 1, 1, 3)))[0].sum(), 1)
 
@@ -122,7 +122,7 @@ def test_density_is_that_of_numpy_and_integrates_to_one(boxed: bool) -> None:
     same = np.isclose(got, expected, rtol=1e-4, atol=1e-6)
     assert same.mean() > 0.998
     assert_parity(got[same], expected[same].astype(np.float32), rtol=1e-4, atol=1e-6)
-    assert np.sum(got * np.tile(exact_solid_angles(n).ravel(), 6)) == pytest.approx(1, abs=0.01)
+    assert np.sum(got * np.tile(texel_solid_angles(n).ravel(), 6)) == pytest.approx(1, abs=0.01)
 
 
 def test_directions_are_drawn_with_that_probability() -> None:

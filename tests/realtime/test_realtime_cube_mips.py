@@ -5,23 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.realtime.cube_mips import SMOOTH_AREA, exact_solid_angles, finite, mip_chain, smooth_chain
-from lambent.store.contract import HALF_MAX
+from lambent.core.colour import HALF_MAX
+from lambent.core.cubemap import texel_solid_angles
+from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 64])
 def test_solid_angles_of_a_cube_fill_the_sphere(n: int) -> None:
-    assert 6 * exact_solid_angles(n).sum() == pytest.approx(4 * np.pi)
+    assert 6 * texel_solid_angles(n).sum() == pytest.approx(4 * np.pi)
 
 
 @pytest.mark.parametrize("n", [2, 5, 12, 33, 64])
 def test_every_level_keeps_the_light_and_constants(n: int) -> None:
     cube = np.random.default_rng(n).gamma(0.3, size=(6, n, n, 3)).astype(np.float32)
-    light = (cube * exact_solid_angles(n)[..., None]).sum(axis=(0, 1, 2))
+    light = (cube * texel_solid_angles(n)[..., None]).sum(axis=(0, 1, 2))
     levels = mip_chain(cube)
     assert [level.shape[1] for level in levels] == [n >> i for i in range(n.bit_length())]
     for level in levels:
-        omega = exact_solid_angles(level.shape[1])[..., None]
+        omega = texel_solid_angles(level.shape[1])[..., None]
         np.testing.assert_allclose((level * omega).sum(axis=(0, 1, 2)), light, rtol=2e-2 if n & (n - 1) else 1e-4)
     for level in mip_chain(np.full((6, n, n, 3), 2.5)):
         np.testing.assert_allclose(level, 2.5, rtol=1e-5)
@@ -33,7 +34,7 @@ def test_smooth_levels_keep_constants_and_nearly_the_light(n: int) -> None:
         np.testing.assert_allclose(level, 2.5, rtol=1e-5)
     cube = np.random.default_rng(n).gamma(0.3, size=(6, n, n, 3)).astype(np.float32)
     for plain, smooth in zip(mip_chain(cube), smooth_chain(cube), strict=True):
-        omega = exact_solid_angles(plain.shape[1])[..., None]
+        omega = texel_solid_angles(plain.shape[1])[..., None]
         np.testing.assert_allclose((smooth * omega).sum(), (plain * omega).sum(), rtol=0.03)
 
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import cube_of, pixel_rays, smooth_light, wall_scene
+from conftest import cube_of, smooth_light, wall_scene
 
 from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
-from lambent.core.camera import Camera, clip_from_world
+from lambent.core.camera import Camera, clip_from_world, pixel_rays
 from lambent.core.colour import filmic, srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.materials.bsdf import under_fresnel

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import OBLIQUE, cube_of, pixel_rays, smooth_light, wall_scene
+from conftest import OBLIQUE, cube_of, smooth_light, wall_scene
 
-from lambent.core.camera import Camera
+from lambent.core.camera import Camera, pixel_rays
 from lambent.core.cubemap import sample as sample_cube
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material

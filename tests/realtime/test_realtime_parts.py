@@ -69,7 +69,7 @@ def test_what_is_behind_is_left_out() -> None:
     )
     clusters = Clusters(mesh.positions, mesh.faces, (record,))
     camera = Camera(name="c", position=(0, 0, 5), target=(0, 0, 0), fov_y_deg=40)
-    away = camera.model_copy(update={"target": (0, 0, 9)})
+    away = replace(camera, target=(0, 0, 9))
     whole = clusters.seen(clip_from_world(camera, 64, 64, 0.01)).of(0, len(mesh.faces))
     assert whole == [(0, len(mesh.faces))]
     assert clusters.seen(clip_from_world(away, 64, 64, 0.01)).of(0, len(mesh.faces)) == []

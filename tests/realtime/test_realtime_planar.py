@@ -83,7 +83,7 @@ def frame_of(camera: Camera, width: int = WIDTH, height: int = HEIGHT) -> np.voi
 def seen_below(device: Any) -> np.ndarray:
     """The scene without its floor from the mirrored camera, turned to lie on the frame; and what the frame sees."""
     (x, y, z), (u, v, w) = CAMERA.position, CAMERA.target
-    below = CAMERA.model_copy(update={"position": (x, -y, z), "target": (u, -v, w), "up": (0, -1, 0)})
+    below = replace(CAMERA, position=(x, -y, z), target=(u, -v, w), up=(0, -1, 0))
     return Renderer(device, scene_of(mirror(0.001), floor=False)).image(replace(state(), camera=below))[:, ::-1]
 
 
@@ -178,9 +178,9 @@ def test_no_light_comes_in_below_the_walls(device: Any, integrator: str) -> None
 def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
     renderer = Renderer(device, scene_of(mirror(0.05)))
     for target, mirrors in (((0.1, 0.4, 0.0), 1), ((0.4, 2.9, 3.05), 0)):
-        renderer.draw(replace(state(), camera=CAMERA.model_copy(update={"target": target})))
+        renderer.draw(replace(state(), camera=replace(CAMERA, target=target)))
         assert renderer.statistics["mirrors"] == mirrors
-    renderer.draw(replace(state(), camera=CAMERA.model_copy(update={"position": (0.4, -1.3, 3.0)})))
+    renderer.draw(replace(state(), camera=replace(CAMERA, position=(0.4, -1.3, 3.0))))
     assert renderer.statistics["mirrors"] == 0  # seen from behind
     renderer.draw(state(planar="off"))
     assert renderer.statistics["mirrors"] == 0

@@ -11,7 +11,7 @@
 // Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
-const HALF_MAX = 6e4; // below the largest half float
+const HALF_MAX = 65504.0; // the largest half float
 
 // Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
 // progressive series.

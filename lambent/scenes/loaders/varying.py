@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lambent.core.colour import HALF_MAX
 from lambent.core.directions import Floats
 from lambent.scenes.scene import Texture
 
 UvTransform = tuple[tuple[float, float, float], tuple[float, float, float]]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-HALF_MAX = 65504.0
 EVEN = 1e-3  # a picture that departs from its mean by less than this share is no picture
 
 

@@ -1,0 +1,32 @@
+"""Triangles: normals, areas, points on them. Arrays of corners (..., 3, 3): triangle, corner, coordinate."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.directions import normalize
+
+Floats = NDArray[np.floating]
+
+
+def area_vectors(corners: Floats) -> Floats:
+    """Vectors (..., 3) along the normals of triangles (..., 3, 3), counter-clockwise, twice as long as their areas."""
+    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
+    return np.asarray(np.cross(b - a, c - a))
+
+
+def triangle_areas(corners: Floats) -> Floats:
+    """Areas (...) of triangles (..., 3, 3)."""
+    return np.asarray(np.linalg.norm(area_vectors(corners), axis=-1) / 2)
+
+
+def triangle_normals(corners: Floats) -> Floats:
+    """Unit normals (..., 3) of triangles (..., 3, 3); 0 where one has no area."""
+    return normalize(area_vectors(corners))
+
+
+def points_on_triangles(corners: Floats, face: NDArray[np.integer], rng: np.random.Generator) -> Floats:
+    """A point (K, 3), uniform by area, on each of the triangles `face` (K,) of all triangles (F, 3, 3)."""
+    weights = rng.dirichlet((1, 1, 1), size=len(face))
+    return np.asarray(np.einsum("kcx,kc->kx", corners[face], weights))
