@@ -1,0 +1,33 @@
+"""What is found, not listed: the modules of a package. A new format, bench, artefact or mode is a new file.
+
+A package may gain folders (`package.__path__.append`), for instance from a plug-in; their modules are found, too.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterable
+from types import ModuleType
+
+from lambent.core.errors import UserError, did_you_mean
+
+
+def names_in(package: ModuleType) -> list[str]:
+    """Names of the modules and folders of a package, sorted; nothing is imported."""
+    return sorted(info.name for info in pkgutil.iter_modules(package.__path__))
+
+
+def modules_in(package: ModuleType, having: str | None = None) -> dict[str, ModuleType]:
+    """Module of every name in a package, imported, in the order of the names; those that define `having`, if given."""
+    found = {name: importlib.import_module(f"{package.__name__}.{name}") for name in names_in(package)}
+    return {name: module for name, module in found.items() if having is None or hasattr(module, having)}
+
+
+def known(what: str, name: str, names: Iterable[str], *, field: str | None = None) -> str:
+    """`name` if it is one of `names`; otherwise a `UserError` that lists them and names the nearest."""
+    names = list(names)
+    if name not in names:
+        hint = did_you_mean(name, names)
+        raise UserError(f"unknown {what}", field=field, got=name, expected=", ".join(names), hint=hint)
+    return name
