@@ -34,6 +34,7 @@ ONLY_IN = {
     "typer": {"cli"},
     "rich": {"cli"},
     "zarr": {"store"},
+    "numcodecs": {"store"},
 }
 HEAVY = {
     "mitsuba", "drjit", "wgpu", "rendercanvas", "imgui_bundle", "scipy", "matplotlib", "skimage", "trimesh", "zarr",

@@ -106,6 +106,7 @@ def bake(
     if "light_map" in kinds:
         job.lean()
         job.noise()
+    job.store.close()  # others may write it now
     return job.store
 
 

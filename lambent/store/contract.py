@@ -2,34 +2,41 @@
 
     geometry/positions, normals, tangents  (V, 3) float32, world space
     geometry/uv, uv2                       (V, 2) float32; uv2 in [0, 1] is the light map's
-    geometry/faces                         (T, 3) uint32, sorted by object: ObjectRecord says which range is whose
-    light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; texel (row, column) has its
-                                           centre at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
+    geometry/faces                         (T, 3) uint32, sorted by object; ObjectRecord has the range of each
+    light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; the centre of texel (row,
+                                           column) is at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
-                                           before they were denoised; may be absent
-    light_map/lean                         (H, W, 3) float16, mean direction that the light of irradiance comes from,
-                                           weighted by what it adds to it, world space; 0 where there is no normal map
+                                           before denoising; may be absent
+    light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
+                                           the incident light, weighted by its irradiance; 0 without a normal map
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
-    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], OBJECT left out if
-                                           meta["object_left_out"]; meta["seen_irradiance"], may be absent: luminance of
-                                           the irradiance it would give, as a sum over 1, x, y, z, xy, yz, 3zz - 1, xz,
-                                           xx - yy of the normal; its light is to be scaled by the share of that
-                                           that the light map has, at most 1
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], without OBJECT if
+                                           meta["object_left_out"]. meta["seen_irradiance"], may be absent: luminance of
+                                           the irradiance it would give, coefficients of 1, x, y, z, xy, yz, 3zz - 1,
+                                           xz, xx - yy of the normal; scale its light by the light map's share of that,
+                                           at most 1
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
-                                           row 0 is the top; the record says how it lies on uv
+                                           row 0 is the top; the record has its transform of uv
+    view/KEY/KIND/PART                     what depends on one camera, for instance transport vectors per pixel. KEY is
+                                           `view_key` of the camera's values and, where the array depends on it, of the
+                                           image's size: a camera that is renamed keeps its arrays, one that moves has
+                                           none. meta["view"] is the ViewRecord; `baked_views` lists them
 
-The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings".
+The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings". Every array
+is absent, partial or complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
@@ -41,7 +48,9 @@ FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
 TIMINGS = "timings"
 SIDES = ("irradiance", "irradiance_back")  # of the light map
-LEAN = "light_map/lean"
+DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
+LEAN = DOMINANT_DIRECTION
+VIEW = "view"
 
 
 class _Record(BaseModel):
@@ -116,6 +125,39 @@ class SceneRecord(_Record):
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = {}  # by the material's name
+
+
+class ViewRecord(_Record):
+    """A view that artefacts belong to: its camera, with the name it had then, and the image's size where it matters."""
+
+    camera: Camera
+    width: int = 0
+    height: int = 0
+
+
+def view_key(camera: Camera, width: int = 0, height: int = 0) -> str:
+    """16 hex digits that stand for the camera's values, to the last bit, and the image's size; not for its name."""
+    values = np.array([*camera.position, *camera.target, *camera.up, camera.fov_y_deg], "<f8") + 0.0  # -0 is 0
+    return hashlib.sha256(values.tobytes() + f"{width}x{height}".encode("ascii")).hexdigest()[:16]
+
+
+def view_artefact_name(camera: Camera, width: int, height: int, kind: str, part: str) -> str:
+    """Name of an array that belongs to one view; `width` and `height` are 0 where the image's size does not matter."""
+    return f"{VIEW}/{view_key(camera, width, height)}/{kind}/{part}"
+
+
+def view_meta(camera: Camera, width: int = 0, height: int = 0) -> dict[str, Any]:
+    """What the meta of an array that belongs to one view must hold."""
+    return {VIEW: ViewRecord(camera=camera, width=width, height=height).model_dump(mode="json")}
+
+
+def baked_views(store: Store) -> dict[str, ViewRecord]:
+    """The views that a store holds arrays for, finished or not, by their keys."""
+    mine = [artefact for artefact in store.artefacts() if artefact.name.startswith(f"{VIEW}/")]
+    try:
+        return {a.name.split("/")[1]: ViewRecord.model_validate(a.meta.get(VIEW)) for a in mine}
+    except ValidationError as error:
+        raise UserError("broken store", file=store.folder, field="view", got=str(error)) from error
 
 
 def probe_name(object_name: str, part: str) -> str:

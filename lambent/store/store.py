@@ -1,121 +1,120 @@
-"""What a bake is on disk: one folder, `manifest.json` and chunked compressed arrays.
+"""What a bake is on disk: one folder, `manifest.json` and chunked compressed arrays, each with a journal.
 
-Rules: a chunk is on disk before the manifest names it; the manifest is replaced whole, never edited; readers verify
-the checksum of every chunk they read. So a store survives kill -9 at any moment and never reads as complete when it
-is not. Only one process writes a store at a time.
+Rules: a chunk is on disk before the array's journal names it; the manifest is replaced whole, never edited, and takes
+over a journal when its array is finished or the next writer comes; a rewritten chunk is a new file; readers verify the
+checksum of every chunk they read. So a store survives kill -9 at any moment and never reads as complete when it is not.
+
+Only one process writes a store at a time; readers wait for nobody. The first writing call of a `Store` takes the lock
+(`lambent.store.lock`), and `Store.close` or the end of the object gives it back.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import product
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.files import inside, write_text
+from lambent.core.files import write_text
+from lambent.store.artefact import Array, Artefact, Chunk, Region, chunk_id
+from lambent.store.chunk_files import ChunkFiles
+from lambent.store.lock import WriterLock
 
-FORMAT, VERSION = "lambent-store", 1
-LIMIT_BYTES = 1 << 34  # of one array: a manifest that promises more is not believed
-Array = NDArray[Any]
-Chunk = tuple[int, ...]
-
-
-@dataclass
-class Artefact:
-    """One array of a store, as its manifest tells it. `key` changes whenever anything it was made from changes."""
-
-    name: str
-    kind: str
-    shape: tuple[int, ...]
-    chunks: tuple[int, ...]
-    dtype: str
-    key: str
-    meta: dict[str, Any] = field(default_factory=dict)
-    done: dict[str, int] = field(default_factory=dict)  # chunk id "0.1" -> crc32 of its file
-    complete: bool = False
-
-    @property
-    def chunk_counts(self) -> tuple[int, ...]:
-        return tuple(-(-size // step) for size, step in zip(self.shape, self.chunks, strict=True))
-
-    @property
-    def chunk_grid(self) -> list[Chunk]:
-        return list(product(*(range(count) for count in self.chunk_counts)))
-
-    @property
-    def state(self) -> str:
-        return "complete" if self.complete else f"partial ({len(self.done)} of {math.prod(self.chunk_counts)} chunks)"
+FORMAT, VERSIONS = "lambent-store", (1, 2)  # 2 where a chunk was rewritten: readers of 1 do not find its file
+MANIFEST = "manifest.json"
+__all__ = ["Array", "Artefact", "Chunk", "Store", "Writer"]
+_DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
 
 
 class Store:
     """A folder of named arrays. Make one with `create` or `open`; never construct it by hand."""
 
-    def __init__(self, folder: Path, manifest: dict[str, Any]) -> None:
-        self.folder = folder
-        self.inputs: dict[str, str] = manifest["inputs"]
-        self.documents: dict[str, Any] = manifest["documents"]
-        self._artefacts = {name: _artefact(name, entry) for name, entry in manifest["artefacts"].items()}
+    def __init__(self, folder: Path) -> None:
+        self.folder = Path(folder)
+        self.inputs: dict[str, str] = {}
+        self.documents: dict[str, Any] = {}
+        self._artefacts: dict[str, Artefact] = {}
+        self._lock: WriterLock | None = None
 
     @classmethod
     def create(cls, folder: Path, inputs: Mapping[str, str]) -> Store:
-        """The store in `folder`, made where there is none. `inputs` maps the name of each input to its hash.
+        """The store in `folder`, made where there is none, open for writing. `inputs` maps each input to its hash.
 
         An existing store keeps its arrays; the bake finds out by their `key` which of them are stale.
+
+        Raises
+        ------
+        UserError
+            Where the folder holds something else, or another process writes the store.
         """
-        folder = Path(folder)
-        if (folder / "manifest.json").exists():
-            store = cls.open(folder)
-            store.inputs = dict(inputs)
-        elif folder.exists() and any(folder.iterdir()):
-            raise UserError("folder is not empty and not a store", file=folder, hint="choose another folder")
-        else:
-            store = cls(folder, {"inputs": dict(inputs), "documents": {}, "artefacts": {}})
+        store = cls(folder)
+        if not (store.folder / MANIFEST).exists() and store.folder.exists():
+            names = [path.name for path in store.folder.iterdir()]
+            if not all(name.startswith(".") for name in names):  # hidden: left by a process that died early
+                raise UserError("folder is not empty and not a store", file=folder, hint="choose another folder")
+        store._own()
+        store.inputs = dict(inputs)
         store._save()
         return store
 
     @classmethod
     def open(cls, folder: Path) -> Store:
         """The store in `folder`; `UserError` where it is none, of another version, or damaged."""
-        path = Path(folder) / "manifest.json"
-        if not path.exists():
-            raise UserError("not a store", file=folder, expected="manifest.json", hint="make one with `lambent bake`")
-        try:
-            manifest = json.loads(path.read_text(encoding="utf-8"))
-            if manifest["format"] != FORMAT or manifest["version"] != VERSION:
-                found = f"{manifest['format']} {manifest['version']}"
-                raise UserError("unknown store", file=path, got=found, expected=f"{FORMAT} {VERSION}")
-            return cls(Path(folder), manifest)
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
-            raise UserError(f"manifest is damaged ({error})", file=path, hint="bake again") from error
+        store = cls(folder)
+        store._load()
+        return store
+
+    def close(self) -> None:
+        """Let other processes write; reading goes on, and the next writing call takes the lock again."""
+        if self._lock is not None:
+            self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def refresh(self) -> None:
+        """See what another process has written since. `Artefact` objects obtained before stay as they were."""
+        if not self._writes:
+            self._load()
 
     def artefacts(self, kind: str | None = None) -> list[Artefact]:
+        """All arrays, or those of one kind, finished or not."""
         return [a for a in self._artefacts.values() if kind is None or a.kind == kind]
 
     def __contains__(self, name: str) -> bool:
         """Whether the artefact is there and complete."""
         return name in self._artefacts and self._artefacts[name].complete
 
-    def artefact(self, name: str) -> Artefact:
+    def availability(self, name: str) -> tuple[Literal["absent", "partial", "complete"], float]:
+        """Whether an artefact is there, and which share of its chunks is written (0 to 1)."""
         if name not in self._artefacts:
-            raise UserError("store does not hold this", file=self.folder, field=name, hint="bake it first")
+            return "absent", 0.0
+        a = self._artefacts[name]
+        return ("complete", 1.0) if a.complete else ("partial", len(a.done) / max(1, math.prod(a.chunk_counts)))
+
+    def artefact(self, name: str) -> Artefact:
+        """The record of an array; `UserError` where the store holds none of this name."""
+        if name not in self._artefacts:
+            raise self._error("store does not hold this", name, "bake it first")
         return self._artefacts[name]
 
     def set_document(self, name: str, document: Any) -> None:
         """Keep a small JSON value (the scene record, timings) in the manifest."""
+        self._own()
         self.documents[name] = document
         self._save()
 
     def forget_all(self) -> None:
         """Drop every array, so that a bake starts anew; their files go when they are written again."""
+        self._own()
         self._artefacts.clear()
         self._save()
 
@@ -129,24 +128,29 @@ class Store:
         *,
         key: str,
         meta: Mapping[str, Any] | None = None,
+        growing: bool = False,
     ) -> Writer:
         """Start, or go on with, an array.
 
         Where the store holds chunks of the same `key`, shape and chunking, they are kept and `Writer.missing` lists
-        the rest; otherwise the array starts empty.
+        the rest; otherwise the array starts empty. Of a `growing` array, whose first axis `Writer.extend` lengthens,
+        the longer of what the store holds and `shape` counts.
         """
-        found = self._artefacts.get(name)
+        self._own()
         wanted = Artefact(name, kind, tuple(shape), tuple(chunks), np.dtype(dtype).name, key, dict(meta or {}))
-        same = found is not None and (found.key, found.shape, found.chunks, found.dtype) == (
-            key, wanted.shape, wanted.chunks, wanted.dtype,
-        )  # fmt: skip
-        if not same or found is None:
-            found = self._artefacts[name] = wanted
-            self._save()  # forget the old chunks before their files change
-            zarr.create_array(
-                inside(self.folder, name), shape=wanted.shape, chunks=wanted.chunks, dtype=wanted.dtype, overwrite=True
-            )
-        return Writer(self, found)
+        wanted.check(self.folder)
+        found = self._artefacts.get(name)
+        if found is None or not found.is_same(wanted, growing=growing):
+            files = ChunkFiles(self.folder, wanted)
+            if self._artefacts.pop(name, None) is not None:
+                self._save()  # forget the old chunks before their files change
+            files.create()
+            self._artefacts[name] = found = wanted
+            self._save()
+        writer = Writer(self, found)
+        if growing and wanted.shape[0] > found.shape[0]:
+            writer.extend(wanted.shape[0] - found.shape[0])
+        return writer
 
     def put(self, name: str, kind: str, array: Array, *, key: str, meta: Mapping[str, Any] | None = None) -> None:
         """Write a whole array at once, as one chunk."""
@@ -160,95 +164,165 @@ class Store:
         """The whole array; `UserError` where it is absent, incomplete or damaged."""
         artefact = self.artefact(name)
         if not artefact.complete:
-            raise UserError(f"is {artefact.state}", file=self.folder, field=name, hint="go on with `bake --resume`")
-        for chunk in artefact.chunk_grid:
-            if self._crc(name, chunk) != artefact.done[_id(chunk)]:
-                raise UserError("chunk is damaged", file=self.folder, field=f"{name} {_id(chunk)}", hint="bake again")
-        array: Array = np.asarray(self._open_array(artefact, "r")[...])
-        return array
+            raise self._error(f"is {artefact.state}", name, "go on with `bake --resume`")
+        return self.read_region(name, ())
 
-    def _open_array(self, artefact: Artefact, mode: Literal["r", "r+"]) -> zarr.Array[Any]:
+    def read_partial(self, name: str) -> tuple[Array, NDArray[np.bool_]]:
+        """The array as far as it is written, zero elsewhere, and which chunks are written (`Artefact.written`)."""
+        artefact = self.artefact(name)
+        written = artefact.written
+        chunks = [chunk for chunk in artefact.chunk_grid if written[chunk]]
+        return self._gathered(artefact, tuple(slice(0, size) for size in artefact.shape), chunks), written
+
+    def read_region(self, name: str, region: Sequence[slice]) -> Array:
+        """Part of an array, complete or not; `UserError` where a chunk of it is not written or damaged.
+
+        `region` has slices without a step, for the first axes or for all; only the chunks that it touches are read.
+        Of one chunk: `artefact.region(chunk)`.
+        """
+        artefact = self.artefact(name)
+        parts = [*region, *[slice(None)] * (len(artefact.shape) - len(region))]
+        plain = tuple(slice(*part.indices(size)[:2]) for part, size in zip(parts, artefact.shape, strict=True))
+        return self._gathered(artefact, plain, artefact.chunks_in(plain))
+
+    def _gathered(self, artefact: Artefact, region: Region, chunks: Iterable[Chunk]) -> Array:
+        """Values of a region from these chunks."""
+        files = ChunkFiles(self.folder, artefact)
+        gathered = np.zeros([max(0, part.stop - part.start) for part in region], artefact.dtype)
+        for chunk in chunks:
+            covered = artefact.region(chunk)
+            pairs = zip(region, covered, strict=True)
+            both = [slice(max(part.start, c.start), min(part.stop, c.stop)) for part, c in pairs]
+            gathered[_within(both, region)] = self._piece(files, chunk)[_within(both, covered)]
+        return gathered
+
+    def _piece(self, files: ChunkFiles, chunk: Chunk) -> Array:
+        """A chunk that passes its checksum; the new one where another process has rewritten it since."""
+        artefact, name = files.artefact, files.artefact.name
+        field = f"{name} {chunk_id(chunk)}"
+        while (version := artefact.version(chunk)) is not None:
+            piece = files.read(chunk, version)
+            if piece is not None:
+                return piece
+            self.refresh()
+            artefact = self.artefact(name)
+            if not artefact.is_same(files.artefact, growing=True):
+                raise self._error("was begun anew while it was read", name, "read it again")
+            if artefact.version(chunk) == version:
+                raise self._error("chunk is damaged", field, "bake again")
+        raise self._error("chunk is not written", field, "bake it first")
+
+    def _error(self, message: str, field: str, hint: str) -> UserError:
+        return UserError(message, file=self.folder, field=field, hint=hint)
+
+    @property
+    def _writes(self) -> bool:
+        return self._lock is not None and self._lock.held
+
+    def _own(self) -> None:
+        """Take the right to write, and take over what others have written until then."""
+        if self._writes:
+            return
+        self._lock = WriterLock(self.folder)
         try:
-            array = zarr.open_array(inside(self.folder, artefact.name), mode=mode)
-            if (array.shape, array.chunks, np.dtype(artefact.dtype)) == (artefact.shape, artefact.chunks, array.dtype):
-                return array
-            reason = "another shape or type than the manifest says"
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            reason = str(error)
-        raise UserError(f"array is damaged ({reason})", file=self.folder, field=artefact.name, hint="bake again")
+            if (self.folder / MANIFEST).exists():
+                self._load()
+                journals = [f for a in self.artefacts() if (f := ChunkFiles(self.folder, a)).journal.exists()]
+                if journals:
+                    self._save()
+                for files in journals:
+                    files.settle()
+        except BaseException:
+            self._lock.release()
+            raise
 
-    def _crc(self, name: str, chunk: Chunk) -> int:
-        path = inside(self.folder, name) / "c" / Path(*map(str, chunk)) if chunk else inside(self.folder, name) / "c"
-        # A chunk of zeros is not written at all by zarr: its absence is its content.
-        return zlib.crc32(path.read_bytes()) if path.exists() else 0
+    def _load(self) -> None:
+        """Read manifest and journals; again where a writer has replaced the manifest meanwhile."""
+        path = self.folder / MANIFEST
+        if not path.exists():
+            hint = "make one with `lambent bake`"
+            raise UserError("not a store", file=self.folder, expected=MANIFEST, hint=hint)
+        try:
+            text = None
+            while text != (text := path.read_text(encoding="utf-8")):  # ends when none has replaced it meanwhile
+                manifest = json.loads(text)
+                if manifest["format"] != FORMAT or manifest["version"] not in VERSIONS:
+                    found, expected = f"{manifest['format']} {manifest['version']}", f"{FORMAT} 1 or 2"
+                    raise UserError("unknown store", file=path, got=found, expected=expected)
+                inputs, documents = manifest["inputs"], manifest["documents"]
+                artefacts = {name: Artefact.of_entry(name, entry) for name, entry in manifest["artefacts"].items()}
+                for artefact in artefacts.values():
+                    ChunkFiles(self.folder, artefact).read_journal()
+                    artefact.check(path)
+        except _DAMAGE as error:
+            raise UserError(f"manifest is damaged ({error})", file=path, hint="bake again") from error
+        self.inputs, self.documents, self._artefacts = inputs, documents, artefacts
 
     def _save(self) -> None:
+        rewritten = any(version.generation for a in self.artefacts() for version in a.done.values())
         manifest = {
             "format": FORMAT,
-            "version": VERSION,
+            "version": VERSIONS[rewritten],
             "inputs": self.inputs,
             "documents": self.documents,
-            "artefacts": {a.name: _entry(a) for a in self._artefacts.values()},
+            "artefacts": {name: a.entry() for name, a in self._artefacts.items()},
         }
-        write_text(self.folder / "manifest.json", json.dumps(manifest, indent=1))
+        write_text(self.folder / MANIFEST, json.dumps(manifest, indent=1))
 
 
 class Writer:
-    """Writes the chunks of one array; see `Store.begin`."""
+    """Writes the chunks of one array; see `Store.begin`. It is of use as long as its store holds the lock."""
 
     def __init__(self, store: Store, artefact: Artefact) -> None:
-        self._store, self.artefact = store, artefact
-        self._array = store._open_array(artefact, "r+")
+        self.artefact = artefact
+        self._store, self._lock = store, store._lock
+        self._files = ChunkFiles(store.folder, artefact)
 
     @property
     def missing(self) -> list[Chunk]:
-        return [chunk for chunk in self.artefact.chunk_grid if _id(chunk) not in self.artefact.done]
+        """Chunks that are not written yet."""
+        return [chunk for chunk in self.artefact.chunk_grid if self.artefact.version(chunk) is None]
 
-    def region(self, chunk: Chunk) -> tuple[slice, ...]:
+    def region(self, chunk: Chunk) -> Region:
         """Index of the array that a chunk covers (cut at the array's end)."""
-        a = self.artefact
-        return tuple(
-            slice(i * step, min((i + 1) * step, size)) for i, step, size in zip(chunk, a.chunks, a.shape, strict=True)
-        )
+        return self.artefact.region(chunk)
 
     def write(self, chunk: Chunk, data: Array) -> None:
-        """Put a chunk on disk, then name it in the manifest."""
-        self._array[self.region(chunk)] = data
-        self.artefact.done[_id(chunk)] = self._store._crc(self.artefact.name, chunk)
-        self._store._save()
+        """Write a chunk, or replace one: whoever reads, and whatever dies, finds the old one or the new one whole.
+
+        `Artefact.version` tells how often a chunk was replaced: a pass that adds samples to finished chunks goes on,
+        after an interruption, with those that are behind.
+        """
+        self._check()
+        self._files.write(chunk, data)
 
     def read_chunk(self, chunk: Chunk) -> Array:
         """A chunk written before, to build on."""
-        data: Array = np.asarray(self._array[self.region(chunk)])
-        return data
+        return self._store.read_region(self.artefact.name, self.region(chunk))
+
+    def extend(self, count: int) -> None:
+        """Lengthen the first axis by `count`, whole chunks each; the array is partial until it is finished again."""
+        self._check()
+        a = self.artefact
+        assert count > 0 and not (count % a.chunks[0] or a.shape[0] % a.chunks[0]), "batches are whole chunks"
+        self._files.lengthen(a.shape[0] + count)
 
     def finish(self, **meta: Any) -> None:
         """Mark the array complete; every chunk must have been written."""
+        self._check()
         assert not self.missing, f"{self.artefact.name}: {len(self.missing)} chunks missing"
         self.artefact.meta.update(meta)
         self.artefact.complete = True
         self._store._save()
+        self._files.settle()
+
+    def _check(self) -> None:
+        """`UserError` where the lock went to another `Store`, or the array was begun anew."""
+        ours = self._lock is self._store._lock and self._store._writes
+        if not ours or self._store._artefacts.get(self.artefact.name) is not self.artefact:
+            raise self._store._error("writer was closed or replaced", self.artefact.name, "begin the array again")
 
 
-def _id(chunk: Chunk) -> str:
-    return ".".join(map(str, chunk))
-
-
-def _entry(a: Artefact) -> dict[str, Any]:
-    return {
-        "kind": a.kind, "shape": a.shape, "chunks": a.chunks, "dtype": a.dtype, "key": a.key,
-        "meta": a.meta, "done": a.done, "complete": a.complete,
-    }  # fmt: skip
-
-
-def _artefact(name: str, e: dict[str, Any]) -> Artefact:
-    """The manifest's entry, or an error that `Store.open` turns into "manifest is damaged"."""
-    shape, chunks = tuple(map(int, e["shape"])), tuple(map(int, e["chunks"]))
-    a = Artefact(
-        name, e["kind"], shape, chunks, e["dtype"], e["key"], dict(e["meta"]), dict(e["done"]), e["complete"] is True
-    )
-    if min(shape, default=0) < 0 or math.prod(shape) * np.dtype(a.dtype).itemsize > LIMIT_BYTES:
-        raise ValueError(f"{name}: impossible shape {shape}")
-    if a.complete and len(a.done) != math.prod(a.chunk_counts):
-        raise ValueError(f"{name}: complete with {len(a.done)} chunks")
-    return a
+def _within(part: Sequence[slice], whole: Sequence[slice]) -> Region:
+    """Index of a region relative to one that encloses it."""
+    return tuple(slice(p.start - w.start, p.stop - w.start) for p, w in zip(part, whole, strict=True))

@@ -1,6 +1,6 @@
-"""Views and ways that people saved while they looked at a store: `views.json` in its folder, which no bake touches.
+"""Cameras and recorded camera paths that people save while they look at a store: `views.json` in its folder.
 
-It holds cameras and recorded paths by name. Every change reads the file again and replaces it whole, so that two
+No bake touches the file or waits for its lock. Every change reads the file again and replaces it whole, so that two
 windows on one store do not lose each other's views.
 """
 
@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -21,6 +22,7 @@ from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes, write_text
 from lambent.store.contract import SceneRecord
+from lambent.store.lock import lock
 
 FILE = "views.json"
 LIMIT_BYTES = 64 << 20
@@ -82,12 +84,9 @@ def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
 def _alone(folder: Path) -> Iterator[None]:
     """Keep others who change this folder's views waiting, so that what one of them adds is not replaced unread.
 
-    The folder itself is locked: a lock file would stay behind. Systems without such locks (Windows; some network
-    drives) go without.
+    The folder itself is locked, because a lock file would stay behind; Windows cannot, and goes without.
     """
-    try:
-        import fcntl
-    except ImportError:
+    if sys.platform == "win32":
         yield
         return
     try:
@@ -95,8 +94,7 @@ def _alone(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise UserError(f"cannot be opened ({error.strerror})", file=folder) from error
     try:
-        with suppress(OSError):  # a drive that knows no locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
+        lock(handle, wait=True)
         yield
     finally:
         os.close(handle)  # which ends the lock
@@ -140,9 +138,9 @@ def _check(views: Views, path: Path) -> None:
             numbers = (*camera.position, *camera.target, *camera.up, camera.fov_y_deg)
             if not all(map(math.isfinite, numbers)) or not 0 < camera.fov_y_deg < 180:
                 raise UserError("a camera is not finite, or sees no angle", file=path, field=f"{kind}.{camera.name}")
-    for way in views.paths:
-        times = way.times_s or ()
-        if not way.keys or len(times) != len(way.keys):
-            raise UserError("a path needs one time per key", file=path, field=way.name, got=len(times))
-        if times[0] != 0 or times[-1] != way.seconds or any(b <= a for a, b in pairwise(times)):
-            raise UserError("times of a path begin at 0, grow, and end with it", file=path, field=way.name)
+    for walk in views.paths:
+        times = walk.times_s or ()
+        if not walk.keys or len(times) != len(walk.keys):
+            raise UserError("a path needs one time per key", file=path, field=walk.name, got=len(times))
+        if times[0] != 0 or times[-1] != walk.seconds or any(b <= a for a, b in pairwise(times)):
+            raise UserError("times of a path begin at 0, grow, and end with it", file=path, field=walk.name)

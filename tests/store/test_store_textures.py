@@ -1,4 +1,4 @@
-"""Textures survive a store, and one picture stays one."""
+"""Textures survive a store, and an image that several materials show stays one."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_textures_come_back_as_they_were_written(tmp_path: Path) -> None:
     assert read["a"].diffuse.texels is read["b/c"].diffuse.texels
 
 
-def test_a_picture_that_is_there_is_not_written_again(tmp_path: Path) -> None:
+def test_an_image_that_is_there_is_not_written_again(tmp_path: Path) -> None:
     store = Store.create(tmp_path / "s", {})
     textures = {"a": MaterialTextures(roughness=Texture(np.ones((2, 2, 1), np.float16)))}
     write_textures(store, textures)

@@ -14,12 +14,12 @@ from lambent.store.views import FILE, Views, change_views, checked_name, free_na
 
 A = Camera(name="a", position=(0, 1, 0), target=(0, 1, -1))
 B = Camera(name="b", position=(2, 1, 0), target=(2, 1, -1), fov_y_deg=60)
-WAY = CameraPath(name="w", keys=(A, A, B), seconds=3.0, times_s=(0.0, 2.0, 3.0))
+WALK = CameraPath(name="w", keys=(A, A, B), seconds=3.0, times_s=(0.0, 2.0, 3.0))
 
 
 def test_round_trip(tmp_path):
     assert read_views(tmp_path) == Views()
-    saved = Views(cameras=(A, B), paths=(WAY,))
+    saved = Views(cameras=(A, B), paths=(WALK,))
     assert change_views(tmp_path, lambda views: saved) == saved == read_views(tmp_path)
     change_views(tmp_path, lambda views: views.model_copy(update={"cameras": (*views.cameras, A)}))
     assert [c.name for c in read_views(tmp_path).cameras] == ["a", "b", "a"]
@@ -40,7 +40,7 @@ def test_round_trip(tmp_path):
     ],
 )
 def test_damage_is_said_and_nothing_is_overwritten(tmp_path, damage, word):
-    document = Views(cameras=(A,), paths=(WAY,)).model_dump(mode="json")
+    document = Views(cameras=(A,), paths=(WALK,)).model_dump(mode="json")
     damage(document)
     (tmp_path / FILE).write_text(json.dumps(document))
     before = (tmp_path / FILE).read_bytes()
@@ -76,17 +76,17 @@ def test_the_scene_hides_saved_names():
         name="s", objects=(), materials={}, cameras=(A,), paths=(CameraPath(name="w", keys=(A, B), seconds=1),),
         bounds=((0, 0, 0), (1, 1, 1)),
     )  # fmt: skip
-    whole = with_views(scene, Views(cameras=(replace(A, fov_y_deg=9), B), paths=(WAY,)))
+    whole = with_views(scene, Views(cameras=(replace(A, fov_y_deg=9), B), paths=(WALK,)))
     assert whole.cameras == (A, B) and whole.paths == scene.paths
 
 
 def test_a_recorded_path_keeps_its_times():
     """It stands still for two of its three seconds; then it walks, through its keys."""
     for time_s, x in ((-1, 0), (0, 0), (2, 0), (3, 2), (9, 2)):
-        assert camera_at(WAY, time_s).position == pytest.approx((x, 1, 0)), time_s
-    assert camera_at(WAY, 1.0).position[0] == pytest.approx(0, abs=0.2)
-    assert 0.3 < camera_at(WAY, 2.5).position[0] < 1.5
-    assert camera_at(WAY, 2.5).name == "w" and 45 < camera_at(WAY, 2.5).fov_y_deg < 60
+        assert camera_at(WALK, time_s).position == pytest.approx((x, 1, 0)), time_s
+    assert camera_at(WALK, 1.0).position[0] == pytest.approx(0, abs=0.2)
+    assert 0.3 < camera_at(WALK, 2.5).position[0] < 1.5
+    assert camera_at(WALK, 2.5).name == "w" and 45 < camera_at(WALK, 2.5).fov_y_deg < 60
     straight = tuple(replace(A, position=(float(k), 0.0, 0.0)) for k in range(4))
     even = CameraPath(name="e", keys=straight, seconds=3.0, times_s=(0.0, 1.0, 2.0, 3.0))
     assert [camera_at(even, t).position[0] for t in (1.25, 1.5, 1.75)] == pytest.approx([1.25, 1.5, 1.75])

@@ -1,0 +1,154 @@
+"""The files of one array: one per chunk, and the journal of what was written since the manifest.
+
+The array is zarr's, format 3, so that other programs read it: `zarr.json`, and the chunk (0, 1) in `c/0/1`,
+little-endian in one zstd frame, padded with zeros where it leaves the array. The manifest has its shape and checksums;
+`zarr.json` is never read here. Rewriting a chunk makes a new file, `c/0/1.1`, then `c/0/1.2`..., which other programs
+do not find: a process that dies leaves the old one whole.
+
+The journal has one line per event: "0.1 GENERATION CRC;" for a written chunk, "length N 0;" for a first axis that has
+grown. A line begins with its newline and ends with its semicolon, so half a line, the trace of a process that died or
+of a full disk, neither counts nor spoils the next. Reading a line twice changes nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import zlib
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numcodecs import Zstd
+
+from lambent.core.errors import UserError
+from lambent.core.files import atomic_path, inside
+from lambent.store.artefact import Array, Artefact, Chunk, Region, Version, chunk_id
+
+LENGTH = "length"
+_LINE = re.compile(rb"^([\d.]*|length) (\d+) (\d+);$", re.MULTILINE)
+_ZSTD = Zstd(level=0)
+
+
+class ChunkFiles:
+    """Reads and writes the chunks of one artefact in the folder of its store."""
+
+    def __init__(self, store_folder: Path, artefact: Artefact) -> None:
+        self.artefact, self._store_folder = artefact, store_folder
+        self._folder = inside(store_folder, artefact.name)
+        self._dtype = np.dtype(artefact.dtype).newbyteorder("<")
+        self.journal = self._folder / "journal"
+
+    def create(self) -> None:
+        """Make the array's folder anew, without chunks."""
+        if self._folder.exists():
+            shutil.rmtree(self._folder)
+        self.describe()
+
+    def describe(self) -> None:
+        """Write `zarr.json`."""
+        from zarr import create_array  # here, because what only reads does without
+        from zarr.codecs import ZstdCodec
+        from zarr.storage import MemoryStore
+
+        files: dict[str, Any] = {}
+        a, codec = self.artefact, ZstdCodec(level=_ZSTD.level)
+        create_array(MemoryStore(files), shape=a.shape, chunks=a.chunks, dtype=a.dtype, compressors=codec)
+        with atomic_path(self._folder / "zarr.json") as beside:
+            beside.write_bytes(files["zarr.json"].to_bytes())
+
+    def write(self, chunk: Chunk, data: Array) -> None:
+        """Put a chunk on disk, then name it in the journal, then remove the file that it replaces."""
+        old = self.artefact.version(chunk)
+        encoded = self._encoded(chunk, data)
+        version = Version(zlib.crc32(encoded), 0 if old is None else old.generation + 1)
+        path = self._path(chunk, version)
+        if encoded:
+            with atomic_path(path) as beside:
+                beside.write_bytes(encoded)
+        else:
+            path.unlink(missing_ok=True)  # of a process that died before it could name the file
+        self._note(chunk_id(chunk), version.generation, version.crc)
+        self.artefact.done[chunk_id(chunk)] = version
+        if old is not None:
+            _remove(self._path(chunk, old))
+
+    def read(self, chunk: Chunk, version: Version) -> Array | None:
+        """One writing of a chunk, cut at the array's end; None where its file is gone or fails its checksum."""
+        encoded = _content(self._path(chunk, version))
+        if zlib.crc32(encoded) != version.crc:
+            return None
+        if not encoded:
+            return np.zeros([part.stop for part in self._inner(chunk)], self._dtype)
+        try:
+            whole = np.frombuffer(_ZSTD.decode(encoded), self._dtype).reshape(self.artefact.chunks)
+        except (RuntimeError, ValueError) as error:
+            where, name = self._store_folder, f"{self.artefact.name} {chunk_id(chunk)}"
+            raise UserError(f"chunk cannot be read ({error})", file=where, field=name, hint="bake again") from error
+        return whole[self._inner(chunk)]
+
+    def lengthen(self, length: int) -> None:
+        """Make the first axis `length` long; the array is no longer complete."""
+        longer = replace(self.artefact, shape=(length, *self.artefact.shape[1:]))
+        longer.check(self._store_folder)
+        ChunkFiles(self._store_folder, longer).describe()
+        self._note(LENGTH, length, 0)
+        self.artefact.shape, self.artefact.complete = longer.shape, False
+
+    def read_journal(self) -> None:
+        """Bring the artefact up to what the journal says."""
+        a = self.artefact
+        for name, number, crc in ((w.decode(), int(n), int(c)) for w, n, c in _LINE.findall(_content(self.journal))):
+            if name == LENGTH:
+                if number > a.shape[0]:
+                    a.shape, a.complete = (number, *a.shape[1:]), False
+                continue
+            chunk = tuple(map(int, name.split("."))) if name else ()
+            if all(i < n for i, n in zip(chunk, a.chunk_counts, strict=True)):
+                a.done[name] = Version(crc, number)
+
+    def settle(self) -> None:
+        """When the manifest has all that the journal has: remove the journal and the files that nothing names."""
+        a = self.artefact
+        named = {self._path(chunk, version) for chunk in a.chunk_grid if (version := a.version(chunk)) is not None}
+        for path in (self._folder / "c").rglob("*"):
+            if path not in named and path.is_file():
+                _remove(path)
+        self.journal.unlink(missing_ok=True)
+
+    def _note(self, name: str, number: int, crc: int) -> None:
+        """Append a line to the journal and see it onto the disk."""
+        with self.journal.open("ab") as file:
+            file.write(f"\n{name} {number} {crc};".encode("ascii"))
+            file.flush()
+            os.fsync(file.fileno())
+
+    def _path(self, chunk: Chunk, version: Version) -> Path:
+        path = self._folder.joinpath("c", *map(str, chunk))
+        return path.with_name(f"{path.name}.{version.generation}") if version.generation else path
+
+    def _encoded(self, chunk: Chunk, data: Array) -> bytes:
+        """Bytes of a chunk's file; none for a chunk of zeros, which has no file."""
+        whole = np.zeros(self.artefact.chunks, self._dtype)
+        whole[self._inner(chunk)] = data
+        return bytes(_ZSTD.encode(whole)) if whole.reshape(-1).view(np.uint8).any() else b""
+
+    def _inner(self, chunk: Chunk) -> Region:
+        """Index of the values of a chunk that lie within the array."""
+        return tuple(slice(0, part.stop - part.start) for part in self.artefact.region(chunk))
+
+
+def _content(path: Path) -> bytes:
+    """Content of a file; nothing where there is none."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+
+
+def _remove(path: Path) -> None:
+    with suppress(PermissionError):  # on Windows, while another process reads it; `settle` removes it later
+        path.unlink(missing_ok=True)
