@@ -24,7 +24,8 @@ import numpy as np
 from lambent.bake.engine import engine
 from lambent.bake.material_plugin import Turned, brushing_angle
 from lambent.core.progress import Progress, silent
-from lambent.materials.measured.half_vector_grid import GridOps, GridShape, HalfVectorGrid
+from lambent.materials.lobes import ArrayOps
+from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import Lookup, PatchSheet, lookup_of
 from lambent.materials.measured.protocol import MeasuredTable
 
@@ -64,9 +65,9 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    ops = GridOps(
-        dr.sqrt, dr.cbrt, dr.sin, dr.cos, dr.atan2, dr.floor, dr.abs, dr.maximum, dr.minimum, dr.select,
-        lambda table, index: dr.gather(mi.Float, table, mi.UInt32(index)), mi.Int32,
+    ops = ArrayOps(
+        dr.exp, dr.log, dr.sqrt, dr.sin, dr.cos, dr.power, dr.abs, dr.maximum, dr.minimum, dr.select, dr.cbrt, dr.atan2,
+        dr.floor, lambda table, index: dr.gather(mi.Float, table, mi.UInt32(index)), mi.Int32,
     )  # fmt: skip
 
     class TableBSDF(mi.BSDF):  # type: ignore[misc, name-defined]

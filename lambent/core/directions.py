@@ -7,9 +7,12 @@ surface; `wi` to the light, `wo` to the viewer; theta from n, phi from t. World 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Floats as Floats  # most users of directions want their type too
+
+FLIP_Z = np.array([1.0, 1.0, -1.0])  # times a direction: mirrored at the surface
+HALF_TURN = np.array([-1.0, -1.0, 1.0])  # times a direction: turned by 180 degrees about n
 
 
 def direction(theta_rad: ArrayLike, phi_rad: ArrayLike) -> Floats:
@@ -24,8 +27,17 @@ def angles(w: Floats) -> tuple[Floats, Floats]:
 
     theta by atan2, because arccos(z) loses half the digits near the normal.
     """
-    theta = np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2])
-    return theta, np.arctan2(w[..., 1], w[..., 0]) % (2 * np.pi)
+    return elevation(w), np.arctan2(w[..., 1], w[..., 0]) % (2 * np.pi)
+
+
+def elevation(w: Floats) -> Floats:
+    """theta (...) in radians of directions (..., 3), in [0, pi]."""
+    return np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2])
+
+
+def raised(w: Floats) -> Floats:
+    """Directions (..., 3) on the upper side: those below are mirrored at the surface."""
+    return np.stack([w[..., 0], w[..., 1], np.abs(w[..., 2])], axis=-1)
 
 
 def normalize(v: Floats) -> Floats:
@@ -33,6 +45,11 @@ def normalize(v: Floats) -> Floats:
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     unit: Floats = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
     return unit
+
+
+def half_vector(wi: Floats, wo: Floats) -> Floats:
+    """normalize(wi + wo), (..., 3); zero for opposite directions."""
+    return normalize(wi + wo)
 
 
 def reflect(w: Floats, about: Floats) -> Floats:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Iterable
+from pathlib import Path
 from types import ModuleType
 
 from lambent.core.errors import UserError, did_you_mean
@@ -24,10 +25,12 @@ def modules_in(package: ModuleType, having: str | None = None) -> dict[str, Modu
     return {name: module for name, module in found.items() if having is None or hasattr(module, having)}
 
 
-def known(what: str, name: str, names: Iterable[str], *, field: str | None = None) -> str:
+def known(
+    what: str, name: str, names: Iterable[str], *, file: Path | str | None = None, field: str | None = None
+) -> str:
     """`name` if it is one of `names`; otherwise a `UserError` that lists them and names the nearest."""
     names = list(names)
     if name not in names:
         hint = did_you_mean(name, names)
-        raise UserError(f"unknown {what}", field=field, got=name, expected=", ".join(names), hint=hint)
+        raise UserError(f"unknown {what}", file=file, field=field, got=name, expected=", ".join(names), hint=hint)
     return name

@@ -1,11 +1,14 @@
-"""Progress and cancellation, spoken by everything that takes more than a second.
+"""Progress and cancellation of everything that takes more than a second.
 
 Long work takes `progress: Progress = silent`. The command line shows a bar, the window a panel, tests nothing.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
 
 
 class Cancelled(Exception):
@@ -20,3 +23,17 @@ class Progress(Protocol):
 
 def silent(done: float, total: float, what: str) -> None:
     """A `Progress` that shows nothing."""
+
+
+def tracked(items: Sequence[T], progress: Progress, what: str) -> Iterator[T]:
+    """The items, each reported to `progress` when it is taken; the end is reported too."""
+    for done, item in enumerate(items):
+        progress(done, len(items), what)
+        yield item
+    progress(len(items), len(items), what)
+
+
+def stepper(progress: Progress, total: int) -> Callable[[str], None]:
+    """A function that reports the next of `total` steps by its name; the call after the last one reports the end."""
+    done = iter(range(total + 1))
+    return lambda what: progress(next(done), total, what)

@@ -1,6 +1,6 @@
 """A whole material as a BSDF: diffuse terms plus lobes, one mixture for eval, sample and pdf.
 
-Same array-library rule as lobes.py: directions are component tuples, `ops` names the library.
+As in lobes.py, directions are component tuples and `ops` is their array library.
 """
 
 from __future__ import annotations
@@ -8,20 +8,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
+from lambent.core.plain import Triple
 from lambent.materials import lobes
-from lambent.materials.document import Material
+from lambent.materials.document import BLACK, Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
 
-Floats = NDArray[np.floating]
-SELECTION_FLOOR = 0.02  # share of k: Fresnel at wo can vanish (r0 = 0, wo = n) where at the half vector it does not
+SELECTION_FLOOR = 0.02  # share of k: Fresnel can vanish at wo (r0 = 0, wo = n) and not at the half vector
 
 
 def under_fresnel(cosine: Any, ops: Any = NUMPY) -> Any:
-    """t = 1 - (1 - cos)^5: what Schlick's Fresnel lets through at this cosine, as a share of what it does at 1.
+    """t = 1 - (1 - cos)^5: Schlick's transmittance at this cosine over that at normal incidence, (1 - F)/(1 - r0).
 
-    (1 - F)/(1 - r0): r0 drops out. Built as cos (1 + m + ... + m^4) with m = 1 - cos, which does not cancel at grazing.
+    Built as cos (1 + m + ... + m^4) with m = 1 - cos, which does not cancel at grazing.
     """
     cosine = ops.minimum(cosine, 1.0)
     m = 1 - cosine
@@ -31,8 +31,8 @@ def under_fresnel(cosine: Any, ops: Any = NUMPY) -> Any:
 def coupling(cos_i: Any, cos_o: Any, ops: Any = NUMPY) -> Any:
     """Factor of kd/pi of a coupled diffuse term, (21/20) t(cos_i) t(cos_o); cosines in [0, 1].
 
-    Reciprocal; the albedo at wo is kd t(cos_o) exactly. In the manner of Ashikhmin & Shirley 2000 (5), with Schlick's
-    own fifth power of the cosine.
+    Reciprocal; the albedo at wo is exactly kd t(cos_o). After Ashikhmin & Shirley 2000 (5), with Schlick's fifth power
+    of the cosine.
     """
     return 21 / 20 * under_fresnel(cos_i, ops) * under_fresnel(cos_o, ops)
 
@@ -50,14 +50,14 @@ def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Ve
     return value[0], value[1], value[2]
 
 
-def _mean(rgb: tuple[float, float, float]) -> float:
+def _mean(rgb: Triple) -> float:
     return sum(rgb) / 3
 
 
 def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
     """Probability of each component at `wo`: diffuse reflection, diffuse transmission, then the lobes.
 
-    A function of wo alone, roughly the energy each component returns, so the mixture pdf stays exact.
+    It depends on wo alone, so that the mixture's pdf is exact; it is roughly the energy each component returns.
     """
     cos_o = ops.abs(wo[2])
     seen = under_fresnel(cos_o, ops) if material.kd_coupled else 1 + 0 * cos_o
@@ -85,13 +85,12 @@ def pdf(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Any:
 def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops: Any = NUMPY) -> Vector:
     """wi of the mixture; u_* uniform in [0, 1).
 
-    A lobe sample at or across the horizon comes back with wi.z = 0, where value and pdf are 0: on the far side the
+    A lobe sample at or across the horizon comes back with wi.z = 0, where value and pdf are 0. Across the horizon the
     other components' pdf would accept it, and the estimate would be too bright.
     """
     chosen = selection(wo, material, ops)
     side = ops.select(wo[2] > 0, 1.0, -1.0)
-    r, phi = ops.sqrt(u1), 2 * np.pi * u2
-    x, y, z = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(ops.maximum(1 - u1, 0.0))
+    x, y, z = lobes.sample_cosine(u1, u2, ops)
     up_to = chosen[0]
     z = ops.select(u_select < up_to, z, -z) * side
     up_to = up_to + chosen[1]
@@ -106,13 +105,13 @@ def sample(wo: Vector, u_select: Any, u1: Any, u2: Any, material: Material, ops:
 
 
 def components(w: Floats) -> Vector:
-    """(..., 3) array as a component tuple, in float64."""
+    """The components of (..., 3) directions, in float64."""
     w = np.asarray(w, np.float64)
     return w[..., 0], w[..., 1], w[..., 2]
 
 
 class MaterialBSDF:
-    """The array face of a material: (..., 3) arrays in, arrays out; float64 inside."""
+    """A material on (..., 3) arrays; float64 inside."""
 
     def __init__(self, material: Material) -> None:
         self.material = material
@@ -130,16 +129,19 @@ class MaterialBSDF:
         """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1)."""
         return np.stack(sample(components(wo), u[..., 0], u[..., 1], u[..., 2], self.material), axis=-1)
 
-    def albedo(self, wo: Floats, samples: int = 4096, seed: int = 0) -> Floats:
+    def albedo(self, wo: Floats, samples: int = 4096) -> Floats:
         """Directional albedo (..., 3) of wo (..., 3): the integral of f |cos| over all wi, by importance sampling."""
-        u = np.random.default_rng(seed).random((samples, 3))
+        u = np.random.default_rng(0).random((samples, 3))
         wo_all = np.broadcast_to(wo[..., None, :], (*wo.shape[:-1], samples, 3))
         wi = self.sample(wo_all, np.broadcast_to(u, wo_all.shape))
-        p = self.pdf(wi, wo_all)
-        weight = np.divide(np.abs(wi[..., 2]), p, out=np.zeros_like(p), where=p > 0)
-        return np.asarray((self.eval(wi, wo_all) * weight[..., None]).mean(axis=-2))
+        return np.asarray((self.eval(wi, wo_all) * cos_over_pdf(wi, self.pdf(wi, wo_all))[..., None]).mean(axis=-2))
+
+
+def cos_over_pdf(wi: Floats, pdf: Floats) -> Floats:
+    """|cos theta| / pdf (...) of sampled directions (..., 3); 0 for rejected samples, whose pdf is 0."""
+    return np.divide(np.abs(wi[..., 2]), pdf, out=np.zeros_like(pdf), where=pdf > 0)
 
 
 def specular_only(material: Material) -> Material:
     """The material without its diffuse terms."""
-    return material.model_copy(update={"kd": (0.0, 0.0, 0.0), "kt_d": (0.0, 0.0, 0.0)})
+    return material.model_copy(update={"kd": BLACK, "kt_d": BLACK})

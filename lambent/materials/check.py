@@ -1,9 +1,9 @@
-"""Is a material fit for a path tracer? Reciprocity, energy, and a sampler that draws what its density says.
+"""Check that a material suits a path tracer: reciprocity, energy, and a sampler that follows its density.
 
-Energy: a directional albedo over 1 is a warning with its angle, because alpha > 0 makes it grow towards grazing and
-published fits do so. It is a failure only where the albedo averaged over all directions (cosine-weighted, the
-bihemispherical albedo) exceeds 1: by reciprocity the light between walls of such a material then grows at every
-bounce, and a closed room of it has no finite radiance. Below that, a warning costs brightness at grazing and no more.
+Energy: a directional albedo over 1 is a warning with its angle; alpha > 0 makes the albedo grow towards grazing, and
+published fits do so. It is a failure only where the mean albedo over all directions (cosine-weighted, the
+bihemispherical albedo) exceeds 1: by reciprocity, light between walls of such a material grows at every bounce, and a
+closed room has no finite radiance. Below that, the albedo only brightens grazing views.
 """
 
 from __future__ import annotations
@@ -13,27 +13,26 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import direction
-from lambent.core.progress import Progress, silent
-from lambent.materials.bsdf import MaterialBSDF
+from lambent.core.directions import Floats, direction
+from lambent.core.plain import Triple
+from lambent.core.progress import Progress, silent, stepper
+from lambent.materials.bsdf import MaterialBSDF, cos_over_pdf
 from lambent.materials.chi_square import ChiSquare, adapted_cells, chi_square, integrate_cells
 from lambent.materials.document import Material
-
-Floats = NDArray[np.floating]
 
 THETA_DEG = (*range(0, 85, 5), 82, 84, 85, 86, 87, 88, 89)
 PHI_DEG = (0.0, 45.0, 90.0, 135.0)
 SAMPLER_THETA_DEG = (0.0, 45.0, 85.0)
+PAIRS = 20_000  # random ones, and as many sampled ones
 RECIPROCITY_LIMIT = 1e-6  # float64 leaves 1e-12 for wide lobes and 1e-8 at the foot of the narrowest
 P_VALUE_LIMIT = 1e-3  # per check, shared by its chi-square tests (Sidak)
-INTEGRAL_LIMIT = 2e-3  # quadrature is good to a few 1e-4 even for slopes of .003 beside 1.5
+INTEGRAL_LIMIT = 2e-3  # the quadrature errs by a few 1e-4, even for slopes of .003 beside 1.5
 ENERGY_LIMIT = 1 + 2e-3  # the furnace's own error
 
 
 class Scatters(Protocol):
-    """What can be checked: arrays of directions (..., 3) in, f (..., 3) in 1/sr, densities and directions out."""
+    """A BSDF that can be checked: directions (..., 3) in; f (..., 3) in 1/sr, densities and directions out."""
 
     def eval(self, wi: Floats, wo: Floats) -> Floats: ...
     def pdf(self, wi: Floats, wo: Floats) -> Floats: ...
@@ -42,9 +41,9 @@ class Scatters(Protocol):
 
 @runtime_checkable
 class KnowsItsSteps(Protocol):
-    """A density with steps, which tests its own sampler in cells along them.
+    """A BSDF whose density has steps, and which tests its own sampler in cells along them.
 
-    `steps` are cells (N, 4) of the light's directions within which f is smooth, or None where it is throughout.
+    `steps` are cells (N, 4) of the light's directions within which f is smooth, or None where f is smooth throughout.
     """
 
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare: ...
@@ -58,24 +57,24 @@ class Furnace:
     theta_deg: tuple[float, ...]
     phi_deg: tuple[float, ...]
     albedo: Floats
-    mean_albedo: tuple[float, float, float]
+    mean_albedo: Triple
 
     @property
-    def highest(self) -> tuple[float, float, float]:
-        """Largest albedo, and theta and phi in degrees where it is."""
+    def highest(self) -> Triple:
+        """Largest albedo, and its theta and phi in degrees."""
         t, p, c = np.unravel_index(int(np.argmax(self.albedo)), self.albedo.shape)
         return float(self.albedo[t, p, c]), self.theta_deg[t], self.phi_deg[p]
 
 
 @dataclass(frozen=True)
 class SamplerCheck:
-    """Sampler against density and value, for one wo. Albedos are the mean of RGB."""
+    """The sampler against its density and value, for one wo. Albedos are means of RGB."""
 
     theta_deg: float
     phi_deg: float
     p_value: float
     pdf_integral: float
-    rejected_share: float  # of samples at or below the horizon: 1 - pdf_integral but for noise
+    rejected_share: float  # of samples at or below the horizon: 1 - pdf_integral up to noise
     albedo_quadrature: float
     albedo_sampled: float
     albedo_error: float  # standard error of albedo_sampled
@@ -83,7 +82,7 @@ class SamplerCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What every check measures; `failures` and `warnings` say in words what is wrong."""
+    """Results of every check; `failures` and `warnings` name what is wrong."""
 
     furnace: Furnace
     sampler: tuple[SamplerCheck, ...]
@@ -103,7 +102,7 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckReport(Report):
-    """Of a material or a model."""
+    """Results for a material or a model."""
 
     reciprocity_error: float  # largest |f(wi, wo) - f(wo, wi)| over the larger of the two
 
@@ -111,44 +110,47 @@ class CheckReport(Report):
 def check(subject: Material | Scatters, seed: int = 0, progress: Progress = silent) -> CheckReport:
     """Check a material, or anything with eval, pdf and sample; a few seconds, deterministic for a seed."""
     bsdf = MaterialBSDF(subject) if isinstance(subject, Material) else subject
-    steps = len(SAMPLER_THETA_DEG) + 2
-    progress(0, steps, "reciprocity")
+    step = stepper(progress, len(SAMPLER_THETA_DEG) + 2)
+    step("reciprocity")
     error = reciprocity_error(bsdf, seed)
-    progress(1, steps, "energy")
+    step("energy")
     energy = furnace(bsdf, seed=seed)
-    sampler = []
-    for i, theta in enumerate(SAMPLER_THETA_DEG):
-        progress(2 + i, steps, f"sampler at {theta:g} degrees")
-        sampler.append(check_sampler(bsdf, theta, 20.0 + 50 * i, seed=seed + i))
-    progress(steps, steps, "checked")
+    sampler = check_samplers(bsdf, seed, step)
+    step("checked")
 
-    failures = _failures(error, energy, sampler)
-    warnings = []
+    failures, warnings = [], []
+    if error > RECIPROCITY_LIMIT:
+        failures.append(f"not reciprocal: swapping wi and wo changes f by up to {error:.2g} of its value")
     albedo, theta, phi = energy.highest
     if albedo > ENERGY_LIMIT:
-        warnings.append(
-            f"reflects {albedo:.3f} of the light at theta {theta:g}, phi {phi:g} degrees: more than arrives"
-        )
+        at = f"theta {theta:g}, phi {phi:g} degrees"
+        warnings.append(f"reflects {albedo:.3f} of the light at {at}: more than arrives")
     return CheckReport(
         reciprocity_error=error,
         furnace=energy,
-        sampler=tuple(sampler),
+        sampler=sampler,
         warnings=tuple(warnings),
-        failures=tuple(failures),
+        failures=(*failures, *energy_failures(energy, ENERGY_LIMIT), *sampler_failures(sampler)),
     )
 
 
-def _failures(error: float, energy: Furnace, sampler: list[SamplerCheck]) -> list[str]:
+def check_samplers(bsdf: Scatters, seed: int, step: Callable[[str], None]) -> tuple[SamplerCheck, ...]:
+    """`check_sampler` at every SAMPLER_THETA_DEG, each reported to `step`."""
     found = []
-    if error > RECIPROCITY_LIMIT:
-        found.append(f"not reciprocal: swapping wi and wo changes f by up to {error:.2g} of its value")
-    if max(energy.mean_albedo) > ENERGY_LIMIT:
-        found.append(f"mean albedo {max(energy.mean_albedo):.3f}: light between such walls grows without bound")
-    return found + sampler_failures(sampler)
+    for i, theta in enumerate(SAMPLER_THETA_DEG):
+        step(f"sampler at {theta:g} degrees")
+        found.append(check_sampler(bsdf, theta, 20.0 + 50 * i, seed=seed + i))
+    return tuple(found)
 
 
-def sampler_failures(sampler: list[SamplerCheck]) -> list[str]:
-    """What is wrong with the sampler, in words; empty where nothing is."""
+def energy_failures(energy: Furnace, limit: float) -> list[str]:
+    """A line where the mean albedo exceeds `limit`, else none."""
+    highest = max(energy.mean_albedo)
+    return [f"mean albedo {highest:.3f}: light between such walls grows without bound"] if highest > limit else []
+
+
+def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
+    """A line for every fault of the sampler."""
     found = []
     least = 1 - (1 - P_VALUE_LIMIT) ** (1 / len(sampler))
     for one in sampler:
@@ -166,14 +168,14 @@ def sampler_failures(sampler: list[SamplerCheck]) -> list[str]:
     return found
 
 
-def reciprocity_error(bsdf: Scatters, seed: int = 0, pairs: int = 20_000) -> float:
-    """Largest relative change of f when wi and wo are swapped, over random pairs and pairs that the sampler likes.
+def reciprocity_error(bsdf: Scatters, seed: int = 0) -> float:
+    """Largest relative change of f when wi and wo are swapped, over random pairs and sampled pairs.
 
-    Values below 1e-9 of the largest count as if they were that large: at the foot of a narrow lobe rounding is all.
+    Values below 1e-9 of the largest count as that large, because at the foot of a narrow lobe rounding prevails.
     """
     rng = np.random.default_rng(seed)
-    wo, wi = _sphere(rng, 2 * pairs), _sphere(rng, 2 * pairs)
-    wi[pairs:] = bsdf.sample(wo[pairs:], rng.random((pairs, 3)))
+    wo, wi = _sphere(rng, 2 * PAIRS), _sphere(rng, 2 * PAIRS)
+    wi[PAIRS:] = bsdf.sample(wo[PAIRS:], rng.random((PAIRS, 3)))
     usable = (np.abs(wi[:, 2]) > 1e-3) & (np.abs(wo[:, 2]) > 1e-3)
     forth, back = bsdf.eval(wi[usable], wo[usable]), bsdf.eval(wo[usable], wi[usable])
     size = np.maximum(np.abs(forth), np.abs(back))
@@ -187,10 +189,7 @@ def _sphere(rng: np.random.Generator, n: int) -> Floats:
 
 
 def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int = 0) -> Furnace:
-    """Directional albedo over theta 0..89 degrees by importance sampling with scrambled Sobol points.
-
-    Nothing is clipped.
-    """
+    """Directional albedo over theta 0..89 degrees by importance sampling with scrambled Sobol points, unclipped."""
     from scipy.stats import qmc
 
     bsdf = MaterialBSDF(subject) if isinstance(subject, Material) else subject
@@ -201,8 +200,8 @@ def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int =
     return Furnace(tuple(map(float, THETA_DEG)), PHI_DEG, albedo, mean_albedo(albedo))
 
 
-def mean_albedo(albedo: Floats) -> tuple[float, float, float]:
-    """Mean of a directional albedo (THETA_DEG, phi, 3), weighed with the cosine; the last degree counts like 89."""
+def mean_albedo(albedo: Floats) -> Triple:
+    """Cosine-weighted mean of a directional albedo (THETA_DEG, phi, 3); beyond 89 degrees it is that at 89."""
     sin2 = np.append(np.sin(np.radians(THETA_DEG)) ** 2, 1.0)
     rows = np.concatenate([albedo, albedo[-1:]]).mean(axis=1)
     red, green, blue = (float(np.trapezoid(rows[:, c], sin2)) for c in range(3))
@@ -210,39 +209,40 @@ def mean_albedo(albedo: Floats) -> tuple[float, float, float]:
 
 
 def _weights(bsdf: Scatters, wo: Floats, u: Floats) -> Floats:
-    """f |cos theta_i| / pdf (n, 3) of the samples of u (n, 3); 0 where the sample was rejected."""
+    """f |cos theta_i| / pdf (n, 3) of the samples of u (n, 3); 0 for rejected samples."""
     wo = np.broadcast_to(wo, u.shape)
     wi = bsdf.sample(wo, u)
-    p = bsdf.pdf(wi, wo)
-    scale = np.divide(np.abs(wi[:, 2]), p, out=np.zeros_like(p), where=p > 0)
-    return np.asarray(bsdf.eval(wi, wo) * scale[:, None])
+    return np.asarray(bsdf.eval(wi, wo) * cos_over_pdf(wi, bsdf.pdf(wi, wo))[:, None])
 
 
 def check_sampler(
     bsdf: Scatters, theta_deg: float, phi_deg: float, *, samples: int = 1_000_000, seed: int = 0
 ) -> SamplerCheck:
-    """Chi-square of the sampler, integral of its density, and the albedo found in two independent ways."""
+    """Chi-square of the sampler, the integral of its density, and the albedo by two independent methods."""
     wo = direction(np.radians(theta_deg), np.radians(phi_deg))
-
-    def seen_from_wo(function: Callable[[Floats, Floats], Floats]) -> Callable[[Floats], Floats]:
-        return lambda w: function(w, np.broadcast_to(wo, w.shape))
 
     def draw(u: Floats) -> Floats:
         return bsdf.sample(np.broadcast_to(wo, u.shape), u)
-
-    def returned(w: Floats) -> Floats:
-        return np.asarray(bsdf.eval(w, np.broadcast_to(wo, w.shape)).mean(axis=-1) * np.abs(w[..., 2]))
 
     if isinstance(bsdf, KnowsItsSteps):
         test, cells = bsdf.chi_square(wo, samples=samples, seed=seed), bsdf.steps(wo)
     else:
         cells = None
-        test = chi_square(draw, seen_from_wo(bsdf.pdf), samples=samples, seed=seed)
+        test = chi_square(draw, lambda w: bsdf.pdf(w, np.broadcast_to(wo, w.shape)), samples=samples, seed=seed)
     rng = np.random.default_rng(seed)
     pilot = draw(rng.random((samples // 16, 3)))
-    quadrature = float(integrate_cells(returned, adapted_cells(pilot) if cells is None else cells, pilot).sum())
+    quadrature = albedo_by_quadrature(lambda w: bsdf.eval(w, np.broadcast_to(wo, w.shape)), pilot, cells)
     weights = _weights(bsdf, wo, rng.random((samples // 4, 3))).mean(axis=-1)
     sampled, error = float(weights.mean()), float(weights.std() / np.sqrt(len(weights)))
     return SamplerCheck(
         theta_deg, phi_deg, test.p_value, test.pdf_integral, test.rejected_share, quadrature, sampled, error
     )
+
+
+def albedo_by_quadrature(f: Callable[[Floats], Floats], pilot: Floats, cells: Floats | None) -> float:
+    """Adaptive quadrature of the mean over channels of f (..., C) times |cos theta|; see `integrate_cells`."""
+
+    def integrand(w: Floats) -> Floats:
+        return np.asarray(f(w).mean(axis=-1) * np.abs(w[..., 2]))
+
+    return float(integrate_cells(integrand, adapted_cells(pilot) if cells is None else cells, pilot).sum())

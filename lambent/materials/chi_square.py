@@ -1,8 +1,8 @@
-"""Chi-square test of a direction sampler against its density, and the adaptive sphere quadrature it stands on.
+"""Chi-square test of a direction sampler against its density, and the adaptive sphere quadrature behind it.
 
-The sphere is cut in cells of (z, phi), so that the horizon is always a cell border. The cut follows quantiles of pilot
-samples: a lobe of slope .005 gets cells of its own size. Expected counts are integrals of the density over the cells,
-refined until they have converged, and the samples the sampler rejected (density 0) are a cell like any other.
+The sphere is cut into cells of (z, phi), so that the horizon is always a cell border. The cut follows quantiles of
+pilot samples: a lobe of slope .005 gets cells of its own size. Expected counts are integrals of the density over the
+cells, refined until they converge; rejected samples (density 0) form a cell of their own.
 """
 
 from __future__ import annotations
@@ -12,21 +12,23 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Flags, Floats, Indices
+
 Function = Callable[[Floats], Floats]  # (..., 3) directions -> (...) or (..., m) values
 
 CHUNK = 1 << 18
-LEAST_EXPECTED = 5.0  # cells below this many expected samples are pooled: the statistic is not chi-square there
-HIDDEN_PEAK = 4.0  # a pilot this many times above the mean of its cell: the nodes have missed something
+LEAST_EXPECTED = 5.0  # cells with fewer expected samples are pooled: their statistic is not chi-square
+HIDDEN_PEAK = 4.0  # a pilot this many times above the mean of its cell shows that the nodes missed a peak
 FEW_PILOTS = 32  # cells with fewer are steered by the samples too, so that the edge of a narrow lobe is not missed
+STRIPS = 32  # of z, and cells of each
+RTOL, LEVELS = 2e-4, 40  # of the quadrature: relative tolerance, and halvings at most
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
 class ChiSquare:
-    """Result of one test. `cells` (N, 4) are z and phi ranges; `observed`, `expected` (N + 1) end with the rejected."""
+    """Result of a test. `cells` (N, 4) are z and phi ranges; `observed`, `expected` (N + 1) end with the rejected."""
 
     statistic: float
     degrees: int
@@ -47,8 +49,8 @@ def chi_square(
 ) -> ChiSquare:
     """Test that `sample`, from u (n, 3) uniform in [0, 1), draws directions (n, 3) of `density` (n) in 1/sr.
 
-    A million samples see a pdf that is 2 % wrong; a hundred thousand do not. A density with steps wants `cells` along
-    its steps: (N, 4) as `adapted_cells` has them, sorted by z0, then phi0.
+    A million samples find a pdf that is 2 % wrong; a hundred thousand do not. A density with steps needs `cells` along
+    its steps: (N, 4) as from `adapted_cells`, sorted by z0, then phi0.
     """
     from scipy.stats import chi2
 
@@ -70,7 +72,7 @@ def chi_square(
 
     rare = expected < LEAST_EXPECTED
     o, e = np.append(observed[~rare], observed[rare].sum()), np.append(expected[~rare], expected[rare].sum())
-    if e[-1] < LEAST_EXPECTED:  # still too few: judged only for samples where none belong
+    if e[-1] < LEAST_EXPECTED:  # still too few: only samples where none belong count
         e[-1] = max(e[-1], 1.0)
     statistic = float(((o - e) ** 2 / e).sum())
     degrees = len(o) - 1
@@ -78,37 +80,35 @@ def chi_square(
     return ChiSquare(statistic, degrees, p_value, integral, samples, cells, observed, expected)
 
 
-def adapted_cells(pilot: Floats, strips: int = 32) -> Floats:
-    """(N, 4) cells [z0, z1, phi0, phi1] that cover the sphere and hold about equal shares of `pilot` (n, 3).
+def adapted_cells(pilot: Floats) -> Floats:
+    """Cells (N, 4) [z0, z1, phi0, phi1] that cover the sphere and hold about equal shares of `pilot` (n, 3).
 
-    The borders z = -1, 0, 1 and phi = 0, 2 pi are always among them.
+    z = -1, 0, 1 and phi = 0, 2 pi are always borders.
     """
     z, phi = _z_phi(pilot[pilot[:, 2] != 0])
-    shares = np.linspace(0, 1, strips + 1)
+    shares = np.linspace(0, 1, STRIPS + 1)
     z_edges = np.unique([-1.0, 0.0, 1.0, *np.quantile(z, shares)]) if z.size else np.array([-1.0, 0.0, 1.0])
     rows = []
     for low, high in pairwise(z_edges):
         inside = phi[(z >= low) & (z < high)]
-        quantiles = np.quantile(inside, shares[1:-1]) if inside.size >= 4 * strips else np.linspace(0, 2 * np.pi, 9)
+        quantiles = np.quantile(inside, shares[1:-1]) if inside.size >= 4 * STRIPS else np.linspace(0, 2 * np.pi, 9)
         edges = np.unique([0.0, 2 * np.pi, *quantiles])
         rows += [(low, high, a, b) for a, b in pairwise(edges)]
     return np.array(rows)
 
 
-def integrate_cells(
-    function: Function, cells: Floats, pilot: Floats, *, rtol: float = 2e-4, levels: int = 40
-) -> Floats:
+def integrate_cells(function: Function, cells: Floats, pilot: Floats) -> Floats:
     """Integral over solid angle of `function` on each cell (N, 4): (N) or (N, m).
 
-    Gauss-Legendre 4 x 4; a cell is halved across its longer side, up to `levels` times, while its halves disagree with
-    it, or while it hides a peak: a value at a `pilot` direction (n, 3) far above the mean the nodes have seen. The
-    pilots only steer; they add nothing to the sum. A step elsewhere than at the horizon costs about 1e-3.
+    Gauss-Legendre 4 x 4. A cell is halved across its longer side, up to LEVELS times, while its halves disagree with
+    it or it hides a peak: a value at a `pilot` direction (n, 3) far above the mean at the nodes. The pilots only steer;
+    they add nothing to the sum. A step away from the horizon costs about 1e-3.
     """
     probe = _rule(function, cells)
-    total, floor = np.zeros_like(probe), 0.02 * rtol * np.abs(probe).sum(axis=0) / len(cells)
+    total, floor = np.zeros_like(probe), 0.02 * RTOL * np.abs(probe).sum(axis=0) / len(cells)
     owner, rects, coarse = np.arange(len(cells)), cells, probe
     where, points, heights = _cell_of(pilot, cells), np.stack(_z_phi(pilot), axis=-1), _highest(function(pilot))
-    for level in range(levels):
+    for level in range(LEVELS):
         halves, along_phi = _halved(rects)
         fine = _rule(function, halves)
         together = fine.reshape(len(rects), 2, *probe.shape[1:]).sum(axis=1)
@@ -116,8 +116,8 @@ def integrate_cells(
         np.maximum.at(peak, where, heights)
         area = (rects[:, 1] - rects[:, 0]) * (rects[:, 3] - rects[:, 2])
         hides = (peak * area > HIDDEN_PEAK * _highest(together)) & (peak * area > 1e-7)
-        rough = hides | _any(np.abs(together - coarse) > rtol * np.abs(together) + floor)
-        if level == levels - 1:
+        rough = hides | _any(np.abs(together - coarse) > RTOL * np.abs(together) + floor)
+        if level == LEVELS - 1:
             rough[:] = False
         np.add.at(total, owner[~rough], together[~rough])
         if not rough.any():
@@ -137,8 +137,8 @@ def _highest(values: Floats) -> Floats:
     return highest
 
 
-def _any(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    anywhere: NDArray[np.bool_] = flags if flags.ndim == 1 else np.any(flags, axis=-1)
+def _any(flags: Flags) -> Flags:
+    anywhere: Flags = flags if flags.ndim == 1 else np.any(flags, axis=-1)
     return anywhere
 
 
@@ -146,8 +146,8 @@ def _z_phi(w: Floats) -> tuple[Floats, Floats]:
     return w[:, 2], np.arctan2(w[:, 1], w[:, 0]) % (2 * np.pi)
 
 
-def _cell_of(w: Floats, cells: Floats) -> NDArray[np.integer]:
-    """Index of the cell that holds each direction; cells are sorted by strip, then phi."""
+def _cell_of(w: Floats, cells: Floats) -> Indices:
+    """Index of the cell of each direction; cells are sorted by strip, then phi."""
     z, phi = _z_phi(w)
     z_low, first = np.unique(cells[:, 0], return_index=True)
     strip = np.clip(np.searchsorted(z_low, z, side="right") - 1, 0, len(z_low) - 1)
@@ -173,7 +173,7 @@ def _rule(function: Function, rects: Floats) -> Floats:
     return np.concatenate(parts)
 
 
-def _halved(rects: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _halved(rects: Floats) -> tuple[Floats, Flags]:
     """Halves (2N, 4) of each rectangle, lower first, cut across its longer side on the sphere; whether along phi."""
     z0, z1, p0, p1 = rects.T
     z, p = (z0 + z1) / 2, (p0 + p1) / 2

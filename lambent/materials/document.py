@@ -1,4 +1,4 @@
-"""The material document: one JSON file that every part of Lambent, and other tools, exchange.
+"""The material document: the JSON file that every part of Lambent and other tools exchange.
 
 Units: kd, kt_d and k are dimensionless RGB coefficients (linear Rec.709); mx, my are slopes (dimensionless roughness
 along t and b); r0 is the Fresnel reflectance at normal incidence; alpha is the exponent of the cosine product.
@@ -19,6 +19,9 @@ FORMAT: Literal["lambent-material"] = "lambent-material"
 VERSION: Literal[1] = 1
 LIMIT_BYTES = 16 << 20
 SCATTERING = {"kd", "kt_d", "lobes"}  # a document names at least one of them
+Side = Literal["reflection", "transmission"]
+Distribution = Literal["beckmann", "ggx"]
+SIDES: tuple[Side, ...] = ("reflection", "transmission")
 
 
 def _spread(value: object) -> object:
@@ -26,8 +29,10 @@ def _spread(value: object) -> object:
 
 
 Coefficient = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
 RGB = Annotated[tuple[Coefficient, Coefficient, Coefficient], BeforeValidator(_spread)]
 Roughness = Annotated[float, Field(ge=0.001, le=4, description="slope roughness, dimensionless")]
+BLACK = (0.0, 0.0, 0.0)
 
 
 class _Strict(BaseModel):
@@ -37,24 +42,17 @@ class _Strict(BaseModel):
 class Lobe(_Strict):
     """One directional lobe (Kurt et al. 2010; thesis eqs 3.3-3.5)."""
 
-    side: Literal["reflection", "transmission"] = "reflection"
-    distribution: Literal["beckmann", "ggx"] = "beckmann"
+    side: Side = "reflection"
+    distribution: Distribution = "beckmann"
     k: RGB = (1.0, 1.0, 1.0)
     mx: Roughness
     my: Roughness
-    r0: Annotated[
-        tuple[
-            Annotated[float, Field(ge=0, le=1)],
-            Annotated[float, Field(ge=0, le=1)],
-            Annotated[float, Field(ge=0, le=1)],
-        ],
-        BeforeValidator(_spread),
-    ] = (0.04, 0.04, 0.04)
-    alpha: Annotated[float, Field(ge=0, le=1)] = 0.0
+    r0: Annotated[tuple[Share, Share, Share], BeforeValidator(_spread)] = (0.04, 0.04, 0.04)
+    alpha: Share = 0.0
 
 
 class Provenance(_Strict):
-    """Where the numbers come from, so that a material can be traced to its measurement."""
+    """Where a material's numbers come from: its measurement, and how it was fitted."""
 
     source: str | None = None  # file name of the measurement, without folders
     source_sha256: str | None = None
@@ -69,16 +67,16 @@ class Provenance(_Strict):
 class Material(_Strict):
     """Sum of a diffuse term per side and any number of lobes (thesis eq. 3.6); a thin, two-sided sheet.
 
-    With `kd_coupled` the diffuse reflection falls towards grazing as Fresnel's rises (`bsdf.coupling`): kd is then the
-    albedo seen from straight above.
+    With `kd_coupled` the diffuse reflection falls towards grazing as the Fresnel reflectance rises (`bsdf.coupling`);
+    kd is then the diffuse albedo at normal incidence.
     """
 
     format: Literal["lambent-material"] = FORMAT
     version: Literal[1] = VERSION
     name: str = "material"
-    kd: RGB = (0.0, 0.0, 0.0)
+    kd: RGB = BLACK
     kd_coupled: bool = False
-    kt_d: RGB = (0.0, 0.0, 0.0)
+    kt_d: RGB = BLACK
     lobes: tuple[Lobe, ...] = ()
     provenance: Provenance | None = None
 
@@ -105,7 +103,7 @@ def load_material(path: Path) -> Material:
     Raises
     ------
     UserError
-        Where the file is not JSON, not a material, of another version, or holds an unknown or impossible field.
+        The file is not JSON, not a material, of another version, or holds an unknown or impossible field.
     """
     try:
         data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
@@ -115,7 +113,7 @@ def load_material(path: Path) -> Material:
 
 
 def material_from(data: Any, file: Path | str) -> Material:
-    """Material of a parsed document; `file` is named in errors."""
+    """The material of a parsed document; errors name `file`."""
     if not isinstance(data, dict):
         raise UserError("not a material document", file=file, got=type(data).__name__, expected="an object")
     if data.get("version", VERSION) != VERSION:
@@ -126,7 +124,7 @@ def material_from(data: Any, file: Path | str) -> Material:
         raise _one_line(error, file) from error
     if not data.keys() & SCATTERING:
         hint = "a black surface says so: kd = 0"
-        raise UserError("says nothing of how it scatters", file=file, expected="kd, kt_d or lobes", hint=hint)
+        raise UserError("has no scattering term", file=file, expected="kd, kt_d or lobes", hint=hint)
     return material
 
 

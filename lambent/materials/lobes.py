@@ -1,13 +1,13 @@
-"""The Kurt lobe: eval, sample, pdf. One truth for numpy and for the JIT path tracer; lobes.wgsl is its sibling.
+"""The Kurt lobe: eval, sample, pdf. One implementation for numpy and the JIT path tracer; lobes.wgsl is its sibling.
 
-Every function takes directions as (x, y, z) component tuples and `ops`, the array library they belong to: `NUMPY`
-here, or any module with the same names (drjit has them). So the maths stands once and traces in the path tracer.
+Every function takes directions as (x, y, z) component tuples and `ops`, their array library: `NUMPY`, or any module
+with the same names, such as drjit.
 
 Sources: Kurt, Szirmay-Kalos & Krivanek 2010, "An anisotropic BRDF model for fitting and Monte Carlo rendering";
 thesis M ("Real-time rendering of measured materials"), equations in parentheses. GGX: Walter et al. 2007, eq. 33.
 
-Hazard: tan^2(theta_h) and 1 - cos^2(theta_h) cancel in float32 at low roughness; everything here is built from
-hx^2, hy^2 and hz of the half vector instead.
+Hazard: tan^2(theta_h) and 1 - cos^2(theta_h) cancel in float32 at low roughness; everything is built from hx^2, hy^2
+and hz of the half vector instead.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ COS_MIN = 1e-4  # directions closer to the horizon than this carry no lobe (the 
 
 @dataclass(frozen=True)
 class ArrayOps:
-    """The few array functions the maths needs, under drjit's names."""
+    """Array functions under drjit's names; look-ups of tables need the last five as well."""
 
     exp: Callable[..., Any]
     log: Callable[..., Any]
@@ -38,17 +38,37 @@ class ArrayOps:
     maximum: Callable[..., Any]
     minimum: Callable[..., Any]
     select: Callable[..., Any]
+    cbrt: Callable[..., Any]
+    atan2: Callable[..., Any]
+    floor: Callable[..., Any]
+    gather: Callable[..., Any]  # (flat table, index)
+    whole: Callable[..., Any]  # to an integer
 
 
-NUMPY = ArrayOps(np.exp, np.log, np.sqrt, np.sin, np.cos, np.power, np.abs, np.maximum, np.minimum, np.where)
+NUMPY = ArrayOps(
+    np.exp, np.log, np.sqrt, np.sin, np.cos, np.power, np.abs, np.maximum, np.minimum, np.where, np.cbrt, np.arctan2,
+    np.floor, lambda table, index: table[index], lambda x: np.asarray(x).astype(np.int64),
+)  # fmt: skip
 
 
 def dot(a: Vector, b: Vector) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def reflect(w: Vector, about: Vector) -> Vector:
+    """`w` mirrored about the unit axis `about`: 2 (w.a) a - w."""
+    twice = 2 * dot(w, about)
+    return twice * about[0] - w[0], twice * about[1] - w[1], twice * about[2] - w[2]
+
+
+def sample_cosine(u1: Any, u2: Any, ops: Any = NUMPY) -> Vector:
+    """Cosine-distributed direction of the upper hemisphere; u_* uniform in [0, 1)."""
+    r, phi = ops.sqrt(u1), 2 * np.pi * u2
+    return r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(ops.maximum(1 - u1, 0.0))
+
+
 def half_vector(wi: Vector, wo: Vector, ops: Any = NUMPY) -> Vector:
-    """normalize(wi + wo); of opposite directions the result is finite but has no meaning."""
+    """normalize(wi + wo); finite but without meaning for opposite directions."""
     x, y, z = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
     scale = 1 / ops.sqrt(ops.maximum(x * x + y * y + z * z, 1e-20))
     return x * scale, y * scale, z * scale
@@ -72,7 +92,7 @@ def distribution(h: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
 
 
 def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
-    """h with density D(h) h_z from u1, u2 in [0, 1): (4.5, 4.6) in slopes, so that no quadrant can go wrong."""
+    """h with density D(h) h_z from u1, u2 in [0, 1): (4.5, 4.6) written in slopes, without quadrants."""
     u1 = ops.minimum(u1, 1 - 1e-7)
     r = ops.sqrt(u1 / (1 - u1)) if lobe.distribution == "ggx" else ops.sqrt(-ops.log(1 - u1))
     x = r * lobe.mx * ops.cos(2 * np.pi * u2)
@@ -82,7 +102,7 @@ def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector
 
 
 def _same_side(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> tuple[Vector, Vector, Any]:
-    """wi and wo turned to the upper side (wi mirrored at the surface for transmission), and whether the lobe sees them.
+    """wi and wo on the upper side (wi mirrored at the surface for transmission), and whether the lobe scatters them.
 
     The sheet is two-sided: a pair seen from below is the same pair seen from above.
     """
@@ -92,13 +112,16 @@ def _same_side(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> tuple[Vector, Ve
     return (wi[0], wi[1], ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2])), valid
 
 
+def _cosine_power(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> Any:
+    return ops.power(ops.maximum(wi[2] * wo[2], 1e-12), lobe.alpha)
+
+
 def shape(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> tuple[Any, Any]:
     """The lobe without its Fresnel factor, D/(4 (wo.h) (cos_i cos_o)^alpha) in 1/sr, and cos_d = wo.h."""
     wi, wo, valid = _same_side(wi, wo, lobe, ops)
     h = half_vector(wi, wo, ops)
     cos_d = dot(wo, h)
-    cosines = ops.power(ops.maximum(wi[2] * wo[2], 1e-12), lobe.alpha)
-    value = distribution(h, lobe, ops) / (4 * ops.maximum(cos_d, 1e-6) * cosines)
+    value = distribution(h, lobe, ops) / (4 * ops.maximum(cos_d, 1e-6) * _cosine_power(wi, wo, lobe, ops))
     return ops.select(valid, value, 0.0), cos_d
 
 
@@ -120,10 +143,7 @@ def sample(wo: Vector, u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector
 
     A direction that ends on the wrong side of the surface is returned as it is; `pdf` and `evaluate` are 0 there.
     """
-    h = sample_half_vector(u1, u2, lobe, ops)
-    up = (wo[0], wo[1], ops.abs(wo[2]))
-    twice = 2 * dot(up, h)
-    x, y, z = twice * h[0] - up[0], twice * h[1] - up[1], twice * h[2] - up[2]
+    x, y, z = reflect((wo[0], wo[1], ops.abs(wo[2])), sample_half_vector(u1, u2, lobe, ops))
     side = ops.select(wo[2] > 0, 1.0, -1.0) * (-1.0 if lobe.side == "transmission" else 1.0)
     return x, y, z * side
 
@@ -140,8 +160,6 @@ def weight(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
     """f |cos theta_i| / pdf of a direction made by `sample`, RGB; D, which under- and overflows, is cancelled."""
     wi, wo, valid = _same_side(wi, wo, lobe, ops)
     h = half_vector(wi, wo, ops)
-    cos_d = dot(wo, h)
-    cosines = ops.power(ops.maximum(wi[2] * wo[2], 1e-12), lobe.alpha)
-    value = ops.select(valid, wi[2] / (ops.maximum(h[2], 1e-6) * cosines), 0.0)
-    red, green, blue = (value * tint(cos_d, lobe, c, ops) for c in range(3))
+    value = ops.select(valid, wi[2] / (ops.maximum(h[2], 1e-6) * _cosine_power(wi, wo, lobe, ops)), 0.0)
+    red, green, blue = (value * tint(dot(wo, h), lobe, c, ops) for c in range(3))
     return red, green, blue

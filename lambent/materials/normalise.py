@@ -1,4 +1,4 @@
-"""A material that returns more light than arrives, made one that does not, and how much that changes it."""
+"""Normalise a material that returns more light than arrives, and report how much that changes it."""
 
 from __future__ import annotations
 
@@ -7,35 +7,34 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
+from lambent.core.plain import Triple, triple
 from lambent.core.progress import Progress, silent
 from lambent.core.sequences import cosine_hemisphere
-from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.bsdf import MaterialBSDF, specular_only
 from lambent.materials.check import furnace
-from lambent.materials.document import RGB, Lobe, Material
+from lambent.materials.document import Material
 from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
-from lambent.materials.fitting.metrics import errors_of
+from lambent.materials.fitting.metrics import errors_and_shares
 
 MARGIN = 0.999  # for the furnace's own error
-HALVINGS = 6  # of the interval in which alpha's factor lies
-ROUGHLY = 1 << 11  # samples of the furnace meanwhile; `with_less_k` has the last word
+HALVINGS = 6  # of the interval that holds alpha's factor
+ROUGHLY = 1 << 11  # samples of the furnace during the search; `with_less_k` is exact
 PAIRS = 20_000
-
-
 NOTE = "normalised so that no direction returns more than arrives; the errors are those of before"
 
 
 @dataclass(frozen=True)
 class Normalisation:
-    """A material before and after `normalised`, and what that did.
+    """A material before and after `normalised`, and the difference.
 
     Attributes
     ----------
     before, after : Material
         The same object where nothing exceeded 1.
     highest : tuple of (albedo, theta_deg, phi_deg)
-        Largest directional albedo before and after, and where.
+        Largest directional albedo before and after, with its direction.
     changed : dict
         Parameter -> its values before and after.
     errors, share : dict of float
@@ -44,7 +43,7 @@ class Normalisation:
 
     before: Material
     after: Material
-    highest: tuple[tuple[float, float, float], tuple[float, float, float]]
+    highest: tuple[Triple, Triple]
     changed: dict[str, tuple[Any, Any]]
     errors: dict[str, float]
     share: dict[str, float]
@@ -62,12 +61,12 @@ class Normalisation:
 
 
 def normalisation(material: Material, seed: int = 0, progress: Progress = silent) -> Normalisation:
-    """`normalised`, with its account; seconds to a minute, deterministic for a seed.
+    """`normalised` with a report of the changes; seconds to a minute, deterministic for a seed.
 
     Raises
     ------
     UserError
-        Where the diffuse terms alone exceed 1.
+        The diffuse terms alone exceed 1.
     """
     after = normalised(material, seed, progress)
     before = furnace(material, seed=seed).highest
@@ -75,8 +74,7 @@ def normalisation(material: Material, seed: int = 0, progress: Progress = silent
         return Normalisation(material, material, (before, before), {}, {}, {})
     samples = pairs_of(material, CHECK_LOG2, seed).samples
     f = MaterialBSDF(after).eval(samples.wi, samples.wo)[:, : samples.f.shape[1]]
-    errors, black = errors_of(samples, f), errors_of(samples, np.zeros_like(f))
-    share = {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}
+    errors, share = errors_and_shares(samples, f)
     if after.provenance is not None:
         notes = (*after.provenance.notes, NOTE)
         after = after.model_copy(update={"provenance": after.provenance.model_copy(update={"notes": notes})})
@@ -96,14 +94,14 @@ def _changed(before: Material, after: Material) -> dict[str, tuple[Any, Any]]:
 def normalised(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
     """The material changed so that no furnace angle (theta up to 89 degrees) exceeds 1.
 
-    Of two remedies the one that changes the looks less (`change`): all k scaled, per channel; or all alpha scaled
-    first, which is what makes lobes exceed 1 towards grazing, and k for what is left. The diffuse terms and slopes
-    stay. A material that does not exceed 1 comes back unchanged.
+    Of two remedies, the one that changes the appearance less (`change`) is taken: scale all k, per channel; or scale
+    all alpha first, which makes lobes exceed 1 towards grazing, and then k. Diffuse terms and slopes stay. A material
+    that does not exceed 1 comes back unchanged.
 
     Raises
     ------
     UserError
-        Where the diffuse terms alone exceed 1.
+        The diffuse terms alone exceed 1.
     """
     diffuse = np.add(material.kd, material.kt_d)
     if diffuse.max() > 1:
@@ -118,14 +116,15 @@ def normalised(material: Material, seed: int = 0, progress: Progress = silent) -
 
 
 def with_less_k(material: Material, seed: int = 0) -> Material:
-    """All k scaled, per channel, as far down as it takes."""
+    """The material with all k scaled, per channel, until nothing exceeds 1."""
     highest, room = _highest(material, seed), _room(material)
     scale = np.where(highest > room, MARGIN * room / np.maximum(highest, 1e-12), 1.0)
-    return material.model_copy(update={"lobes": tuple(_scaled(lobe, scale) for lobe in material.lobes)})
+    lobes = tuple(lobe.model_copy(update={"k": triple(np.asarray(lobe.k) * scale)}) for lobe in material.lobes)
+    return material.model_copy(update={"lobes": lobes})
 
 
 def with_less_alpha(material: Material, seed: int = 0, progress: Progress = silent) -> Material:
-    """All alpha scaled by the largest factor with which nothing exceeds 1; 0 where none is small enough."""
+    """The material with all alpha scaled by the largest factor at which nothing exceeds 1; 0 where there is none."""
     low, high = 0.0, 1.0
     for halving in range(HALVINGS):
         progress(1 + halving, HALVINGS + 2, "normalising")
@@ -135,7 +134,7 @@ def with_less_alpha(material: Material, seed: int = 0, progress: Progress = sile
 
 
 def change(before: Material, after: Material, seed: int = 0) -> float:
-    """RMS over all pairs of the difference between the cube roots of f cos(theta_i), as eyes weigh it; (1/sr)^(1/3)."""
+    """RMS over all pairs of the difference between the cube roots of f cos(theta_i), in (1/sr)^(1/3)."""
     rng = np.random.default_rng(seed)
     wo, bsdf = cosine_hemisphere(rng.random((PAIRS, 2))), MaterialBSDF(before)
     wi = bsdf.sample(wo, rng.random((PAIRS, 3)))
@@ -146,14 +145,13 @@ def change(before: Material, after: Material, seed: int = 0) -> float:
 
 
 def _excess(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
-    """By how much (3,) the lobes exceed what the diffuse terms leave; 0 where they do not."""
+    """Excess (3,) of the lobes' albedo over 1 minus the diffuse terms; 0 where there is none."""
     return np.maximum(_highest(material, seed, samples) - _room(material), 0.0)
 
 
 def _highest(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
     """(3,) largest albedo of the lobes alone."""
-    lobes_only = material.model_copy(update={"kd": (0.0, 0.0, 0.0), "kt_d": (0.0, 0.0, 0.0)})
-    return np.asarray(furnace(lobes_only, seed=seed, samples=samples).albedo.max(axis=(0, 1)))
+    return np.asarray(furnace(specular_only(material), seed=seed, samples=samples).albedo.max(axis=(0, 1)))
 
 
 def _room(material: Material) -> Floats:
@@ -163,8 +161,3 @@ def _room(material: Material) -> Floats:
 def _flatter(material: Material, factor: float) -> Material:
     lobes = tuple(lobe.model_copy(update={"alpha": lobe.alpha * factor}) for lobe in material.lobes)
     return material.model_copy(update={"lobes": lobes})
-
-
-def _scaled(lobe: Lobe, scale: Floats) -> Lobe:
-    k: RGB = tuple(float(v) for v in np.asarray(lobe.k) * scale)  # type: ignore[assignment]
-    return lobe.model_copy(update={"k": k})

@@ -1,22 +1,20 @@
-"""Pictures of a BSDF for looking at measurements and materials: the plane of incidence, and the polar matrix."""
+"""Plots of measurements and materials: the plane of incidence, and the polar matrix."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import direction
+from lambent.core.directions import Floats, direction
 from lambent.core.files import atomic_path
 from lambent.materials.fitting.disks import measured_disk
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredTable
 
-Floats = NDArray[np.floating]
 Eval = Callable[[Floats, Floats], Floats]
 
 THETA_I_DEG = (0, 20, 40, 60, 75)
@@ -25,7 +23,7 @@ FLOOR = 1e-5  # 1/sr, the lowest value shown
 DISK_PIXELS = 96
 WHITE_PERCENTILE = 99.8  # of the brightness over all disks, shown as white
 MOST_ROWS, MOST_COLUMNS = 8, 12  # of disks; more incident directions are thinned out
-UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"
+UNKNOWN, SOURCE = (0.66, 0.78, 0.93), "#ffb300"  # shade of directions that were not measured; the light's dot
 IN_PLANE_INCHES, DISK_INCHES = 3.2, 1.3
 
 
@@ -35,14 +33,14 @@ def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str
     Parameters
     ----------
     path : Path
-        Picture to write: .png, .pdf or .svg.
+        Image to write: .png, .pdf or .svg.
     evals : mapping of name -> eval(wi, wo)
-        What to draw: the first as a thick pale line, the next ones as thin lines over it.
+        BSDFs to draw: the first as a thick pale line, the others as thin lines over it.
     transmits : bool
         Whether to show the far side as well; theta_o then runs from -180 to 180 degrees.
     """
-    figure = _figure(3 * len(THETA_I_DEG), IN_PLANE_INCHES)
-    _draw_plane(figure, evals, THETA_I_DEG, transmits)
+    figure = new_figure(3 * len(THETA_I_DEG), IN_PLANE_INCHES)
+    _draw_plane(figure, evals, transmits)
     figure.suptitle(title, fontsize=10)
     _save(figure, path)
 
@@ -51,13 +49,13 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
     """Draw a measurement: the in-plane curves as `eval` reconstructs them, above the polar matrix of the raw tuples.
 
     Disks have the source at the top, theta_o from the centre to the rim, and the cube root of the transfer probability
-    as brightness; blue was not measured. Rows are theta_i and columns phi_i; with one phi_i alone theta_i runs along
-    the columns. The far side stands below the near one.
+    as brightness; blue was not measured. Rows are theta_i and columns phi_i; with a single phi_i, theta_i runs along
+    the columns. The far side is below the near one.
 
     Parameters
     ----------
     path : Path
-        Picture to write: .png, .pdf or .svg.
+        Image to write: .png, .pdf or .svg.
     """
     samples = table.samples()
     gathered = [_both_sides(entry) for entry in incidences(samples)] if samples.info.isotropic else incidences(samples)
@@ -67,16 +65,16 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
     flat = len(phis) <= 1
     rows, columns = (len(sides), len(thetas)) if flat else (len(thetas) * len(sides), len(phis))
     matrix_inches = DISK_INCHES * max(rows, 1) + 0.6
-    figure = _figure(max(3.0 * len(THETA_I_DEG), DISK_INCHES * columns + 1), IN_PLANE_INCHES + matrix_inches)
+    figure = new_figure(max(3.0 * len(THETA_I_DEG), DISK_INCHES * columns + 1), IN_PLANE_INCHES + matrix_inches)
     above, below = figure.subfigures(2, 1, height_ratios=(IN_PLANE_INCHES, matrix_inches))
-    _draw_plane(above, {"measured": table.eval}, THETA_I_DEG, samples.info.transmits)
+    _draw_plane(above, {"measured": table.eval}, samples.info.transmits)
     above.suptitle(title, fontsize=10)
     _draw_matrix(below, shown, sides, (rows, columns), (thetas, phis))
     _save(figure, path)
 
 
-def _figure(width: float, height: float) -> Any:
-    """A figure of its own Agg canvas: no global state, no window."""
+def new_figure(width: float, height: float) -> Any:
+    """A figure with its own Agg canvas: no global state, no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -85,18 +83,41 @@ def _figure(width: float, height: float) -> Any:
     return figure
 
 
+def white_of(disks: Iterable[Floats]) -> float:
+    """The brightness shown as white, over all known pixels of disks."""
+    known = np.concatenate([disk[np.isfinite(disk)] for disk in disks])
+    return max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12) if len(known) else 1.0
+
+
+def colours_of(disk: Floats) -> Floats:
+    """Colours (pixels, pixels, 3) of a disk's brightness, with white at 1."""
+    return np.where(np.isnan(disk), UNKNOWN, np.clip(disk, 0, 1))
+
+
+def draw_rim(axis: Any) -> None:
+    """Draw the rim of a disk."""
+    rim = np.linspace(0, 2 * np.pi, 128)
+    axis.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
+
+
+def draw_source(axis: Any, theta_deg: float, limit: float) -> None:
+    """Draw the dot of the source at the top of a disk, whose axes reach to `limit`."""
+    axis.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
+    axis.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+
+
 def _save(figure: Any, path: Path) -> None:
     with atomic_path(path) as beside:
         figure.savefig(beside, dpi=120)
 
 
-def _draw_plane(figure: Any, evals: Mapping[str, Eval], thetas_i_deg: Sequence[float], transmits: bool) -> None:
-    """One panel per theta_i; positive theta_o lies opposite the light, where a mirror sends it."""
+def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None:
+    """Draw a panel per theta_i; positive theta_o lies opposite the light, on the side of the mirror direction."""
     limit = 180 if transmits else 90
     theta_o = np.linspace(-limit, limit, STEPS)[1:-1]
     wo = direction(np.radians(np.abs(theta_o)), np.where(theta_o >= 0, np.pi, 0.0))
-    axes = figure.subplots(1, len(thetas_i_deg), sharey=True)
-    for axis, theta_i in zip(axes, thetas_i_deg, strict=True):
+    axes = figure.subplots(1, len(THETA_I_DEG), sharey=True)
+    for axis, theta_i in zip(axes, THETA_I_DEG, strict=True):
         wi = np.broadcast_to(direction(np.radians(theta_i), 0.0), wo.shape)
         for index, (name, evaluate) in enumerate(evals.items()):
             style = {"lw": 4, "color": "0.75"} if index == 0 and len(evals) > 1 else {"lw": 1.2}
@@ -116,15 +137,14 @@ def _draw_matrix(
     shape: tuple[int, int],
     angles_deg: tuple[list[float], list[float]],
 ) -> None:
-    """The disks of every incident direction and side."""
+    """Draw the disks of every incident direction and side."""
     if not shown:
         figure.text(0.5, 0.5, "too few tuples per incident direction for disks", ha="center", fontsize=9)
         return
     (rows, columns), (thetas, phis) = shape, angles_deg
     flat = len(phis) <= 1
     disks = {(e.theta_deg, e.phi_deg, far): measured_disk(e, far, DISK_PIXELS) for e in shown for far in sides}
-    known = np.concatenate([disk[np.isfinite(disk)] for disk in disks.values()])
-    white = max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12) if len(known) else 1.0
+    white = white_of(disks.values())
     axes = figure.subplots(rows, columns, squeeze=False)
     for axis in axes.flat:
         axis.set_axis_off()
@@ -144,33 +164,26 @@ def _draw_matrix(
 def _draw_disk(axis: Any, image: Floats, theta_deg: float) -> None:
     x = np.linspace(-1, 1, DISK_PIXELS)
     inside = np.hypot(x, x[:, None]) < 1
-    image = np.broadcast_to(image, (*image.shape[:2], 3))
-    colours = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))
+    colours = colours_of(np.broadcast_to(image, (*image.shape[:2], 3)))
     axis.imshow(np.concatenate([colours, inside[..., None]], axis=-1), extent=(-1, 1, -1, 1), interpolation="nearest")
-    rim = np.linspace(0, 2 * np.pi, 128)
-    axis.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
-    axis.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
-    axis.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
+    draw_rim(axis)
+    draw_source(axis, theta_deg, 1.1)
 
 
 def _both_sides(entry: Incidence) -> Incidence:
-    """The entry of an isotropic table, with the mirror images of tuples on one side of the plane of incidence alone."""
+    """The entry of an isotropic table; tuples on one side of the plane of incidence alone are mirrored to the other."""
     aside = entry.wo[:, 1]
     left, right = aside > 1e-6, aside < -1e-6
     if left.any() == right.any():
         return entry
     other = left | right
-    mirrored = entry.wo[other] * (1, -1, 1)
-    return replace(
-        entry,
-        wo=np.concatenate([entry.wo, mirrored]),
-        f=np.concatenate([entry.f, entry.f[other]]),
-        weight=np.concatenate([entry.weight, entry.weight[other]]),
-    )
+    wo = np.concatenate([entry.wo, entry.wo[other] * (1, -1, 1)])
+    f, weight = (np.concatenate([a, a[other]]) for a in (entry.f, entry.weight))
+    return replace(entry, wo=wo, f=f, weight=weight)
 
 
 def _thinned(gathered: Sequence[Incidence]) -> list[Incidence]:
-    """At most so many theta_i and phi_i, evenly chosen, the ends among them."""
+    """At most MOST_ROWS theta_i and MOST_COLUMNS phi_i, evenly chosen, with both ends."""
     phis = sorted({entry.phi_deg for entry in gathered})
     most = (MOST_COLUMNS, 1) if len(phis) <= 1 else (MOST_ROWS, MOST_COLUMNS)
     kept = []

@@ -1,9 +1,8 @@
-"""Lobes as lobes.wgsl reads them from a buffer: `struct LambentLobe`, 48 bytes each."""
+"""Lobes in the buffer layout of lobes.wgsl: `struct LambentLobe`, 48 bytes each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -31,8 +30,3 @@ def packed_lobes(lobes: Sequence[Lobe]) -> NDArray[Any]:
     """Structured array (N,) of `LOBE_DTYPE`, ready to be written to a storage buffer."""
     rows = [(o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], 0) for o in lobes]
     return np.array(rows, LOBE_DTYPE)
-
-
-def lobe_shader() -> str:
-    """Text of lobes.wgsl, to be put before a shader that uses it."""
-    return files("lambent.materials").joinpath("lobes.wgsl").read_text(encoding="utf-8")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.directions import direction
+from lambent.materials.fresnel import conductor
 from lambent.materials.models import model_named
-from lambent.materials.models.cook_torrance import conductor
 from tests.tools.in_mitsuba import f_cos
 
 

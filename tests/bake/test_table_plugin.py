@@ -10,8 +10,9 @@ from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured import half_vector_grid, load
-from lambent.materials.measured.half_vector_grid import GridShape, grid_of
+from lambent.materials.measured import load
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.half_vector_resampling import grid_of
 from lambent.materials.measured.klems import KLEMS_HALF, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_xml import LbnlTable
 from lambent.materials.measured.patch_sheet import lookup_of
@@ -76,9 +77,9 @@ def test_eval_and_pdf_equal_numpy(mi, sheet):
     wi, wo = random_directions(10_000, 1), random_directions(10_000, 2)
     value, density = plugin.eval_pdf(mi.BSDFContext(), interaction(wo), mi.Vector3f(wi.T))
     pair = components(wi), components(wo)
-    expected = np.stack(half_vector_grid.evaluate(*pair, grid), axis=-1) * np.abs(wi[:, 2:])
+    expected = np.stack(grid.evaluate(*pair), axis=-1) * np.abs(wi[:, 2:])
     np.testing.assert_allclose(np.array(value).T, expected, rtol=2e-4, atol=1e-6)
-    differs = np.abs(np.array(density) - half_vector_grid.pdf(*pair, grid)) > 1e-4 * np.array(density)
+    differs = np.abs(np.array(density) - grid.pdf(*pair)) > 1e-4 * np.array(density)
     assert differs.mean() < 1e-3  # float32 may see a half vector on the border of a cell in the next one
 
 
@@ -92,7 +93,7 @@ def test_sample_agrees_with_eval_pdf_and_numpy(mi, sheet):
     assert kept.mean() > 0.9
     agrees = np.abs(np.array(weight).T * density[:, None] - value).max(axis=1) < 1e-3 * value.max(axis=1)
     assert agrees[kept].mean() > 0.998
-    expected = np.stack(half_vector_grid.sample(components(wo), *u.T.astype(float), grid), axis=-1)
+    expected = np.stack(grid.sample(components(wo), *u.T.astype(float)), axis=-1)
     assert (np.linalg.norm(np.array(bs.wo).T - expected, axis=1)[kept] < 1e-3).mean() > 0.998
 
 
@@ -193,7 +194,7 @@ def test_vertex_tangent_is_the_brushing_direction(mi, sheet, tmp_path):
     wo, wi = direction(0.5, 1.0), direction(0.4, 3.9)
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(wo * 2 + [0.1, 0.2, 0]), mi.Vector3f(-wo)))
     frame = np.stack([t, b, [0, 0, 1]])
-    expected = np.array(half_vector_grid.evaluate(components(frame @ wi), components(frame @ wo), grid)) * wi[2]
+    expected = np.array(grid.evaluate(components(frame @ wi), components(frame @ wo))) * wi[2]
     value = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(wi)))
     np.testing.assert_allclose(np.array(value).ravel(), expected, rtol=1e-3)
 

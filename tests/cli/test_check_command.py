@@ -6,15 +6,15 @@ import pytest
 
 from lambent.materials import check, check_table
 from lambent.materials.document import Lobe, Material, load_material
-from lambent.materials.measured import half_vector_grid
+from lambent.materials.measured import half_vector_resampling
 from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.synthetic import Setup, synthesise
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    for module in (check, check_table):
-        monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(check, "SAMPLER_THETA_DEG", (45.0,))
     monkeypatch.setattr(check_table, "INTEGRAL_THETA_DEG", (40.0,))
 
 
@@ -31,7 +31,7 @@ def test_a_model_that_fails(lambent):
 
 
 def test_a_measured_file(lambent, tmp_path, monkeypatch):
-    monkeypatch.setattr(half_vector_grid, "ISOTROPIC", half_vector_grid.GridShape(16, 1, 64, 32))
+    monkeypatch.setattr(half_vector_resampling, "ISOTROPIC", GridShape(16, 1, 64, 32))
     setup = Setup((0.0, 30.0, 60.0), step_deg=10, fine_deg=5, noise=0.0, floor=0.0)
     material = Material(name="m", kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, k=0.3),))
     write_gonio(tmp_path / "m.txt", synthesise(material, setup))
@@ -61,7 +61,7 @@ def test_files_take_no_parameters(refused, tmp_path):
 
 def test_an_empty_document(refused, tmp_path):
     (tmp_path / "m.json").write_text("{}")
-    assert "nothing of how it scatters" in refused("check", tmp_path / "m.json")
+    assert "no scattering term" in refused("check", tmp_path / "m.json")
 
 
 STEEP = Material(kd=0.1, lobes=(Lobe(mx=0.4, my=0.4, k=0.8, r0=1, alpha=1),))

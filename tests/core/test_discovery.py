@@ -34,3 +34,5 @@ def test_an_unknown_name_is_told_with_the_nearest() -> None:
     assert known("toy", "ball", ["ball", "top"]) == "ball"
     with pytest.raises(UserError, match=r"unknown toy.*bal.*ball, top"):
         known("toy", "bal", ["ball", "top"])
+    with pytest.raises(UserError, match=r"toys.txt: line 3: unknown toy"):
+        known("toy", "bal", ["ball"], file="toys.txt", field="line 3")

@@ -44,7 +44,7 @@ def test_reciprocal(name):
 
 
 def test_a_lobe_that_crosses_the_horizon_is_rejected():
-    """Its samples must not pass for those of the diffuse transmission on the far side: too bright."""
+    """Its samples must not count as diffuse transmission on the far side, which would be too bright."""
     bsdf = MaterialBSDF(Material(kt_d=0.5, lobes=(Lobe(mx=1.0, my=1.0, r0=0.9),)))
     wo = np.tile(direction(np.radians(80), 0.0), (100_000, 1))
     u = np.random.default_rng(0).random(wo.shape)

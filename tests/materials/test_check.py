@@ -1,4 +1,4 @@
-"""The check finds what is wrong, names it, and passes what is right."""
+"""The check names faults and passes sound materials."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BRUSHED = Material(lobes=(Lobe(k=0.98, mx=0.0068, my=0.0297, r0=0.84, alpha=0.49
 
 @pytest.fixture
 def quick(monkeypatch):
-    """One wo for the sampler: the failure that a test is about, without the other directions."""
+    """One wo for the sampler, for speed."""
     monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
 
 
@@ -74,12 +74,12 @@ class LeavesAPartUnsampled(MaterialBSDF):
     ("kind", "complaint"),
     [(NotReciprocal, "not reciprocal"), (WrongPdf, "do not follow the density"), (WrongPdf, "by quadrature")],
 )
-def test_what_is_wrong_is_named(quick, kind, complaint):
+def test_faults_are_named(quick, kind, complaint):
     report = check(kind(Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.2),))))
     assert any(complaint in failure for failure in report.failures), report.failures
 
 
-def test_a_part_that_is_never_sampled_shows_in_the_two_albedos(quick):
+def test_an_unsampled_part_shows_in_the_two_albedos(quick):
     report = check(LeavesAPartUnsampled(Material(kd=0.5, kt_d=0.2)))
     assert any("by sampling" in failure for failure in report.failures), report.failures
     assert not any("follow the density" in failure for failure in report.failures)

@@ -1,4 +1,4 @@
-"""The check of tables finds what no device explains, and reports what every device has."""
+"""The check of tables fails on faults that no device explains, and reports the usual errors of devices."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from lambent.materials import check
 from lambent.materials import check_table as module
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check_table import check_table
@@ -50,7 +51,7 @@ class FCosTakenForF(Exact):
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(module, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(check, "SAMPLER_THETA_DEG", (45.0,))
     monkeypatch.setattr(module, "INTEGRAL_THETA_DEG", (40.0,))
 
 
@@ -67,7 +68,7 @@ def test_a_sound_table_passes_and_the_report_is_json():
 
 @pytest.mark.parametrize(("strength", "passes"), [(0.1, True), (1.0, False)])
 def test_asymmetry_is_reported_and_only_much_of_it_fails(strength, passes):
-    """Of a matt surface |f - f'| = 2 s |cos_i - cos_o| f, whose mean over both cosine-weighted hemispheres is 4/15."""
+    """For a matt surface |f - f'| = 2 s |cos_i - cos_o| f, whose mean over both cosine-weighted hemispheres is 4/15."""
     table = Asymmetric(Material(kd=0.5))
     table.strength = strength
     report = check_table(table, shape=SMALL)

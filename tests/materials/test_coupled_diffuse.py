@@ -27,7 +27,7 @@ def test_nothing_cancels_at_grazing():
 
 
 @pytest.mark.parametrize("theta_deg", [0.0, 45.0, 80.0, 89.0])
-def test_the_albedo_is_kd_times_what_is_seen(theta_deg):
+def test_the_albedo_is_kd_times_the_transmittance(theta_deg):
     """Gauss-Legendre over theta_i: the integrand is a polynomial of degree 6 in cos(theta_i), so it is exact."""
     nodes, weights = np.polynomial.legendre.leggauss(8)
     cos_i = (nodes + 1) / 2
@@ -41,7 +41,7 @@ def test_the_albedo_is_kd_times_what_is_seen(theta_deg):
     assert one.albedo_sampled == pytest.approx(expected, abs=5 * one.albedo_error + 1e-4)
 
 
-def test_it_is_reciprocal_and_its_sampler_right():
+def test_reciprocal_with_a_correct_sampler():
     report = check(Material(kd=KD, kd_coupled=True, lobes=(Lobe(mx=0.2, my=0.1, r0=0.04),)))
     assert report.passed and report.reciprocity_error < 1e-12
 
@@ -51,7 +51,7 @@ def test_the_factor_has_mean_one_under_uniform_light():
     assert np.mean(coupling(cosine, 1.0)) == pytest.approx(1, abs=1e-4)
 
 
-def test_documents_keep_it_and_old_ones_are_read(tmp_path):
+def test_documents_store_the_coupling_and_old_ones_are_read(tmp_path):
     COUPLED.save(tmp_path / "m.json")
     assert load_material(tmp_path / "m.json") == COUPLED
     assert not material_from({"kd": 0.5}, "old").kd_coupled
@@ -59,8 +59,8 @@ def test_documents_keep_it_and_old_ones_are_read(tmp_path):
         material_from({"kd": 0.5, "kd_coupled": 0.3}, "x")
 
 
-def test_a_document_that_says_nothing_is_refused():
-    with pytest.raises(UserError, match="nothing of how it scatters"):
+def test_a_document_without_scattering_terms_is_refused():
+    with pytest.raises(UserError, match="no scattering term"):
         material_from({"name": "x"}, "x.json")
     for black in ({"kd": 0}, {"kt_d": [0, 0, 0]}, {"lobes": []}):
         assert material_from(black, "x.json").kd == (0, 0, 0)

@@ -1,10 +1,11 @@
-"""One lobe: sampler, density and value belong together, in every corner that is rendered."""
+"""One lobe: sampler, density and value agree over the whole range of parameters."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from lambent.core import directions
 from lambent.core.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
@@ -61,7 +62,7 @@ def test_weight_is_value_over_density(name):
 
 
 def test_a_pdf_wrong_by_two_per_cent_is_noticed_and_explained(tmp_path):
-    """The right pdf passes; 2 % too high, or a roughness 2 % too wide, does not, and a picture shows it."""
+    """The right pdf passes; 2 % too high, or a roughness 2 % too wide, fails, and an image shows it."""
     right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
 
     class TooHigh(MaterialBSDF):
@@ -100,7 +101,7 @@ def test_brushed_along_t_is_sharp_along_t():
 
 
 def test_two_sided():
-    """A pair mirrored at the sheet scatters alike."""
+    """A pair mirrored at the sheet has the same f."""
     wi, wo = pairs()
     flip = np.array([1, 1, -1])
     for lobe in LOBES.values():
@@ -117,3 +118,13 @@ def test_density_of_half_vectors_integrates_to_one():
     for distribution in ("beckmann", "ggx"):
         d = lobes.distribution(components(h), Lobe(mx=0.3, my=0.5, distribution=distribution))
         assert (d * h[..., 2]).mean() * 2 * np.pi == pytest.approx(1, abs=1e-3)
+
+
+def test_components_agree_with_arrays():
+    """Half vector and mirrored direction have a form in components, for the path tracer."""
+    random = np.random.default_rng(0)
+    wi, wo = directions.normalize(random.normal(size=(2, 100, 3)))
+    h = lobes.half_vector(components(wi), components(wo))
+    np.testing.assert_allclose(np.stack(h, axis=-1), directions.half_vector(wi, wo), atol=1e-15)
+    mirrored = directions.reflect(wo, directions.half_vector(wi, wo))
+    np.testing.assert_allclose(np.stack(lobes.reflect(components(wo), h), axis=-1), mirrored, atol=1e-14)

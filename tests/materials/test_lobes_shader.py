@@ -1,4 +1,4 @@
-"""lobes.wgsl says what lobes.py says.
+"""lobes.wgsl agrees with lobes.py.
 
 Inputs are float32 and go to numpy as float32 values in float64. Where float32 itself cannot do better than 1e-5 (the
 hazards named in lobes.wgsl: the foot of a narrow lobe amplifies the rounding of h by tan(theta_h)/m^2), the tolerance
@@ -7,6 +7,9 @@ says so from that formula instead of the inputs avoiding it.
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,9 +17,10 @@ from lambent.core.directions import direction
 from lambent.materials import lobes
 from lambent.materials.bsdf import components, under_fresnel
 from lambent.materials.document import Lobe
-from lambent.materials.shader_layout import LOBE_DTYPE, lobe_shader, packed_lobes
+from lambent.materials.shader_layout import LOBE_DTYPE, packed_lobes
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
+SHADER = Path(lobes.__file__).with_suffix(".wgsl").read_text(encoding="utf-8")
 COUNT = 5000
 LOBES = [
     Lobe(side=side, distribution=distribution, k=(0.9, 0.5, 0.2), r0=(0.9, 0.5, 0.03), mx=mx, my=my, alpha=alpha)
@@ -58,7 +62,7 @@ def test_functions_of_two_directions(lobe, function):
     expected = np.stack(expected, axis=-1) if isinstance(expected, tuple) else expected
     call = f"lambent_{function}(wi, wo, LOBE)"
     width = expected.shape[1] if expected.ndim == 2 else 1
-    got = run_wgsl(lobe_shader(), call, {"wi": wi, "wo": wo}, components=width, declarations=declared(lobe))
+    got = run_wgsl(SHADER, call, {"wi": wi, "wo": wo}, components=width, declarations=declared(lobe))
     assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
@@ -67,7 +71,7 @@ def test_sample(lobe):
     _, wo, u = pairs(lobe)
     expected = np.stack(lobes.sample(components(wo), *u.T.astype(float), lobe), axis=-1)
     inputs = {"wo": wo, "u": u}
-    got = run_wgsl(lobe_shader(), "lambent_sample(wo, u, LOBE)", inputs, components=3, declarations=declared(lobe))
+    got = run_wgsl(SHADER, "lambent_sample(wo, u, LOBE)", inputs, components=3, declarations=declared(lobe))
     assert_parity(got, expected, rtol=1e-5, atol=1e-5)
 
 
@@ -76,7 +80,7 @@ def test_distribution_of_narrow_lobes(distribution):
     lobe = Lobe(mx=0.0068, my=0.0297, distribution=distribution)
     u = np.random.default_rng(3).random((COUNT, 2))
     h = np.stack(lobes.sample_half_vector(*u.T, lobe), axis=-1).astype(np.float32)
-    got = run_wgsl(lobe_shader(), "lambent_distribution(h, LOBE)", {"h": h}, declarations=declared(lobe))
+    got = run_wgsl(SHADER, "lambent_distribution(h, LOBE)", {"h": h}, declarations=declared(lobe))
     assert_parity(got, lobes.distribution(components(h), lobe), rtol=1e-5)
 
 
@@ -84,28 +88,36 @@ def test_fresnel():
     cosine = np.linspace(0, 1, COUNT, dtype=np.float32)
     expected = np.stack([lobes.fresnel(cosine.astype(float), r0) for r0 in (0.03, 0.5, 1.0)], axis=-1)
     call = "lambent_fresnel(cosine, vec3f(.03, .5, 1.))"
-    assert_parity(run_wgsl(lobe_shader(), call, {"cosine": cosine}, components=3), expected, rtol=1e-5)
+    assert_parity(run_wgsl(SHADER, call, {"cosine": cosine}, components=3), expected, rtol=1e-5)
 
 
-def test_what_fresnel_lets_through():
+def test_under_fresnel():
     cosine = np.geomspace(1e-4, 1, COUNT, dtype=np.float32)
-    got = run_wgsl(lobe_shader(), "lambent_under_fresnel(cosine)", {"cosine": cosine})
+    got = run_wgsl(SHADER, "lambent_under_fresnel(cosine)", {"cosine": cosine})
     assert_parity(got, under_fresnel(cosine.astype(float)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("lobe", [LOBES[0], LOBES[-1]], ids=name_of)
-def test_pairs_that_a_lobe_does_not_see_are_zero(lobe):
+def test_pairs_outside_a_lobe_are_zero(lobe):
     wi, wo, _ = pairs(lobe)
     seen = lobes.pdf(components(wi), components(wo), lobe) > 0
     wi, wo = wi[seen], wo[seen]
     wi = wi * np.array([1, 1, -1], np.float32)
     for function in ("evaluate", "weight"):
         call = f"lambent_{function}(wi, wo, LOBE)"
-        got = run_wgsl(lobe_shader(), call, {"wi": wi, "wo": wo}, components=3, declarations=declared(lobe))
+        got = run_wgsl(SHADER, call, {"wi": wi, "wo": wo}, components=3, declarations=declared(lobe))
         assert (got == 0).all()
 
 
 def test_layout_is_the_shaders():
-    assert LOBE_DTYPE.itemsize == 48 and LOBE_DTYPE.fields["r0"][1] == 16 and LOBE_DTYPE.fields["alpha"][1] == 32
+    """Name and offset of every field, by WGSL's rules of alignment."""
+    body = re.search(r"struct LambentLobe \{(.*?)\}", SHADER, re.DOTALL)[1]
+    align, size = {"f32": 4, "u32": 4, "vec3f": 16}, {"f32": 4, "u32": 4, "vec3f": 12}
+    offsets, end = {}, 0
+    for name, kind in re.findall(r"^\s*(\w+): (\w+),", body, re.MULTILINE):
+        offsets[name] = -(-end // align[kind]) * align[kind]
+        end = offsets[name] + size[kind]
+    assert {name: offset for name, (_, offset, *_) in LOBE_DTYPE.fields.items()} == offsets
+    assert LOBE_DTYPE.itemsize == -(-end // 16) * 16 == 48
     row = packed_lobes([Lobe(side="transmission", distribution="ggx", mx=0.1, my=0.2, k=0.5)])[0]
     assert (row["side"], row["distribution"]) == (1, 1) and row["k"].tolist() == [0.5] * 3

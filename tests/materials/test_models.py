@@ -1,4 +1,4 @@
-"""Every model that discovery finds, by one harness. A declared deficiency is a strict xfail, undeclared when mended."""
+"""Every model that discovery finds, by one harness. A declared deficiency is a strict xfail."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The example in docs/adding-a-model.md is the model of that name, and its shader says the same."""
+"""The example in docs/adding-a-model.md is the model of that name, and its shader agrees with it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def phong():
 
 @pytest.mark.parametrize("language", ["python", "wgsl"])
 def test_the_example_is_the_file_itself(language):
-    """Which the tests of all models test."""
+    """The tests of all models test that file."""
     file = Path(package.__path__[0]) / {"python": "phong.py", "wgsl": "phong.wgsl"}[language]
     assert blocks(language)[0] == file.read_text(encoding="utf-8")
 
 
-def test_shader_says_the_same(phong):
+def test_the_shader_agrees(phong):
     rng = np.random.default_rng(0)
     z, phi = rng.uniform(-1, 1, (2, 5000)), rng.uniform(0, 2 * np.pi, (2, 5000))
     wi, wo = direction(np.arccos(z), phi).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Values of the models that are known by hand, in a limit, or from another implementation of the same paper."""
+"""Values of the models known by hand, in a limit, or from another implementation of the same paper."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lambent.core.directions import direction
+from lambent.materials.fresnel import conductor
 from lambent.materials.models import model_named
-from lambent.materials.models.cook_torrance import conductor
 from lambent.materials.models.published import MERL_CHANNELS, Published
 
 N = direction(0.0, 0.0)

@@ -1,4 +1,4 @@
-"""No direction returns more than arrives, and the looks change as little as two remedies allow."""
+"""No direction returns more than arrives, and the appearance changes as little as two remedies allow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_normalised_does_not_exceed_one():
     assert check_sampler(MaterialBSDF(tame), theta, phi, samples=200_000).albedo_quadrature <= 1.002
 
 
-def test_alpha_is_lowered_where_it_is_to_blame_and_k_where_it_is():
+def test_alpha_or_k_is_lowered_whichever_is_the_cause():
     less_alpha, less_k = with_less_alpha(STEEP), with_less_k(STEEP)
     assert less_alpha.lobes[0].k == STEEP.lobes[0].k and 0 < less_alpha.lobes[0].alpha < 1
     assert change(STEEP, less_alpha) < 0.7 * change(STEEP, less_k)
@@ -33,7 +33,7 @@ def test_alpha_is_lowered_where_it_is_to_blame_and_k_where_it_is():
     assert change(STEEP, STEEP) == 0
 
 
-def test_normalised_leaves_alone_what_needs_nothing():
+def test_normalised_keeps_a_passive_material():
     assert normalised(BRUSHED) is BRUSHED
 
 
@@ -44,12 +44,12 @@ def test_normalised_refuses_diffuse_terms_over_one():
 
 @pytest.fixture
 def one_azimuth(monkeypatch):
-    """Isotropic materials need no more."""
+    """Isotropic materials need one azimuth only."""
     monkeypatch.setattr(check, "PHI_DEG", (0.0,))
 
 
 @pytest.mark.usefixtures("one_azimuth")
-def test_the_account_names_what_changed_and_by_how_much():
+def test_the_report_names_the_changes():
     provenance = Provenance(source="steep.txt", notes=("first",))
     done = normalisation(STEEP.model_copy(update={"provenance": provenance}))
     assert done.needed and done.highest[0][0] > 1 >= done.highest[1][0]
@@ -69,6 +69,6 @@ def test_scaling_k_is_an_error_of_its_share():
     assert done.share["l1"] == pytest.approx(1 - now[0] / 1.6, rel=1e-6)
 
 
-def test_the_account_of_what_needs_nothing():
+def test_the_report_of_a_passive_material():
     done = normalisation(BRUSHED)
     assert not done.needed and done.after is BRUSHED and not done.changed and not done.errors

@@ -1,4 +1,4 @@
-"""Published parameters are read strictly, mean what their sources mean, and describe the materials they are of."""
+"""Published parameters are read strictly, evaluate as in their sources, and describe their materials."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_values_at_normal_incidence_by_hand(tmp_path):
     np.testing.assert_allclose(fits["d"].eval(N, N), [0.04 / (np.pi * 0.04)] * 3, rtol=1e-12)
 
 
-def test_values_aside_by_hand(tmp_path):
+def test_values_off_the_normal_by_hand(tmp_path):
     """wo = n, theta_i = 60 degrees: theta_h = theta_d = 30 degrees; grooves shadow nothing before 2 c30/2 > c30."""
     fits = read_fits(written(tmp_path, WARD, COOK))
     wi, bell = direction(np.pi / 3, 0.7), np.exp(-1 / 3 / 0.04) / 0.04

@@ -1,1 +1,1 @@
-"""Writers of materials and tables in other tools' formats, one file each; see registry.py."""
+"""Writers of materials and tables in other tools' formats, one file each; see contract.py."""

@@ -1,14 +1,14 @@
-"""What every writer of this package takes and says.
+"""The contract of the writers in this package.
 
 A writer is a module of this package with
 
-    NAME = "MERL binary"                # how it is shown
-    ENDINGS = (".binary",)              # file endings it is the natural choice for; may be shared with others
-    TAKES = ("table", "material")       # what it can be given
+    NAME = "MERL binary"                # the name to show
+    ENDINGS = (".binary",)              # file endings of the format; may be shared with others
+    TAKES = ("table", "material")       # subjects it accepts
     write(subject, path, progress) -> Cost
 
-The module's name is what `lambent convert --as` takes. A material given to a writer of tables is sampled; a table given
-to a writer of materials is refused: it has to be fitted first.
+`lambent convert --as` takes the module's name. A writer of tables samples a material; a writer of materials refuses a
+table, which has to be fitted first.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ Kind = Literal["table", "material"]
 
 @dataclass(frozen=True)
 class Cost:
-    """What a conversion loses.
+    """Losses of a conversion.
 
     Attributes
     ----------
     lost : tuple of str
-        In words: what the format cannot hold, and what stands in its place.
+        Sentences: what the format cannot hold, and what replaces it.
     errors : dict of float
-        Metric name -> E between the subject and what the written file says, in the metric's unit.
+        Metric name -> E between the subject and the written file, in the metric's unit.
     share : dict of float
-        The same as a share of the subject's own size under that metric (E against black).
+        The errors as shares of the subject's own size under that metric (E against black).
     """
 
     lost: tuple[str, ...] = ()
@@ -45,7 +45,7 @@ class Cost:
 
 
 class Writer(Protocol):
-    """What a module of this package offers."""
+    """A writer's module."""
 
     NAME: str
     ENDINGS: tuple[str, ...]

@@ -1,7 +1,7 @@
-"""A material as glTF 2.0: a sphere that wears it, for any viewer and engine.
+"""A material as glTF 2.0: a sphere with the material, for any viewer and engine.
 
-The metallic-roughness model with its thin-sheet extensions, exactly as they define it, is fitted to the material; the
-exact document travels along in the material's `extras`.
+The metallic-roughness model with its thin-sheet extensions, exactly as specified, is fitted to the material; the exact
+document is in the material's `extras`.
 
 Sources: glTF 2.0, appendix B; KHR_materials_anisotropy, _ior, _specular, _transmission, _diffuse_transmission. The
 roughness of the anisotropic facets is larger along the tangent turned by anisotropyRotation.
@@ -37,14 +37,15 @@ from lambent.materials.export.match import (
     three,
 )
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
+from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "glTF 2.0"
 ENDINGS = (".gltf", ".glb")
 TAKES: tuple[Kind, ...] = ("material",)
 
 IOR_MAX = 2.333  # diamond's; engines clamp beyond it
-F0_MAX = ((IOR_MAX - 1) / (IOR_MAX + 1)) ** 2
-SIMPLER = 0.98  # a blend of metal and dielectric has to be so much better than either to be taken
+F0_MAX = r0_of(IOR_MAX)
+SIMPLER = 0.98  # a blend of metal and dielectric is taken only below this share of either's remainder
 NEGLIGIBLE = 1e-4
 RADIUS_M = 0.1
 AROUND, ROWS = 96, 48
@@ -52,7 +53,7 @@ AROUND, ROWS = 96, 48
 
 @dataclass(frozen=True)
 class GltfMaterial:
-    """The parameters that a glTF material holds.
+    """The parameters of a glTF material.
 
     Attributes
     ----------
@@ -63,7 +64,7 @@ class GltfMaterial:
     strength : float
         anisotropyStrength.
     axis : "t" or "b"
-        The axis along which the facets are rougher; "b" is an anisotropyRotation of 90 degrees.
+        The axis of the rougher facets; "b" is an anisotropyRotation of 90 degrees.
     """
 
     base: Floats
@@ -79,12 +80,12 @@ class GltfMaterial:
     through: float = 0.0
 
     def eval(self, pairs: Pairs) -> Floats:
-        """f (N, C) in 1/sr at the pairs, as the specification defines it."""
+        """f (N, C) in 1/sr at the pairs, as specified."""
         narrow = self.roughness**2
         wide = narrow + (1 - narrow) * self.strength**2
         alphas = (wide, narrow) if self.axis == "t" else (narrow, wide)
         s5 = pairs.schlick[:, None]
-        f0 = np.minimum(((self.ior - 1) / (self.ior + 1)) ** 2 * self.specular_colour, 1)
+        f0 = np.minimum(r0_of(self.ior) * self.specular_colour, 1)
         fresnel = f0 + (1 - f0) * s5
         under = 1 - self.specular * fresnel.max(axis=1, keepdims=True)
         near, far = ~pairs.far, pairs.far
@@ -102,38 +103,33 @@ class GltfMaterial:
         return f
 
     def document(self, name: str) -> dict[str, Any]:
-        """The material's JSON; extensions stand where they say something."""
+        """The material's JSON, with the extensions whose values are not their defaults."""
         pbr: dict[str, Any] = {"baseColorFactor": [*three(self.base), 1.0], "roughnessFactor": self.roughness}
-        pbr["metallicFactor"] = self.metallic
-        more: dict[str, dict[str, Any]] = {}
-        if self.metallic < 1:
-            colour = three(self.specular_colour)
-            specular: dict[str, Any] = {"specularFactor": self.specular} if self.specular < 1 else {}
-            specular |= {"specularColorFactor": list(colour)} if colour != (1.0, 1.0, 1.0) else {}
-            if specular:
-                more["KHR_materials_specular"] = specular
-            if self.ior != 1.5:
-                more["KHR_materials_ior"] = {"ior": self.ior}
-            if self.transmission > 0:
-                more["KHR_materials_transmission"] = {"transmissionFactor": self.transmission}
-            if self.through > 0:
-                more["KHR_materials_diffuse_transmission"] = {
-                    "diffuseTransmissionFactor": self.through,
-                    "diffuseTransmissionColorFactor": list(three(self.through_colour)),
-                }
-        if self.strength > 0:
-            rotation = {} if self.axis == "t" else {"anisotropyRotation": math.pi / 2}
-            more["KHR_materials_anisotropy"] = {"anisotropyStrength": self.strength, **rotation}
+        pbr |= {"metallicFactor": self.metallic}
+        colour, dielectric = three(self.specular_colour), self.metallic < 1
+        specular: dict[str, Any] = {"specularFactor": self.specular} if self.specular < 1 else {}
+        specular |= {"specularColorFactor": list(colour)} if colour != (1.0, 1.0, 1.0) else {}
+        through: dict[str, Any] = {"diffuseTransmissionFactor": self.through}
+        through |= {"diffuseTransmissionColorFactor": list(three(self.through_colour))}
+        anisotropy = {"anisotropyStrength": self.strength}
+        anisotropy |= {} if self.axis == "t" else {"anisotropyRotation": math.pi / 2}
+        extensions = {
+            "specular": specular if dielectric else {},
+            "ior": {"ior": self.ior} if dielectric and self.ior != 1.5 else {},
+            "transmission": {"transmissionFactor": self.transmission} if dielectric and self.transmission > 0 else {},
+            "diffuse_transmission": through if dielectric and self.through > 0 else {},
+            "anisotropy": anisotropy if self.strength > 0 else {},
+        }
         material: dict[str, Any] = {"name": name, "pbrMetallicRoughness": pbr}
-        if more:
-            material["extensions"] = more
+        if any(extensions.values()):
+            material["extensions"] = {f"KHR_materials_{key}": value for key, value in extensions.items() if value}
         if self.transmission > 0 or self.through > 0:
             material["doubleSided"] = True
         return material
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
-    """Write a .gltf with embedded buffers, or a .glb, of a sphere that wears the material."""
+    """Write a .gltf with embedded buffers, or a .glb, of a sphere with the material."""
     material = material_of(subject)
     fitted, cost = likeness(material, progress)
     document, buffer = _sphere(fitted, material)
@@ -148,28 +144,24 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMaterial, Cost]:
-    """The glTF material that looks most like `material`, rounded as it is written, and what it costs."""
+    """The glTF material that looks most like `material`, rounded as in the file, and its cost."""
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     space = _Space(material, pairs.samples.f.shape[1])
-    ends = []
-    for metallic in (1.0, 0.0):
-        low, high = space.bounds(metallic)
-        x, total = match(
-            pairs, lambda x: space.read(x).eval(pairs), space.starts(metallic), (low, high), progress, NAME
-        )
-        ends.append((total, x))
+
+    def best(metallic: float | None, starts: list[Floats]) -> tuple[Floats, float]:
+        return match(pairs, lambda x: space.read(x).eval(pairs), starts, space.bounds(metallic), progress, NAME)
+
+    ends = [best(metallic, space.starts(metallic)) for metallic in (1.0, 0.0)]
     if not material.transmits:
-        low, high = space.bounds(None)
-        starts = [np.where(np.arange(len(x)) == 0, 0.5, x) for _, x in ends]
-        x, total = match(pairs, lambda x: space.read(x).eval(pairs), starts, (low, high), progress, NAME)
-        ends.append((total / SIMPLER**2, x))
-    fitted = space.read(min(ends, key=lambda end: end[0])[1], rounded=True)
+        x, total = best(None, [np.where(np.arange(len(x)) == 0, 0.5, x) for x, _ in ends])
+        ends.append((x, total / SIMPLER**2))
+    fitted = space.read(min(ends, key=lambda end: end[1])[0], rounded=True)
     check = pairs_of(material, CHECK_LOG2, seed=1)
     return fitted, cost_of(check, fitted.eval(check), _lost(material, fitted))
 
 
 class _Space:
-    """The parameters as the search moves them: roots of colours, the logarithm of the finer roughness."""
+    """The parameters in search coordinates: roots of colours, the logarithm of the finer roughness."""
 
     def __init__(self, material: Material, channels: int) -> None:
         self.material, self.channels = material, channels
@@ -203,7 +195,7 @@ class _Space:
         return low, high
 
     def starts(self, metallic: float) -> list[Floats]:
-        """The material's own numbers where they have a counterpart; one lobe cannot be two, so each lobe in turn."""
+        """A start per lobe, with the material's own numbers where they have a counterpart."""
         c = self.channels
         starts = []
         for lobe in self.material.lobes or (None,):
@@ -220,21 +212,14 @@ class _Space:
         return starts
 
     def read(self, x: Floats, rounded: bool = False) -> GltfMaterial:
-        """The glTF material of a parameter vector; `rounded` to what is written."""
+        """The glTF material of a parameter vector; `rounded` as in the file."""
         c = self.channels
         base, through_colour = x[6 : 6 + c] ** 2, x[self.f0.stop :] ** 2
         f0 = np.broadcast_to(x[self.f0] ** 2, base.shape)
         brightest = max(float(f0.max()), 1e-9)
-        root = math.sqrt(brightest)
-        numbers = {
-            "metallic": float(x[0]),
-            "roughness": float(np.sqrt(np.exp(x[1]))),
-            "strength": float(x[2]),
-            "specular": float(x[3]),
-            "transmission": float(x[4]),
-            "through": float(x[5]),
-            "ior": (1 + root) / (1 - root),
-        }
+        names = ("metallic", "roughness", "strength", "specular", "transmission", "through")
+        numbers = {name: float(value) for name, value in zip(names, x, strict=False)}
+        numbers |= {"roughness": float(np.sqrt(np.exp(x[1]))), "ior": ior_of(brightest)}
         colour = f0 / brightest if x[3] > 0 and brightest > 1e-9 else np.ones_like(f0)
         if rounded:
             numbers = {name: _near_ends(round(value, 6)) for name, value in numbers.items()}
@@ -243,11 +228,8 @@ class _Space:
 
 
 def _near_ends(value: float) -> float:
-    """0 or 1 where the value is as good as that."""
-    for end in (0.0, 1.0):
-        if abs(value - end) < NEGLIGIBLE:
-            return end
-    return value
+    """The value, or 0 or 1 within NEGLIGIBLE of those."""
+    return next((end for end in (0.0, 1.0) if abs(value - end) < NEGLIGIBLE), value)
 
 
 def _lost(material: Material, fitted: GltfMaterial) -> list[str]:
@@ -272,24 +254,22 @@ def _sphere(fitted: GltfMaterial, material: Material) -> tuple[dict[str, Any], b
     The sphere is brushed along its circles of latitude: the tangent is t, b = n x t.
     """
     normals, tangents, faces = _unit_sphere()
-    accessors: list[dict[str, Any]] = [
-        {"bufferView": 0, "componentType": 5123, "count": faces.size, "type": "SCALAR"},
-        {"bufferView": 1, "componentType": 5126, "count": len(normals), "type": "VEC3"},
-        {"bufferView": 2, "componentType": 5126, "count": len(normals), "type": "VEC3"},
-    ]
-    positions = (RADIUS_M * normals).astype(np.float32)
-    accessors[1] |= {"min": positions.min(axis=0).tolist(), "max": positions.max(axis=0).tolist()}
-    attributes = {"POSITION": 1, "NORMAL": 2}
-    parts = [faces.astype("<u2").tobytes(), positions.astype("<f4").tobytes(), normals.astype("<f4").tobytes()]
+    columns = {"POSITION": RADIUS_M * normals, "NORMAL": normals}
     if fitted.strength > 0:
-        attributes["TANGENT"] = 3
-        accessors.append({"bufferView": 3, "componentType": 5126, "count": len(normals), "type": "VEC4"})
-        parts.append(np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1).astype("<f4").tobytes())
-    views: list[dict[str, Any]] = []
-    start = 0
-    for i, part in enumerate(parts):
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(part), "target": 34962 if i else 34963})
-        start += len(part)
+        columns["TANGENT"] = np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1)
+    vectors = [column.astype("<f4") for column in columns.values()]
+    accessors = [{"bufferView": 0, "componentType": 5123, "count": faces.size, "type": "SCALAR"}] + [
+        {"bufferView": i, "componentType": 5126, "count": len(vector), "type": f"VEC{vector.shape[1]}"}
+        for i, vector in enumerate(vectors, 1)
+    ]
+    accessors[1] |= {"min": vectors[0].min(axis=0).tolist(), "max": vectors[0].max(axis=0).tolist()}
+    parts = [part.tobytes() for part in (faces.astype("<u2"), *vectors)]
+    starts = np.cumsum([0, *map(len, parts)]).tolist()
+    views = [
+        {"buffer": 0, "byteOffset": start, "byteLength": len(part), "target": 34962 if i else 34963}
+        for i, (start, part) in enumerate(zip(starts, parts, strict=False))
+    ]
+    attributes = {name: i for i, name in enumerate(columns, 1)}
     described = fitted.document(material.name)
     described["extras"] = {"lambent_material": material.model_dump(mode="json")}
     document: dict[str, Any] = {
@@ -301,7 +281,7 @@ def _sphere(fitted: GltfMaterial, material: Material) -> tuple[dict[str, Any], b
         "materials": [described],
         "accessors": accessors,
         "bufferViews": views,
-        "buffers": [{"byteLength": start}],
+        "buffers": [{"byteLength": starts[-1]}],
     }
     if described.get("extensions"):
         document["extensionsUsed"] = sorted(described["extensions"])
@@ -309,9 +289,9 @@ def _sphere(fitted: GltfMaterial, material: Material) -> tuple[dict[str, Any], b
 
 
 def _unit_sphere() -> tuple[Floats, Floats, NDArray[np.integer]]:
-    """Normals and tangents (V, 3) of a sphere, y up, and its triangles (T, 3); none of them is without area."""
+    """Normals and tangents (V, 3) of a sphere, y up, and its triangles (T, 3), all with an area."""
     theta, phi = np.linspace(0, np.pi, ROWS + 1), np.linspace(0, 2 * np.pi, AROUND + 1)
-    # Every triangle at a pole has a pole of its own, so that the tangent there is that of its sector.
+    # Every triangle at a pole has its own pole vertex, so that the tangent there is that of its sector.
     turn = np.tile(phi, (ROWS + 1, 1))
     turn[[0, -1]] += np.pi / AROUND
     sin_theta = np.sin(theta)[:, None]

@@ -1,7 +1,7 @@
-"""Gonio text, Lambent's own plain columns (measured/gonio_text.py): the tuples of a table as they are.
+"""Gonio text, Lambent's own plain columns (measured/gonio_text.py): the tuples of a gonio table, unchanged.
 
-What is no gonio table (MERL, RGL, LBNL, a material) is measured by the gonio-photometer in software, without noise,
-with directions closer about the mirror direction.
+Other subjects (MERL, RGL, LBNL, a material) are measured by the gonio-photometer in software, without noise, with finer
+steps about the mirror direction.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampled import Scatterer, read_back, scatterer_of
 from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.gonio_rows import Quantity
 from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.protocol import Quantity
 from lambent.materials.measured.synthetic import Setup, record
 
 NAME = "gonio text"
@@ -33,7 +33,7 @@ FINE_STEPS = 10  # to either side of the mirror direction
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
-    """Write the file and say what it lost."""
+    """Write the file and return its losses."""
     if isinstance(subject, GonioTable):
         write_gonio(Path(path), subject, QUANTITY)
         return read_back(subject, Path(path), ())
@@ -59,7 +59,7 @@ def _setup(scatterer: Scatterer) -> Setup:
 
 
 def _lobe_width_deg(scatterer: Scatterer) -> float:
-    """Angle from the mirror direction at which f has fallen to half, near theta_i = 30 degrees."""
+    """Angle from the mirror direction at which f falls to half, near theta_i = 30 degrees."""
     offset = np.geomspace(0.05, 30, 200)
     wi = np.broadcast_to(direction(np.radians(30), 0.0), (len(offset), 3))
     narrow = []

@@ -1,7 +1,7 @@
 """LBNL BSDF XML on the Klems full basis: 145 x 145 patches, both sides, reflection and transmission.
 
-Every pair of patches holds the mean of f over both, so that what leaves by a patch is what the subject sends there.
-Colour is written as Radiance's tools write and read it: Visible is the luminance, CIE-X and CIE-Z stand beside it.
+Every pair of patches holds the mean of f over both, so that each patch receives the light the subject sends there.
+Colour follows Radiance's tools: Visible is the luminance, beside CIE-X and CIE-Z.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.pairs import is_grey
 from lambent.materials.export.patch_mean import Means, patch_means
@@ -31,21 +31,21 @@ ENDINGS = (".xml",)
 TAKES: tuple[Kind, ...] = ("table", "material")
 
 BASIS = KLEMS_FULL
-_WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes a table is searched with
+_WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes of the proposal for a table
 _DIRECT_SHARE = 0.5
-_EXACT = 1e-4  # share of its size: the subject is a matrix of these patches itself
-_ASKED_DEG = (1.0, 20.0, 45.0, 70.0)  # theta, whether a table says anything of light from behind
+_EXACT = 1e-4  # share of the subject's size, below which it is a matrix of these patches itself
+_ASKED_DEG = (1.0, 20.0, 45.0, 70.0)  # theta at which a table is tested for light from behind
 _WAVELENGTHS = (("CIE-X", "X"), ("Visible", "Y"), ("CIE-Z", "Z"))
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd]")
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
-    """Write the file and say what it lost.
+    """Write the file and return its losses.
 
     Raises
     ------
     UserError
-        Where the subject scatters nothing: a file of zeros is none.
+        The subject scatters nothing; a file of zeros would be invalid.
     """
     scatterer = scatterer_of(subject)
     grey = scatterer.channels == 1 or (isinstance(subject, Material) and is_grey(subject))
@@ -58,7 +58,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     }
     lit = {name: values for name, values in blocks.items() if values.any()}
     if not lit:
-        raise UserError("scatters no light, and a file of zeros says nothing", file=scatterer.name)
+        raise UserError("scatters no light, so there is nothing to write", file=scatterer.name)
     write_text(Path(path), _document(scatterer.name, lit, grey))
     cost = read_back(subject, Path(path), _lost(lit, grey))
     if max(cost.share.values()) < _EXACT:
@@ -67,10 +67,10 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[Means, Means]:
-    """Of light from +z and from -z. A material is the same from both and reciprocal; so are its means, exactly."""
+    """Means of light from +z and from -z. A material is equal from both and reciprocal; so are its means, exactly."""
     if isinstance(subject, Material):
         means = patch_means(scatterer.eval, BASIS, MaterialBSDF(subject), 1, progress)
-        means = Means(_both_ways(means.reflected), _both_ways(means.transmitted))
+        means = Means(_reciprocal(means.reflected), _reciprocal(means.transmitted))
         return means, means
     proposal = MaterialBSDF(_search(scatterer.transmits))
     front = patch_means(scatterer.eval, BASIS, proposal, 1, progress)
@@ -80,32 +80,31 @@ def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[
     return front, patch_means(scatterer.eval, BASIS, proposal, -1, progress)
 
 
-def _both_ways(f: Floats) -> Floats:
-    """(outgoing, incident, C) and the same with every way taken backwards, half of each.
+def _reciprocal(f: Floats) -> Floats:
+    """The mean of f (outgoing, incident, C) and of f for reversed light.
 
-    Light that goes back along a way comes by the patch opposite to the one it left by.
+    Reversed light enters by the patch opposite to the one the light left by.
     """
     back = BASIS.opposite
     return np.asarray((f + np.swapaxes(f, 0, 1)[back][:, back]) / 2)
 
 
 def _search(transmits: bool) -> Material:
-    """A material with lobes of every width a measured one can have, to look for a table's light with."""
+    """A proposal for tables: a material with lobes of every width a measured one can have."""
     white, part = (1.0, 1.0, 1.0), (1 / len(_WIDTHS),) * 3
     lobes = [Lobe(distribution="ggx", mx=m, my=m, r0=white, k=part) for m in _WIDTHS]
     if transmits:
-        through = {"side": "transmission", "r0": (0.0, 0.0, 0.0)}
-        lobes += [lobe.model_copy(update=through) for lobe in lobes]
-    half = (0.25, 0.25, 0.25)
-    return Material(kd=half, kt_d=half if transmits else (0.0, 0.0, 0.0), lobes=tuple(lobes))
+        lobes += [lobe.model_copy(update={"side": "transmission", "r0": BLACK}) for lobe in lobes]
+    quarter = (0.25, 0.25, 0.25)
+    return Material(kd=quarter, kt_d=quarter if transmits else BLACK, lobes=tuple(lobes))
 
 
 def _lost_detail(front: Means) -> list[str]:
-    lost = ["whatever is finer than a patch, 10 to 15 degrees wide: its mean stands for it"]
+    lost = ["detail finer than a patch, 10 to 15 degrees wide: a patch holds its mean"]
     for name, values in (("reflected", front.reflected), ("transmitted", front.transmitted)):
-        share = _direct_share(values)
+        share = BASIS.direct_share(values.sum(axis=-1))
         if share > _DIRECT_SHARE:
-            lost.append(f"the shape of the highlight: {100 * share:.0f} % of what is {name} is in one patch")
+            lost.append(f"the shape of the highlight: {100 * share:.0f} % of the {name} light is in one patch")
     return lost
 
 
@@ -114,14 +113,8 @@ def _lost(lit: dict[str, Floats], grey: bool) -> tuple[str, ...]:
     if not grey:
         lost.append("colour in tools other than Radiance: they read Visible, the luminance, and not CIE-X and CIE-Z")
     if not any(name.endswith("Front") for name in lit):
-        lost.append("nothing is known of light from behind: Radiance takes the back as black, transmission as mutual")
+        lost.append("light from behind is unknown: Radiance takes the back as black, transmission as mutual")
     return tuple(lost)
-
-
-def _direct_share(f: Floats) -> float:
-    projected, total = BASIS.projected_sr, f.sum(axis=-1)
-    power = projected @ total @ projected
-    return float((projected**2) @ np.diagonal(total) / power) if power > 0 else 0.0
 
 
 def _document(name: str, blocks: dict[str, Floats], grey: bool) -> str:

@@ -1,32 +1,32 @@
-"""Find the parameters of another tool's model that look most like a material, and say what they miss."""
+"""Find the parameters of another tool's model that look most like a material, and name their differences."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
-from lambent.core.progress import Progress
+from lambent.core.plain import Triple, triple
+from lambent.core.progress import Progress, tracked
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import Pairs
-from lambent.materials.fitting.metrics import CUBEROOT, errors_of
+from lambent.materials.fitting.metrics import CUBEROOT, errors_and_shares, light_ratios
 
 MOST_EVALUATIONS = 60  # of the Jacobian, per start
 ALBEDO_BINS = 8
 ALBEDO_WEIGHT = 0.3  # of relative differences of albedo, beside those of f
-ALBEDO_TOLERANCE = 0.02  # relative; a larger difference is said in words
-ALPHA_MIN, ALPHA_MAX = 0.001, 1.0  # roughness the other tools take
+ALBEDO_TOLERANCE = 0.02  # relative; larger differences are reported
+ALPHA_MIN, ALPHA_MAX = 0.001, 1.0  # range of the other tools' roughness
 
 Model = Callable[[Floats], Floats]
 """f (N, C) in 1/sr at the pairs, of a parameter vector."""
 
 
 def material_of(subject: Subject) -> Material:
-    """The subject, or a `UserError` where it is a table."""
+    """The subject; raises `UserError` for a table."""
     if isinstance(subject, Material):
         return subject
     raise UserError("is a measurement, not a material", file=subject.info.file, hint="lambent fit makes one of it")
@@ -37,15 +37,15 @@ def match(
 ) -> tuple[Floats, float]:
     """Bounded least squares from every start: cube-root, cosine-weighted differences of f, and those of the albedos.
 
-    The albedos are there because a cube root sees so much of the tails that tails too long are paid for with light:
-    a metal would come out a third too dark. Parameters whose bounds are equal stay where they are.
+    Without the albedos, the cube root's weight on the tails would trade light for shorter tails: a metal would come out
+    a third too dark. Parameters whose bounds are equal stay.
 
     Returns
     -------
     best : (P,)
         Parameters of the best end point.
     total : float
-        What it leaves; 0 is perfect, a black surface leaves 1 + ALBEDO_WEIGHT.
+        Its sum of squares; 0 is perfect, a black surface has 1 + ALBEDO_WEIGHT.
     """
     from scipy.optimize import least_squares
 
@@ -53,8 +53,7 @@ def match(
     free = high > low
     differences = _Differences(pairs)
     ends = []
-    for i, start in enumerate(starts):
-        progress(i, len(starts), what)
+    for i, start in enumerate(tracked(starts, progress, what)):
         margin = 1e-6 * (high - low)
         x = np.clip(start, low + margin, high - margin)
 
@@ -65,12 +64,11 @@ def match(
             residual, x[free], bounds=(low[free], high[free]), x_scale="jac", max_nfev=MOST_EVALUATIONS, ftol=1e-5
         )
         ends.append((2 * float(found.cost), i, _moved(x, free, found.x)))
-    progress(len(starts), len(starts), what)
     total, _, best = min(ends, key=lambda end: end[:2])
     return best, total
 
 
-def _moved(x: Floats, free: NDArray[np.bool_], values: Floats) -> Floats:
+def _moved(x: Floats, free: Flags, values: Floats) -> Floats:
     x = x.copy()
     x[free] = values
     return x
@@ -103,53 +101,46 @@ class _Differences:
 
 
 def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
-    """Errors of what was written, f (N, C) at `pairs`, and the same as shares of the errors of a black surface."""
-    errors = errors_of(pairs.samples, f_written)
-    black = errors_of(pairs.samples, np.zeros_like(pairs.samples.f))
-    share = {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}
-    return Cost((*lost, *_light_lost(pairs, f_written)), errors, share)
-
-
-def _light_lost(pairs: Pairs, f_written: Floats) -> list[str]:
-    """Where the light returned, mean over the incident directions and channels, is not the material's."""
-    samples, lines = pairs.samples, []
-    cosine = samples.weight * np.abs(samples.wo[:, 2])
-    for side, here in (("reflected", ~pairs.far), ("transmitted", pairs.far)):
-        before, after = (float((cosine[here] @ f[here]).mean()) for f in (samples.f, f_written))
-        if before > 0 and abs(after - before) > ALBEDO_TOLERANCE * before:
-            lines.append(f"the {side} light is {after / before:.2f} times the material's")
-    return lines
+    """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's."""
+    light = [
+        f"the {'reflected' if side == 'reflection' else 'transmitted'} light is {ratio:.2f} times the material's"
+        for side, ratio in light_ratios(pairs.samples, f_written).items()
+        if abs(ratio - 1) > ALBEDO_TOLERANCE
+    ]
+    return Cost((*lost, *light), *errors_and_shares(pairs.samples, f_written))
 
 
 def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str]:
-    """What Smith-masked GGX facets with a Fresnel factor cannot say of the lobes."""
+    """Properties of the lobes that Smith-masked GGX facets with a Fresnel factor cannot express."""
     lost = []
     if material.kd_coupled and any(material.kd):
-        lost.append("the diffuse term is coupled to Fresnel in the way of the format, not in ours, or not at all")
+        lost.append("the diffuse term's coupling to Fresnel: the format has another one, or none")
     if not beckmann_kept and any(lobe.distribution == "beckmann" for lobe in material.lobes):
         lost.append("Beckmann lobes became GGX lobes, whose tails are longer; a fit of GGX lobes loses less")
     if material.lobes:
         alphas = ", ".join(f"{lobe.alpha:.2g}" for lobe in material.lobes)
-        lost.append(f"alpha ({alphas}): Smith's masking stands in place of the exponent of the cosines")
+        lost.append(f"alpha ({alphas}): the exponent of the cosines becomes Smith's masking")
     return lost
 
 
 def slope_start(lobe: Lobe, distribution: str) -> tuple[float, float]:
-    """Roughness along t and b to start from: a GGX peak is as wide as a Beckmann one of 1.2 times its roughness."""
+    """Start roughness along t and b: a GGX peak is as wide as a Beckmann one of 1.2 times its roughness."""
     scale = 0.8 if lobe.distribution == "beckmann" and distribution == "ggx" else 1.0
     mx, my = (float(np.clip(scale * m, ALPHA_MIN, ALPHA_MAX)) for m in (lobe.mx, lobe.my))
     return mx, my
 
 
 def brightness(lobe: Lobe) -> float:
-    """About the light the lobe returns, to rank lobes by."""
-    mean = float(
-        np.mean([k * (r if lobe.side == "reflection" else 1 - r) for k, r in zip(lobe.k, lobe.r0, strict=True)])
-    )
-    return mean + 0.02 * float(np.mean(lobe.k))
+    """Approximate light returned by the lobe, to rank lobes by."""
+    k, r0 = np.array(lobe.k), np.array(lobe.r0)
+    return float(np.mean(k * (r0 if lobe.side == "reflection" else 1 - r0))) + 0.02 * float(np.mean(k))
 
 
-def three(values: Floats) -> tuple[float, float, float]:
-    """RGB of (1,) or (3,) values, rounded to what is written."""
-    red, green, blue = (round(float(v), 6) for v in np.broadcast_to(values, 3))
-    return red, green, blue
+def rounded(values: Floats) -> Floats:
+    """Values (K,), rounded as in the written file."""
+    return np.array([round(float(v), 6) for v in values])
+
+
+def three(values: Floats) -> Triple:
+    """RGB of (1,) or (3,) values, rounded as in the written file."""
+    return triple(np.broadcast_to(rounded(values), 3))

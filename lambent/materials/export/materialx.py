@@ -1,8 +1,8 @@
-"""A material as MaterialX: a graph of the physically based library's nodes, one for each of our terms.
+"""A material as MaterialX: a graph of nodes of the physically based library, one for each of our terms.
 
-`generalized_schlick_bsdf` per lobe of reflection, `dielectric_bsdf` in mode T per lobe of transmission, a rough diffuse
-of roughness 0, a translucent node for the far side, all added, on a thin-walled surface. Roughness is GGX's alpha, not
-its root; the x axis of it is the tangent of the shape.
+The sum of a `generalized_schlick_bsdf` per lobe of reflection, a `dielectric_bsdf` in mode T per lobe of transmission,
+a rough diffuse of roughness 0 and a translucent node for the far side, on a thin-walled surface. Roughness is GGX's
+alpha, not its root; its x axis is the tangent of the shape.
 
 Sources: MaterialX Physically Based Shading Nodes 1.39; its GLSL closures for the Fresnel terms.
 """
@@ -10,26 +10,26 @@ Sources: MaterialX Physically Based Shading Nodes 1.39; its GLSL closures for th
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import sums
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.match import material_of, shape_losses, three
+from lambent.materials.export.match import material_of, rounded, shape_losses, three
 from lambent.materials.export.pairs import Pairs
 from lambent.materials.export.sums import Likeness, Part, Tool
+from lambent.materials.fresnel import ior_of, r0_of
 
 NAME = "MaterialX"
 ENDINGS = (".mtlx",)
 TAKES: tuple[Kind, ...] = ("material",)
 VERSION = "1.39"
-F0_RANGE = (0.02, 0.25)  # of the thin wall; beyond it renderers bend or lose the light
+F0_RANGE = (0.02, 0.25)  # of the thin wall; outside it renderers bend or lose the light
 
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
@@ -41,13 +41,13 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[Likeness, Cost]:
-    """The nodes' numbers that look most like `material`, rounded as they are written, and what they cost."""
+    """The nodes' numbers that look most like `material`, rounded as in the file, and their cost."""
     lost = shape_losses(material)
     if material.lobes:
         lost.append("some renderers add light that rough facets lose (energy compensation); it is not counted here")
     if material.transmission_lobes:
         lost.append("lobes of transmission are those of a thin wall; a renderer without thin walls bends the light")
-    return sums.likeness(material, TOOL, lost, _rounded, progress)
+    return sums.likeness(material, TOOL, lost, progress)
 
 
 def _eval(pairs: Pairs, part: Part) -> Floats:
@@ -79,24 +79,19 @@ def _colour_start(lobe: Lobe) -> Floats:
 
 
 def _f0(lobe: Lobe) -> float:
-    """Reflectance of the wall that a lobe of transmission passes, as its rounded ior gives it."""
-    ior = _ior(lobe)
-    return ((ior - 1) / (ior + 1)) ** 2
+    """Reflectance of the wall of a lobe of transmission, by its rounded ior."""
+    return r0_of(_ior(lobe))
 
 
 def _ior(lobe: Lobe) -> float:
-    root = float(np.sqrt(np.clip(np.mean(lobe.r0), *F0_RANGE)))
-    return round((1 + root) / (1 - root), 6)
+    return round(ior_of(np.clip(np.mean(lobe.r0), *F0_RANGE)), 6)
 
 
-def _rounded(part: Part) -> Part:
-    count = len(part.colour)
-    others = np.sqrt(np.array(three(part.others**2))[:count]) if len(part.others) else part.others
-    colour = np.array(three(part.colour))[:count]
-    return replace(part, mx=round(part.mx, 6), my=round(part.my, 6), colour=colour, others=others)
+def _rounded_others(roots: Floats) -> Floats:
+    return np.sqrt(rounded(roots**2))
 
 
-TOOL = Tool(NAME, _eval, _others, _colour_start, 1.0, lambda lobe: "ggx")
+TOOL = Tool(NAME, _eval, _others, _colour_start, 1.0, lambda lobe: "ggx", _rounded_others)
 
 
 def document(name: str, found: Likeness) -> str:
@@ -136,7 +131,7 @@ def _lobe_node(root: ET.Element, part: Part, name: str) -> str:
 
 
 def _node(root: ET.Element, kind: str, name: str, **inputs: float | str | tuple[float, ...]) -> str:
-    """Append a BSDF node; the number of values says an input's type."""
+    """Append a BSDF node; an input's type follows from its number of values."""
     node = ET.SubElement(root, kind, name=name, type="BSDF")
     for key, value in inputs.items():
         if isinstance(value, str):

@@ -1,7 +1,7 @@
-"""Direction pairs at which a material is compared with its likeness in another tool's model, and that model's facets.
+"""Direction pairs at which a material is compared with another tool's model, and that model's facets.
 
-The tools read today all have the same microfacets, D G / (4 (wi.n)(wo.n)) over a GGX (or Beckmann) distribution with
-Smith's masking; they differ in how they mask and in what they multiply. So the terms stand here once.
+All these tools have the same microfacets, D G / (4 (wi.n)(wo.n)) over a GGX (or Beckmann) distribution with Smith's
+masking; they differ in the form of the masking and in the factors.
 
 Sources: Walter et al. 2007, Microfacet models for refraction, eqs 25-28, 33, 34; Heitz 2014, Understanding the
 masking-shadowing function, eqs 72, 86, 99 (anisotropic, height-correlated).
@@ -13,30 +13,30 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, direction
+from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import direction, raised
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.document import Material
+from lambent.materials.document import Distribution, Material
+from lambent.materials.fresnel import schlick_weight
 from lambent.materials.lobes import Vector
 from lambent.materials.measured.protocol import GRAZING_DEG, LeftOut, MeasuredSamples, TableInfo
 
-FIT_LOG2, CHECK_LOG2 = 12, 14  # of the number of pairs: to fit with, and to state the errors with
+FIT_LOG2, CHECK_LOG2 = 12, 14  # of the number of pairs to fit, and to measure the errors
 Masking = Literal["correlated", "separable"]
-Distribution = Literal["ggx", "beckmann"]
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """A material's values at pairs of directions, and what every microfacet model needs to know of a pair.
+    """A material's values at pairs of directions, with the terms of all microfacet models.
 
     Attributes
     ----------
     samples : MeasuredSamples
-        wi, wo, f (1 channel where the material is grey) and the solid angle wo stands for.
+        wi, wo, f (1 channel for a grey material) and the solid angle of wo.
     wi, wo, h : component tuples of (N,)
-        Turned to the upper side (wo mirrored at the surface where it is below), and their half vector.
+        Directions on the upper side (wo mirrored at the surface where it is below), and their half vector.
     cos_d, schlick : (N,)
         wo.h and (1 - wo.h)^5.
     far : (N,) bool
@@ -49,7 +49,7 @@ class Pairs:
     h: Vector
     cos_d: Floats
     schlick: Floats
-    far: NDArray[np.bool_]
+    far: Flags
 
     def __len__(self) -> int:
         return len(self.samples)
@@ -57,7 +57,7 @@ class Pairs:
     def facets(
         self, mx: float, my: float, masking: Masking = "correlated", distribution: Distribution = "ggx"
     ) -> Floats:
-        """(N,) D G / (4 cos_i cos_o) in 1/sr, without Fresnel; of the transmitting lobe where wo is on the far side."""
+        """(N,) D G / (4 cos_i cos_o) in 1/sr, without Fresnel; of the mirrored pair where wo is on the far side."""
         hz2 = self.h[2] ** 2
         slope2 = ((self.h[0] / mx) ** 2 + (self.h[1] / my) ** 2) / hz2
         tails = np.exp(-slope2) if distribution == "beckmann" else (1 + slope2) ** -2.0
@@ -83,7 +83,7 @@ def _beckmann_lambda(slope2: Floats) -> Floats:
 
 
 def is_grey(material: Material) -> bool:
-    """Whether all coefficients are the same in the three channels."""
+    """Whether all coefficients are equal in the three channels."""
     triples = [material.kd, material.kt_d, *(rgb for lobe in material.lobes for rgb in (lobe.k, lobe.r0))]
     return all(len(set(rgb)) == 1 for rgb in triples)
 
@@ -93,15 +93,15 @@ def is_isotropic(material: Material) -> bool:
 
 
 def pairs_of(material: Material, log2_count: int, seed: int) -> Pairs:
-    """Pairs spread as a measurement spreads them: theta_i even up to the grazing limit, wo over both sides.
+    """Pairs spread as in a measurement: theta_i even up to the grazing limit, wo over both sides.
 
-    Half of the wo are uniform in solid angle, half follow the material's own lobes, so that no peak is missed; the
-    weight of a pair is the solid angle it stands for, as in a measured table.
+    Half of the wo are uniform in solid angle, half follow the material's own lobes, so that no peak is missed. A pair's
+    weight is the solid angle of wo, as in a measured table.
 
     Parameters
     ----------
     log2_count : int
-        2^log2_count pairs are drawn; those that end beyond the grazing limit are left out.
+        2^log2_count pairs are drawn; those beyond the grazing limit are left out.
     """
     from scipy.stats import qmc
 
@@ -123,9 +123,8 @@ def pairs_of(material: Material, log2_count: int, seed: int) -> Pairs:
 
 
 def pairs_from(samples: MeasuredSamples) -> Pairs:
-    """The same of any tuples with wi above the surface."""
-    wi, (x, y, z) = components(samples.wi), components(samples.wo)
-    wo = (x, y, np.abs(z))
+    """Pairs of any tuples with wi above the surface."""
+    wi, wo = components(samples.wi), components(raised(samples.wo))
     h = lobes.half_vector(wi, wo)
     cos_d = lobes.dot(wo, h)
-    return Pairs(samples, wi, wo, h, cos_d, np.maximum(1 - cos_d, 0.0) ** 5, np.asarray(z < 0))
+    return Pairs(samples, wi, wo, h, cos_d, schlick_weight(cos_d), samples.transmitted)

@@ -1,9 +1,9 @@
-"""Means of f over pairs of patches of an angle basis: what a matrix of patches has to hold to keep the energy.
+"""Means of f over pairs of patches of an angle basis, with which a matrix of patches keeps the energy.
 
-The mean is over projected solid angle, of the patch the light comes by and of the one it leaves by. A lobe can be far
-narrower than a patch, and a dim patch is rarely met by any lobe; so directions are drawn both evenly within every patch
-and from a BSDF's own lobes, and weighed by the sum of both densities (Veach & Guibas 1995, the balance heuristic). Per
-pair the smallest value met is taken out first: what is constant comes out exactly.
+The mean is over the projected solid angle of the incident and the outgoing patch. A lobe can be far narrower than a
+patch, and a dim patch is rarely met by any lobe; directions are therefore drawn both evenly within every patch and from
+a BSDF's own lobes, and weighted by the sum of both densities (Veach & Guibas 1995, the balance heuristic). Per pair the
+smallest value found is subtracted first, so that a constant comes out exactly.
 """
 
 from __future__ import annotations
@@ -13,55 +13,45 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.directions import Floats
-from lambent.core.progress import Progress
+from lambent.core.arrays import Floats, Indices
+from lambent.core.directions import FLIP_Z, HALF_TURN, raised
+from lambent.core.progress import Progress, tracked
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.lobes import COS_MIN
-from lambent.materials.measured.klems import OUTSIDE, AngleBasis, Indices
+from lambent.materials.measured.klems import OUTSIDE, AngleBasis
 
-EVEN_LOG2, LOBES_LOG2 = 3, 13  # of the directions per pair of patches, and per incident patch and its lobes
-_DOWN, _HEADING = np.array((1.0, 1.0, -1.0)), np.array((-1.0, -1.0, 1.0))
+EVEN_LOG2, LOBES_LOG2 = 3, 13  # of the directions per pair of patches, and per incident patch from lobes
 
 Evaluate = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True)
 class Means:
-    """f in 1/sr, (outgoing patches, incident patches, C) each."""
+    """Mean f in 1/sr, (outgoing patches, incident patches, C) each."""
 
     reflected: Floats
     transmitted: Floats
 
 
-def patch_means(
-    evaluate: Evaluate,
-    basis: AngleBasis,
-    proposal: MaterialBSDF,
-    side: int,
-    progress: Progress,
-) -> Means:
-    """Means over all pairs of patches, of light from one side of the sheet.
+def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, progress: Progress) -> Means:
+    """Means over all pairs of patches, for light from one side of the sheet.
 
     Parameters
     ----------
     evaluate : callable
         f (N, C) of wi and wo (N, 3), on any side.
     proposal : MaterialBSDF
-        Whose lobes are where f is large; the nearer, the less noise.
+        Proposal with lobes where f is large; the nearer, the less noise.
     side : +1 or -1
-        The side wi is on.
+        The side of wi.
     """
-    columns = []
-    for i in range(basis.count):
-        progress(i, basis.count, "averaging over patches")
-        columns.append(_column(evaluate, basis, proposal, side, i))
-    progress(basis.count, basis.count, "averaging over patches")
-    whole = np.stack(columns, axis=1)
+    patches = tracked(range(basis.count), progress, "averaging over patches")
+    whole = np.stack([_column(evaluate, basis, proposal, side, i) for i in patches], axis=1)
     return Means(whole[: basis.count], whole[basis.count :])
 
 
 def _column(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, i: int) -> Floats:
-    """(2 outgoing patches, C) means of one incident patch: of all patches reflected, then of all transmitted."""
+    """(2 outgoing patches, C) means of one incident patch: all patches of reflection, then all of transmission."""
     wi, wo, patch = _directions(basis, proposal, i)
     cosine = np.abs(wo[:, 2])
     density = (1 << EVEN_LOG2) / basis.projected_sr[patch] + (1 << LOBES_LOG2) * proposal.pdf(wo, wi) / cosine
@@ -75,17 +65,17 @@ def _column(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side:
 
 
 def _directions(basis: AngleBasis, proposal: MaterialBSDF, i: int) -> tuple[Floats, Floats, Indices]:
-    """wi (N, 3) in patch i of the upper side, wo (N, 3) on both, and the outgoing patch (N,) each belongs to."""
+    """wi (N, 3) in patch i of the upper side, wo (N, 3) on both sides, and the outgoing patch (N,) of each."""
     from scipy.stats import qmc
 
     patch = np.repeat(np.tile(np.arange(basis.count), 2), 1 << EVEN_LOG2)
     u = qmc.Sobol(4, rng=2 * i).random_base2(int(len(patch) - 1).bit_length())[: len(patch)]
     v = qmc.Sobol(5, rng=2 * i + 1).random_base2(LOBES_LOG2)
-    wi = basis.points(np.full(len(u) + len(v), i), np.concatenate([u, v[:, :4]])[:, :2]) * _HEADING
+    wi = basis.points(np.full(len(u) + len(v), i), np.concatenate([u, v[:, :4]])[:, :2]) * HALF_TURN
     even = basis.points(patch, u[:, 2:])
-    even[len(even) // 2 :] *= _DOWN
+    even[len(even) // 2 :] *= FLIP_Z
     lobes = proposal.sample(wi[len(u) :], v[:, 2:])
     wo = np.concatenate([even, lobes])
-    patch = np.concatenate([patch, basis.index(np.column_stack([lobes[:, :2], np.abs(lobes[:, 2])]))])
-    scattered = (np.abs(wo[:, 2]) > COS_MIN) & (patch != OUTSIDE)  # a lobe's sample can be lost at the horizon
+    patch = np.concatenate([patch, basis.index(raised(lobes))])
+    scattered = (np.abs(wo[:, 2]) > COS_MIN) & (patch != OUTSIDE)  # samples of lobes can end at the horizon
     return wi[scattered], wo[scattered], patch[scattered]

@@ -1,4 +1,4 @@
-"""Tables and materials alike as functions of two directions, for writers that ask them at the directions they need."""
+"""Tables and materials as functions of two directions, for writers that evaluate them at directions of their own."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import CHECK_LOG2, is_isotropic, pairs_of
-from lambent.materials.fitting.metrics import errors_of
+from lambent.materials.fitting.metrics import errors_and_shares
 from lambent.materials.measured.gonio import GonioTable, Symmetry
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.registry import load
@@ -24,17 +24,14 @@ LOST_TRANSMISSION = "transmission: the format holds reflection alone"
 
 @dataclass(frozen=True)
 class Scatterer:
-    """What a writer asks.
+    """A subject as a function.
 
     Attributes
     ----------
-    name : str
     eval : callable
         f (N, C) in 1/sr of wi and wo (N, 3), C as in `channels`.
     symmetry : str
-        isotropic, quadrant, half or none, as `GonioTable` has it.
-    transmits : bool
-    channels : int
+        isotropic, quadrant, half or none, as in `GonioTable`.
     """
 
     name: str
@@ -50,7 +47,7 @@ class Scatterer:
 
 
 def scatterer_of(subject: Subject) -> Scatterer:
-    """The subject as a function, and what is known of it."""
+    """The subject as a function, with its symmetry."""
     if isinstance(subject, Material):
         symmetry: Symmetry = "isotropic" if is_isotropic(subject) else "quadrant"
         return Scatterer(subject.name, MaterialBSDF(subject).eval, symmetry, subject.transmits, 3)
@@ -62,25 +59,22 @@ def scatterer_of(subject: Subject) -> Scatterer:
 
 
 def tuples_of(subject: Subject) -> MeasuredSamples:
-    """The measured tuples of a table, pairs spread like a measurement's of a material."""
+    """The measured tuples of a table; for a material, pairs spread as in a measurement."""
     if isinstance(subject, Material):
         return pairs_of(subject, CHECK_LOG2, seed=1).samples
     return subject.samples(MOST_TUPLES)
 
 
 def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
-    """What the file at `path`, read again, differs from the subject by, at the subject's own tuples.
+    """Differences of the file at `path`, read again, from the subject at the subject's own tuples.
 
     Raises
     ------
     UserError
-        Where the file is of no format that is read.
+        The file is of no readable format.
     """
     samples = tuples_of(subject)
     f = load(path).eval(samples.wi, samples.wo)
     if f.shape[1] != samples.f.shape[1]:
         f = f.mean(axis=1, keepdims=True) if samples.f.shape[1] == 1 else np.repeat(f, 3, axis=1)
-    errors = errors_of(samples, f)
-    black = errors_of(samples, np.zeros_like(f))
-    share = {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}
-    return Cost(lost, errors, share)
+    return Cost(lost, *errors_and_shares(samples, f))

@@ -1,34 +1,34 @@
-"""For tools whose materials are sums, like ours: diffuse terms stay diffuse terms, each lobe gets a counterpart."""
+"""Matching for tools whose materials are sums, like ours: diffuse terms stay, each lobe gets a counterpart."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost
-from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, slope_start, three
+from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, rounded, slope_start
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, pairs_of
 
 
 @dataclass(frozen=True)
 class Part:
-    """One lobe as the other tool has it.
+    """A lobe of the other tool.
 
     Attributes
     ----------
     lobe : Lobe
-        Ours that it stands for.
+        Our counterpart.
     mx, my : float
         Roughness along t and b of the tool's facets.
     colour : (C,)
-        What the lobe is multiplied with; of a reflection lobe in MaterialX, its reflectance at normal incidence.
+        Factor of the lobe; for a reflection lobe in MaterialX, its reflectance at normal incidence.
     others : (K,)
-        What else the tool's lobe has.
+        The tool's other parameters.
     """
 
     lobe: Lobe
@@ -40,20 +40,20 @@ class Part:
 
 @dataclass(frozen=True)
 class Tool:
-    """What a tool's lobes are like.
+    """A tool's model of lobes.
 
     Attributes
     ----------
-    name : str
     eval : callable
-        f (N, C) of a part at the pairs, both sides of it zero where it is not.
+        f (N, C) of a part at the pairs; zero on the other side.
     others : callable
-        (start, low, high), each (K,), of the parameters besides roughness and colour, of a lobe and C channels.
+        (start, low, high), each (K,), of the parameters besides roughness and colour, for a lobe and C channels.
     colour_start : callable
-        (C,) of a lobe, before limiting.
-    colour_max : float
+        Start colour (C,) for a lobe, before limiting.
     distribution : callable
         The tool's distribution for a lobe: "ggx" or "beckmann".
+    rounded_others : callable
+        The other parameters, rounded as in the file.
     """
 
     name: str
@@ -62,11 +62,17 @@ class Tool:
     colour_start: Callable[[Lobe], Floats]
     colour_max: float
     distribution: Callable[[Lobe], str]
+    rounded_others: Callable[[Floats], Floats]
+
+    def rounded(self, part: Part) -> Part:
+        """The part, rounded as in the file."""
+        colour, others = rounded(part.colour), self.rounded_others(part.others)
+        return replace(part, mx=round(part.mx, 6), my=round(part.my, 6), colour=colour, others=others)
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """A material as the other tool has it: diffuse coefficients (C,) of both sides, and a part per lobe."""
+    """A material of the other tool: diffuse coefficients (C,) of both sides, and a part per lobe."""
 
     kd: Floats
     kt_d: Floats
@@ -80,33 +86,26 @@ class Likeness:
         return f
 
 
-def likeness(
-    material: Material, tool: Tool, lost: Sequence[str], rounded: Callable[[Part], Part], progress: Progress
-) -> tuple[Likeness, Cost]:
-    """What looks most like the material, as written, and what it costs. Without lobes it is the material itself."""
+def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Progress) -> tuple[Likeness, Cost]:
+    """The closest material of the tool, rounded as in the file, and its cost; exact if there are no lobes."""
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     kd, kt_d = (np.array(rgb[: pairs.samples.f.shape[1]]) for rgb in (material.kd, material.kt_d))
     found = Likeness(kd, kt_d)
     if material.lobes or material.kd_coupled:
         spaces = [_diffuse_space(kd), _diffuse_space(kt_d), *(_space(lobe, tool, pairs) for lobe in material.lobes)]
         start, low, high = (np.concatenate(parts) for parts in zip(*spaces, strict=True))
-        x, _ = match(
-            pairs,
-            lambda x: _read(x, material, tool, pairs).eval(pairs, tool),
-            [start],
-            (low, high),
-            progress,
-            tool.name,
-        )
-        best = _read(x, material, tool, pairs)
-        kd, kt_d = (np.array(three(rgb))[: len(rgb)] for rgb in (best.kd, best.kt_d))
-        found = Likeness(kd, kt_d, tuple(rounded(part) for part in best.parts))
+
+        def model(x: Floats) -> Floats:
+            return _read(x, material, tool, pairs).eval(pairs, tool)
+
+        best = _read(match(pairs, model, [start], (low, high), progress, tool.name)[0], material, tool, pairs)
+        found = Likeness(rounded(best.kd), rounded(best.kt_d), tuple(tool.rounded(part) for part in best.parts))
     check = pairs_of(material, CHECK_LOG2, seed=1)
     return found, cost_of(check, found.eval(check, tool), lost)
 
 
 def _diffuse_space(coefficient: Floats) -> tuple[Floats, Floats, Floats]:
-    """Start and bounds of the roots of a diffuse coefficient; one that is 0 stays 0."""
+    """Start and bounds of the roots of a diffuse coefficient; 0 stays 0."""
     root = np.sqrt(np.minimum(coefficient, 1))
     return root, np.zeros_like(root), np.where(root > 0, 1.0, 0.0)
 

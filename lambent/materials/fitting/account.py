@@ -1,40 +1,36 @@
-"""What a fit has to say for itself: reference errors and warnings."""
+"""Reference errors and warnings of a fit."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import direction
+from lambent.core.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Material
+from lambent.materials.document import Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
-from lambent.materials.fitting.metrics import METRICS
-from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, Side, from_search, parameter
+from lambent.materials.fitting.metrics import METRICS, light_ratios
+from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
 from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
+from lambent.materials.fresnel import schlick_weight
 from lambent.materials.measured.protocol import MeasuredSamples
-
-Floats = NDArray[np.floating]
 
 AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
 ENERGY_TOLERANCE = 0.01
 TOTAL_TOLERANCE = 0.1  # of the light scattered to one side, over all tuples
-PEAK_SHARE = 0.001  # of the tuples, the brightest
+PEAK_SHARE = 0.001  # share of the tuples, the brightest, that form the peak
 LAMBERTIAN_STEPS = 30
 CHUNK = 1 << 14  # tuples evaluated at once
-SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach for r0 and ks to be told apart
+SCHLICK_SPAN = 0.1  # (1 - cos_d)^5 that the bright tuples must reach to determine both r0 and ks
 
 
 def lambertian_errors(samples: MeasuredSamples) -> dict[str, float]:
     """E of the best Lambertian surface under each metric, each with its own coefficient per side and channel."""
-    sides: tuple[Side, ...] = ("reflection", "transmission")
-    present = [side for side in sides if (samples.transmitted == (side == "transmission")).any()]
     totals = dict.fromkeys(METRICS, 0.0)
-    for side in present:
+    for side in samples.sides:
         problem = problem_of(samples, side, METRICS["l1"], "beckmann", False)
         for name, metric in METRICS.items():
             totals[name] += _lambertian_rest(replace_metric(problem, samples, metric))
@@ -42,7 +38,7 @@ def lambertian_errors(samples: MeasuredSamples) -> dict[str, float]:
 
 
 def _lambertian_rest(problem: Problem) -> float:
-    """What the best diffuse term alone leaves: the weighted median is exact for L1, least squares for the others."""
+    """The remainder of the best diffuse term alone: a weighted median, exact for L1; least squares otherwise."""
     if problem.metric.power == 1:
         best = np.pi * weighted_median(problem.measured, np.broadcast_to(problem.w * problem.c, problem.measured.shape))
         return problem.remaining(Mixture(best))
@@ -51,7 +47,7 @@ def _lambertian_rest(problem: Problem) -> float:
 
 
 def evaluate(material: Material, samples: MeasuredSamples) -> Floats:
-    """f (N, C) in 1/sr of the material at the tuples, with little memory."""
+    """f (N, C) in 1/sr of the material at the tuples, in chunks to save memory."""
     bsdf, channels = MaterialBSDF(material), samples.f.shape[1]
     value = np.empty_like(samples.f)
     for start in range(0, len(samples), CHUNK):
@@ -67,10 +63,13 @@ def warnings_of(
     found: Mapping[Side, tuple[Mixture, Sequence[Box]]],
     metric: str,
 ) -> tuple[str, ...]:
-    """One line per doubt about a fit; `model` is its f (N, C) at the tuples."""
+    """A line for every doubt about a fit; `model` is its f (N, C) at the tuples."""
     lines = [line for side, (one, boxes) in found.items() for line in _bounds(side, one.lobes, boxes)]
     lines += _peaks(samples, model, metric)
-    lines += _totals(samples, model)
+    for side, ratio in light_ratios(samples, model).items():
+        if abs(ratio - 1) > TOTAL_TOLERANCE:
+            word = "reflects" if side == "reflection" else "transmits"
+            lines.append(f"the model {word} {ratio:.2f} times the light that was measured")
     lines += _energy(material)
     lines += _ambiguity(samples, found)
     return tuple(lines)
@@ -115,19 +114,6 @@ def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
     return [f"the model reaches {share:.2f} of the measured peak{hint}"]
 
 
-def _totals(samples: MeasuredSamples, model: Floats) -> list[str]:
-    """Sides of which the model scatters noticeably less or more light in all than was measured."""
-    light = samples.weight * np.abs(samples.wo[:, 2])
-    lines = []
-    for here, word in ((~samples.transmitted, "reflects"), (samples.transmitted, "transmits")):
-        measured = float((light[here] @ samples.f[here]).sum())
-        if measured > 0:
-            share = float((light[here] @ model[here]).sum()) / measured
-            if abs(share - 1) > TOTAL_TOLERANCE:
-                lines.append(f"the model {word} {share:.2f} times the light that was measured")
-    return lines
-
-
 def _energy(material: Material) -> list[str]:
     theta = np.radians([0.0, 30.0, 45.0, 60.0, 75.0, 80.0])
     phi = np.radians([0.0, 90.0])
@@ -147,6 +133,6 @@ def _ambiguity(samples: MeasuredSamples, found: Mapping[Side, object]) -> list[s
         cos_d = np.sqrt(np.maximum((1 + np.sum(samples.wi * samples.wo, axis=1)) / 2, 0))
         near = ~samples.transmitted
         brightest = np.argsort(samples.f[near].mean(axis=1))[-max(int(0.02 * near.sum()), 10) :]
-        if ((1 - cos_d[near][brightest]) ** 5).max() < SCHLICK_SPAN:
+        if schlick_weight(cos_d[near][brightest]).max() < SCHLICK_SPAN:
             lines.append("ks and r0: only their product is well determined, no bright tuple is near grazing")
     return lines

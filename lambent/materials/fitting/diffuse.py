@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Floats
 
 BIN = 0.02  # bin width in ln f: finer than the 2 % noise of a good gonio-photometer
 SMOOTH_BINS = 3.0  # standard deviation of the smoothing, in bins, so that noise does not split the peak
-FLOOR = 1e-4 / np.pi  # f of a diffuse coefficient of 1e-4; what lies below counts as none
-FLOOR_SHARE = 0.2  # of the mode's density: as much as may be left below it (table noise, a gonio-photometer's dark rim)
+FLOOR = 1e-4 / np.pi  # f of a diffuse coefficient of 1e-4; smaller values count as 0
+FLOOR_SHARE = 0.2  # of the mode's density: the most allowed below it (table noise, a gonio-photometer's dark rim)
 LOWEST_SHARE = 0.25  # the mode is sought among the lowest quarter of the values, see `diffuse_mode`
 
 
 def diffuse_mode(f: Floats, weight: Floats) -> float:
-    """kd (dimensionless) of one channel: pi times the value that most of the measured directions share.
+    """kd (dimensionless) of one channel: pi times the most frequent value of the measured directions.
 
     The histogram is over ln f, because values span five decades and noise is relative to them; tuples count by
     `weight`, so that a table sampled densely around its peak gives the same mode as an even one. Lobes only add to the
-    diffuse term, so no more than `LOWEST_SHARE` of the weight may lie below the mode: the plateau of a wide lobe is not
-    mistaken for it. Where more than that share scatters nothing, kd is 0; fewer zeros than that (a channel clipped at
-    the edge of the gamut, sensor noise) say nothing about the mode. The density has to fall off below the
-    mode (`_is_floor`), otherwise kd is 0: the values of a lobe without a diffuse term spread evenly over ln f.
+    diffuse term, so at most `LOWEST_SHARE` of the weight may lie below the mode; a wide lobe's plateau is thus not
+    mistaken for it. If more than that share scatters nothing, kd is 0; fewer zeros (a channel clipped at the edge of
+    the gamut, sensor noise) do not affect the mode. The density must fall off below the mode (`_is_floor`), otherwise
+    kd is 0: values of a lobe without a diffuse term spread evenly over ln f.
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ def diffuse_mode(f: Floats, weight: Floats) -> float:
 
 
 def _is_floor(share: Floats, mode: int, peak: float) -> bool:
-    """Whether next to nothing lies below the mode: the mean density one to two and a half units of ln f below it."""
+    """Whether the density is low one to two and a half units of ln f below the mode."""
     near, far = int(1 / BIN), int(2.5 / BIN)
     below = share[max(mode - far, 0) : max(mode - near, 0)].sum() / (far - near)
     return bool(below < FLOOR_SHARE * peak)

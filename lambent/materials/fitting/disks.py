@@ -1,21 +1,18 @@
-"""Disks and in-plane curves of an incident direction, as numbers: what the plots and the window draw.
+"""Disks and in-plane curves of an incident direction, as numbers for the plots and the window.
 
 A disk shows the outgoing hemisphere from above, theta_o from the centre to the rim, turned so that the source is at the
-top; the far side is seen in the same azimuths. Its brightness is the cube root of the transfer probability.
+top; the far side is shown in the same azimuths. Its brightness is the cube root of the transfer probability.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import angles, direction
+from lambent.core.arrays import Flags
+from lambent.core.directions import Floats, angles, direction
 from lambent.materials.fitting.incidence import Incidence
 
-Floats = NDArray[np.floating]
-Flags = NDArray[np.bool_]
-
-NEAR_TUPLE = 1.3  # a pixel shows a tuple no further away than this times the distance to its fourth neighbour
+NEAR_TUPLE = 1.3  # a pixel shows the nearest tuple within this times the distance to its fourth neighbour
 LEAST_TUPLES = 8  # fewer on a side make no disk
 PLANE_DEG = 3.0  # tuples this close to the plane of incidence belong to its curve
 THETA_STEP_DEG = 0.75
@@ -27,7 +24,7 @@ def brightness(f: Floats, wo: Floats) -> Floats:
 
 
 def disk_directions(pixels: int, phi_deg: float, far: bool) -> tuple[Floats, Flags]:
-    """wo (pixels, pixels, 3) of a disk whose source has azimuth phi_deg, and which pixels are on it; row 0 on top."""
+    """wo (pixels, pixels, 3) of a disk whose source has azimuth phi_deg, and flags of its pixels; row 0 on top."""
     steps = (np.arange(pixels) + 0.5) / pixels * 2 - 1
     x, y = np.meshgrid(steps, -steps)
     radius = np.hypot(x, y)
@@ -37,7 +34,7 @@ def disk_directions(pixels: int, phi_deg: float, far: bool) -> tuple[Floats, Fla
 
 
 def measured_disk(entry: Incidence, far: bool, pixels: int) -> Floats:
-    """(pixels, pixels, C) brightness of the nearest tuple, NaN where none is near or the pixel is off the disk."""
+    """Brightness (pixels, pixels, C) of the nearest tuple, NaN where none is near or the pixel is off the disk."""
     from scipy.spatial import cKDTree
 
     wo, inside = disk_directions(pixels, entry.phi_deg, far)
@@ -66,7 +63,7 @@ def in_plane_directions(theta_i_deg: float, phi_deg: float, signed_deg: Floats, 
 def in_plane_tuples(entry: Incidence, far: bool) -> tuple[Floats, Floats]:
     """Signed theta_o (K,) in degrees from the side's normal, and p (K, C), of the tuples nearest the plane.
 
-    Per `THETA_STEP_DEG` the nearest tuple alone, and none that is further than `PLANE_DEG` from the plane.
+    One tuple per `THETA_STEP_DEG`, the nearest, and none further than `PLANE_DEG` from the plane.
     """
     theta, phi = angles(entry.wo)
     off = np.degrees(phi) - entry.phi_deg

@@ -1,4 +1,4 @@
-"""Fit the lobe model to a measured table: table in, material document and an honest account out."""
+"""Fit the lobe model to a measured table: table in, material document with its errors and warnings out."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.arrays import Floats
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.core.files import sha256_of
+from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
-from lambent.materials.document import Lobe, Material, Provenance
-from lambent.materials.fitting import account, gradient, several
+from lambent.materials.document import Distribution, Lobe, Material, Provenance, Side
+from lambent.materials.fitting import account, gradient, grid
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
@@ -25,17 +27,15 @@ from lambent.materials.fitting.parameters import (
     Box,
     Fixed,
     Ranges,
-    Side,
     box_of,
     check,
     parameter,
     per_channel,
     scalar,
 )
-from lambent.materials.fitting.problem import Candidate, Distribution, Mixture, Problem, problem_of
+from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
-Floats = NDArray[np.floating]
 Method = Literal["grid", "gradient"]
 METHODS: tuple[Method, ...] = ("grid", "gradient")
 DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
@@ -44,26 +44,26 @@ DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
     "best": ("beckmann", "ggx"),
 }
 MAX_LOBES = 4
-GAIN = 0.05  # share of E that one more lobe has to take off, where their number is not given
-DARK = 1e-5  # a diffuse coefficient below this is none
+GAIN = 0.05  # share of E that another lobe must remove, where the number of lobes is "auto"
+DARK = 1e-5  # a smaller diffuse coefficient counts as 0
 
 
 @dataclass(frozen=True)
 class FitResult:
-    """A fitted material and how good it is.
+    """A fitted material and its quality.
 
     Attributes
     ----------
     material : Material
-        With its provenance filled in.
+        With its provenance.
     errors, lambertian_errors : dict of float
         Metric name -> E of the material, and of the best Lambertian surface under that metric.
     seconds : float
         Wall-clock time.
     warnings : tuple of str
-        What the user should know before trusting the numbers.
+        Reasons to doubt the numbers.
     partial : bool
-        Whether the fit was cancelled and this is the best it had.
+        Whether the fit was cancelled and this is the best found so far.
     """
 
     material: Material
@@ -76,10 +76,10 @@ class FitResult:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of a fit; see `fit`."""
+    """The checked arguments of `fit`."""
 
     lobes: int
-    gain: float  # share of E that another lobe has to take off; 0 where the number is given
+    gain: float  # share of E that another lobe must remove; 0 where the number of lobes is given
     method: Method
     metric: Metric
     distributions: tuple[Distribution, ...]
@@ -92,7 +92,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Found:
-    """The models of one side with one lobe, two, ... that were finished, and the boxes their lobes were sought in."""
+    """The finished models of one side with one lobe, two, ..., and the boxes of their lobes."""
 
     problem: Problem
     boxes: tuple[Box, ...]
@@ -123,14 +123,14 @@ def fit(
     ----------
     table : MeasuredSamples or MeasuredTable
     lobes : int or "auto"
-        1 to 4 per side; "auto" adds lobes while each takes at least `gain` off the error.
+        1 to 4 per side; "auto" adds lobes while each removes at least the share `gain` of the error.
     method : "gradient" or "grid"
         Least squares from several starts, all lobes and the diffuse term jointly; or the thesis's hierarchical search,
-        lobe by lobe, with kd and kt_d read off the histogram (3.4.1).
+        lobe by lobe, with kd and kt_d from the histogram (3.4.1).
     metric : str
-        What is minimised, one of `METRICS`; the result names E under all of them.
+        The metric to minimise, one of `METRICS`; the result has E under all of them.
     distribution : "beckmann", "ggx" or "best"
-        Of the microfacets; "best" fits either and keeps, per side, the one that leaves less.
+        Of the microfacets; "best" fits either and keeps the better one per side.
     coupled : bool
         Whether the diffuse reflection falls as Fresnel reflection rises (`Material.kd_coupled`).
     fix, ranges : mapping, optional
@@ -142,7 +142,7 @@ def fit(
     seed : int
         Of the choice of tuples; the same seed gives the same material.
     source : Path, optional
-        The measured file, to be hashed into the provenance.
+        The measured file, whose hash goes into the provenance.
     progress : Progress
         May raise `Cancelled` or KeyboardInterrupt: the best so far is returned, flagged partial.
 
@@ -150,16 +150,21 @@ def fit(
     ------
     UserError
         Unknown method, metric, distribution or parameter; impossible value; number of lobes out of range; a parameter
-        of transmission for a table without any.
+        of transmission for a table without transmission.
     """
     began = time.perf_counter()
-    task = _task(lobes, gain, method, metric, distribution, coupled, fix or {}, ranges or {}, schedule, seed)
+    count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
+    _check(count, gain, method, distribution)
+    check(fix, ranges, count)
+    share = gain if lobes == "auto" else 0.0
+    kinds = DISTRIBUTIONS[distribution]
+    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, schedule or Schedule(), seed)
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
     _check_sides(samples, task.fix, task.ranges)
     found: dict[Side, Found] = {}
     partial = False
     try:
-        for side in _sides(samples):
+        for side in samples.sides:
             _fit_side(samples, side, task, progress, found)
     except (Cancelled, KeyboardInterrupt):
         partial = True
@@ -196,46 +201,17 @@ def fit(
     )
 
 
-def _task(
-    lobes: int | Literal["auto"],
-    gain: float,
-    method: str,
-    metric: str,
-    distribution: str,
-    coupled: bool,
-    fix: Fixed,
-    ranges: Ranges,
-    schedule: Schedule | None,
-    seed: int,
-) -> Task:
-    if method not in METHODS:
-        hint = did_you_mean(method, METHODS)
-        raise UserError("unknown method", field="method", got=method, expected=", ".join(METHODS), hint=hint)
-    if distribution not in DISTRIBUTIONS:
-        hint, known = did_you_mean(distribution, DISTRIBUTIONS), ", ".join(DISTRIBUTIONS)
-        raise UserError("unknown distribution", field="distribution", got=distribution, expected=known, hint=hint)
+def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
+    known("method", method, METHODS, field="method")
+    known("distribution", distribution, DISTRIBUTIONS, field="distribution")
     if not 0 < gain < 1:
         raise UserError("share out of range", field="gain", got=gain, expected="between 0 and 1")
-    count = MAX_LOBES if lobes == "auto" else lobes
-    if not 1 <= count <= MAX_LOBES:
+    if not 1 <= lobes <= MAX_LOBES:
         raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}, or auto")
-    check(fix, ranges, count)
-    return Task(
-        count,
-        gain if lobes == "auto" else 0.0,
-        "grid" if method == "grid" else "gradient",
-        metric_named(metric),
-        DISTRIBUTIONS[distribution],
-        coupled,
-        fix,
-        ranges,
-        schedule or Schedule(),
-        seed,
-    )
 
 
 def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progress, found: dict[Side, Found]) -> None:
-    """Put the side's models into `found`, also those that are finished when `progress` raises."""
+    """Put the side's models into `found`, including those finished when `progress` raises."""
     channels = samples.f.shape[1]
     boxes = tuple(box_of(side, i, samples.info.isotropic, channels, task.fix, task.ranges) for i in range(task.lobes))
     diffuse = _diffuse(samples, side, task.fix)
@@ -246,7 +222,7 @@ def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progre
             found[side] = one
         report = _part(progress, side, number, len(task.distributions))
         if task.method == "grid":
-            several.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule, task.gain, one.models)
+            grid.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule, task.gain, one.models)
         else:
             bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
             gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed, task.gain, one.models)
@@ -256,15 +232,11 @@ def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progre
 
 
 def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
-    """The lobes by their roughness, where the user's restrictions do not tell them apart."""
+    """The model with its lobes sorted by roughness, if the user's restrictions are the same for all."""
     alike = all(np.array_equal((box.lo, box.hi), (boxes[0].lo, boxes[0].hi)) for box in boxes)
     alike = alike and all(box.k_limits == boxes[0].k_limits for box in boxes)
-    return replace(model, lobes=tuple(sorted(model.lobes, key=_area))) if alike else model
-
-
-def _area(lobe: Candidate) -> float:
-    mx, my, _, _ = lobe.shape
-    return float(mx * my)
+    by_area = sorted(model.lobes, key=lambda lobe: float(lobe.shape[0] * lobe.shape[1]))
+    return replace(model, lobes=tuple(by_area)) if alike else model
 
 
 def _part(progress: Progress, side: Side, number: int, parts: int) -> Progress:
@@ -277,20 +249,10 @@ def _part(progress: Progress, side: Side, number: int, parts: int) -> Progress:
 
 
 def _check_sides(samples: MeasuredSamples, fix: Fixed, ranges: Ranges) -> None:
-    """Raise `UserError` where a restriction is about transmission and the table has none."""
+    """Raise `UserError` for a restriction of transmission if the table has none."""
     far = [name for name in [*fix, *ranges] if name.startswith("t_") or name.startswith("kt")]
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
-
-
-def _sides(samples: MeasuredSamples) -> Sequence[Side]:
-    far = samples.transmitted
-    sides: list[Side] = []
-    if not far.all():
-        sides.append("reflection")
-    if far.any():
-        sides.append("transmission")
-    return sides
 
 
 def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
@@ -299,15 +261,13 @@ def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
     channels = samples.f.shape[1]
     if name in fix:
         return np.array(per_channel(fix[name], channels))
-    here = samples.transmitted if side == "transmission" else ~samples.transmitted
+    here = samples.on(side)
     weight = samples.weight[here] * np.abs(samples.wo[here, 2])
     return np.array([diffuse_mode(samples.f[here, c], weight) for c in range(channels)])
 
 
-def _diffuse_rgb(
-    side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found]
-) -> tuple[float, float, float]:
-    """kd or kt_d of the model found, of the histogram where the fit did not get so far."""
+def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found]) -> Triple:
+    """kd or kt_d of the model found, or of the histogram if the fit found none."""
     if side in found and found[side].models:
         diffuse = found[side].models[-1].diffuse
         return _rgb(np.where(diffuse < DARK, 0.0, diffuse) if task.method == "gradient" else diffuse)
@@ -321,38 +281,28 @@ def _document_lobes(side: Side, found: Found, task: Task) -> list[Lobe]:
 
 
 def _lobe(side: Side, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
+    names = [parameter(side, base, index) for base in SHAPE]
     mx, my, r0, alpha = (
-        scalar(fix[parameter(side, base, index)], base) if parameter(side, base, index) in fix else float(value)
-        for base, value in zip(SHAPE, candidate.shape, strict=True)
+        scalar(fix[name], base) if name in fix else float(value)
+        for name, base, value in zip(names, SHAPE, candidate.shape, strict=True)
     )
     if side == "transmission" and r0 < 2e-6:
         r0 = 0.0
-    return Lobe(
-        side=side,
-        distribution=distribution,
-        k=_rgb(candidate.k),
-        mx=mx,
-        my=my,
-        r0=(r0, r0, r0),
-        alpha=min(max(alpha, 0.0), 1.0),
-    )
+    k, alpha = _rgb(candidate.k), min(max(alpha, 0.0), 1.0)
+    return Lobe(side=side, distribution=distribution, k=k, mx=mx, my=my, r0=(r0, r0, r0), alpha=alpha)
 
 
-def _rgb(values: Floats) -> tuple[float, float, float]:
-    red, green, blue = (float(v) for v in (values if len(values) == 3 else np.repeat(values, 3)))
-    return red, green, blue
-
-
-def _errors_by_lobes(found: Found) -> list[float]:
-    """E of the side alone, with one lobe, two, ..."""
-    return [found.problem.remaining(model) ** (1 / found.problem.metric.power) for model in found.models]
+def _rgb(values: Floats) -> Triple:
+    return triple(np.broadcast_to(values, 3))
 
 
 def _by_lobes(found: dict[Side, Found]) -> list[str]:
+    """A line per side with several models: its own E with one lobe, two, ..."""
     lines = []
     for side, one in found.items():
         if len(one.models) > 1:
-            errors = ", ".join(f"{error:.4g}" for error in _errors_by_lobes(one))
+            power = one.problem.metric.power
+            errors = ", ".join(f"{one.problem.remaining(model) ** (1 / power):.4g}" for model in one.models)
             lines.append(f"{side}: {one.problem.metric.name} error {errors} with 1 to {len(one.models)} lobes")
     return lines
 

@@ -1,18 +1,15 @@
-"""Tuples of a table gathered by incident direction, as the plots show them."""
+"""Tuples of a table grouped by incident direction, for the plots."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import angles, direction
+from lambent.core.directions import Floats, angles, direction
 from lambent.materials.measured.protocol import MeasuredSamples
 
-Floats = NDArray[np.floating]
-
-MOST_ANGLES = 12  # more distinct angles than this are gathered in bins
+MOST_ANGLES = 12  # more distinct angles than this are grouped in bins
 THETA_CENTRES_DEG = np.array([2.5, 15.0, 30.0, 45.0, 60.0, 75.0])
 PHI_CENTRES_DEG = np.array([0.0, 90.0, 180.0, 270.0])  # every ring of a Klems basis has patches there
 BIN_HALF_WIDTH_DEG = 2.5
@@ -27,7 +24,7 @@ class Incidence:
     Attributes
     ----------
     theta_deg, phi_deg : float
-        Of wi; phi is 0 throughout an isotropic table, whose tuples are turned there.
+        Of wi; phi is 0 for an isotropic table, whose tuples are turned there.
     wi : (3,)
     wo : (N, 3)
     f : (N, C) in 1/sr
@@ -42,7 +39,7 @@ class Incidence:
     weight: Floats
 
     def albedo(self, far: bool) -> Floats:
-        """(C,) integral of f |cos theta_o| over the near or the far side; gaps are taken at the mean of the rest."""
+        """Integral (C,) of f |cos theta_o| over the near or the far side; gaps count as the mean of the rest."""
         here = (self.wo[:, 2] < 0) == far
         if not here.any():
             return np.zeros(self.f.shape[1])
@@ -51,17 +48,16 @@ class Incidence:
 
 
 def incidences(samples: MeasuredSamples) -> list[Incidence]:
-    """One entry per incident direction, by theta then phi; few tuples (below 16) make none.
+    """One entry per incident direction with at least 16 tuples, by theta then phi.
 
-    A table without incident directions of its own (MERL, Cornell) is gathered in bins of theta_i.
+    A table without incident directions of its own (MERL, Cornell) is grouped in bins of theta_i.
     """
     theta, phi = angles(samples.wi)
-    phi_o = angles(samples.wo)[1]
+    theta_o, phi_o = angles(samples.wo)
     if samples.info.isotropic:
         phi_o, phi = phi_o - phi, np.zeros_like(phi)
-    theta_o = np.arctan2(np.hypot(samples.wo[:, 0], samples.wo[:, 1]), samples.wo[:, 2])
     wo = direction(theta_o, phi_o)
-    phi = np.where(theta < np.radians(ROUND_DEG) / 2, 0.0, phi)  # has no meaning there
+    phi = np.where(theta < np.radians(ROUND_DEG) / 2, 0.0, phi)  # meaningless at the normal
     theta_key, phi_key = _keys(np.degrees(theta), THETA_CENTRES_DEG), _keys(np.degrees(phi), PHI_CENTRES_DEG)
     gathered = []
     for theta_deg in np.unique(theta_key[theta_key >= 0]):
@@ -76,7 +72,7 @@ def incidences(samples: MeasuredSamples) -> list[Incidence]:
 
 
 def _keys(angle_deg: Floats, centres_deg: Floats) -> Floats:
-    """The angle a tuple is filed under: rounded where there are few; where there are many, its bin's centre or -1."""
+    """The key angle of each tuple: the rounded angle if there are few, else its bin's centre or -1."""
     rounded = np.round(angle_deg / ROUND_DEG) * ROUND_DEG % 360
     if len(np.unique(rounded)) <= MOST_ANGLES:
         return rounded

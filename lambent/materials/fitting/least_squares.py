@@ -1,8 +1,8 @@
 """Damped Gauss-Newton on the shapes and coefficients of one side's model, with exact derivatives.
 
 Coefficients enter by their logarithms: they stay positive, and ln k trades linearly against ln r0, which is nearly
-free. L1 is minimised by reweighting: least squares with weights 1/|residual| has the same minimum. Steps obey the
-bounds: an unknown that would leave its interval stops at the end of it and the rest of the step is solved again.
+free. L1 is minimised by reweighting: least squares with weights 1/|residual| has the same minimum. Steps respect the
+bounds: an unknown that would leave its interval stops at its end, and the rest of the step is solved again.
 """
 
 from __future__ import annotations
@@ -11,18 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, MU, NU, Candidate, Mixture, Problem
 from lambent.materials.fitting.scale import TINY
 
-Floats = NDArray[np.floating]
-
-DAMPING = (1e-3, 1e7)  # at the start, and where no step downwards is left; shares of the normal matrix's diagonal
+DAMPING = (1e-3, 1e7)  # at the start, and at most; shares of the normal matrix's diagonal
 LEAST_RESIDUAL = 1e-3  # share of the transformed measurement (and of its mean) below which L1 is quadratic
 LONGEST_STEP = 2.0  # of any logarithm, because far from the optimum the model is not linear in it
-K_SPAN = 14.0  # ln k may move this far in one minimisation
+K_SPAN = 14.0  # range of ln k in one minimisation, to either side
 NOTHING = 1e-9  # a coefficient below this is 0
 SHAPE_AXES = range(MU, ALPHA + 1)
 COEFFICIENT = 4  # "axis" of an unknown that is ln k of a channel
@@ -43,16 +41,16 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Where the model of one side may go: a box per lobe; the diffuse coefficients where they are not given."""
+    """Search space of one side's model: a box per lobe, and whether the diffuse coefficients are free."""
 
     boxes: Sequence[Box]
     diffuse_free: bool
 
 
 def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_share: float) -> tuple[Mixture, float]:
-    """The model after at most `steps` steps downwards, and what it leaves (`Problem.remaining`).
+    """The model after at most `steps` steps downwards, and its remainder (`Problem.remaining`).
 
-    A step that lowers the error by less than `stop_share` of it is the last.
+    A step that lowers the error by less than the share `stop_share` is the last.
     """
     unknowns = _unknowns(bounds, start)
     error = problem.remaining(start)
@@ -77,7 +75,7 @@ def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_
 
 
 def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
-    """Where a damped step ends, the minimum of the damped quadratic within the bounds (by an active set)."""
+    """The end of a damped step: the minimum of the damped quadratic within the bounds (by an active set)."""
     diagonal = np.diag(matrix)
     damped = matrix + damping * np.diag(np.maximum(diagonal, 1e-12 * diagonal.max() + 1e-300))
     least, most = np.maximum(lo - x, -LONGEST_STEP), np.minimum(hi - x, LONGEST_STEP)
@@ -137,7 +135,7 @@ def _add_block(
 
 
 def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:
-    """What may move; a coefficient of 0 or a fixed one is no unknown."""
+    """The free coordinates; a coefficient that is 0 or fixed is none."""
     unknowns = []
     for index, (box, lobe) in enumerate(zip(bounds.boxes, start.lobes, strict=False)):
         for axis in SHAPE_AXES:

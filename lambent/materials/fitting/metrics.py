@@ -1,8 +1,8 @@
 """Error metrics between a measured table and a model, by name.
 
-Every metric is E = (mean over channels of sum_t w_t |T(c_t f_measured) - T(c_t f_model)|^p)^(1/p) over the tuples t
-that were measured: a weight w_t per tuple (its solid angle over the sum of all, so only ratios matter), a cosine c_t, a
-transform T and a power p. The search needs these four parts, not only the sum; that is why they are named here.
+Every metric is E = (mean over channels of sum_t w_t |T(c_t f_measured) - T(c_t f_model)|^p)^(1/p) over the measured
+tuples t, with a weight w_t per tuple (its solid angle over the sum of all, so only ratios matter), a cosine c_t, a
+transform T and a power p. The search needs these four terms, not only the sum.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.arrays import Floats
+from lambent.core.discovery import known
+from lambent.materials.document import Side
 from lambent.materials.measured.protocol import MeasuredSamples
 
-Floats = NDArray[np.floating]
-
-BLOCK = 8192  # tuples looked at together: what is computed of them stays in the processor's cache
+BLOCK = 8192  # tuples evaluated together, so that intermediate results stay in the processor's cache
 CUBEROOT_EPS = 1e-5  # keeps the slope of the cube root finite where nothing is scattered
 
 
@@ -38,8 +37,7 @@ class Metric:
     Attributes
     ----------
     name, unit, source : str
-        How it is called, the unit of E, and where it comes from.
-    power : 1 or 2
+        Name, unit of E, and publication.
     cosine : "wi" or "wo"
         Whose cosine multiplies f before the transform.
     weigh_cos_i : bool
@@ -71,7 +69,7 @@ class Metric:
         return w, cos_i if self.cosine == "wi" else np.abs(samples.wo[:, 2])
 
     def error(self, samples: MeasuredSamples, f_model: Floats) -> float:
-        """E of a model's f (N, C) in 1/sr at the tuples of `samples`, in `unit`."""
+        """E in `unit` of a model's f (N, C) in 1/sr at the tuples of `samples`."""
         w, c = self.terms(samples)
         total = 0.0
         for start in range(0, len(w), BLOCK):
@@ -108,13 +106,27 @@ METRICS: dict[str, Metric] = {metric.name: metric for metric in (L1, L2_NGAN, CU
 
 
 def metric_named(name: str) -> Metric:
-    """The metric of that name, or a `UserError` with the nearest known one."""
-    if name not in METRICS:
-        known = ", ".join(METRICS)
-        raise UserError("unknown metric", field="metric", got=name, expected=known, hint=did_you_mean(name, METRICS))
-    return METRICS[name]
+    """The metric of that name; raises `UserError` with the nearest known one."""
+    return METRICS[known("metric", name, METRICS, field="metric")]
 
 
 def errors_of(samples: MeasuredSamples, f_model: Floats) -> dict[str, float]:
     """E of a model's f (N, C) under every metric."""
     return {name: metric.error(samples, f_model) for name, metric in METRICS.items()}
+
+
+def light_ratios(samples: MeasuredSamples, f_model: Floats) -> dict[Side, float]:
+    """Light scattered to each side by a model with f (N, C), summed over the tuples, over the light measured there."""
+    light = samples.weight * np.abs(samples.wo[:, 2])
+    sums = {
+        side: [float((light[here] @ f[here]).sum()) for f in (f_model, samples.f)]
+        for side in samples.sides
+        for here in (samples.on(side),)
+    }
+    return {side: modelled / measured for side, (modelled, measured) in sums.items() if measured > 0}
+
+
+def errors_and_shares(samples: MeasuredSamples, f_model: Floats) -> tuple[dict[str, float], dict[str, float]]:
+    """`errors_of`, and the same as shares of the errors of a black surface; 0 where that error is 0."""
+    errors, black = errors_of(samples, f_model), errors_of(samples, np.zeros_like(samples.f))
+    return errors, {name: error / black[name] if black[name] > 0 else 0.0 for name, error in errors.items()}

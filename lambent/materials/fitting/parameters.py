@@ -1,7 +1,7 @@
-"""Names, ranges and the user's restrictions of what is fitted.
+"""Names and ranges of the fitted parameters, and the user's restrictions.
 
-Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From the second lobe of a side
-on the lobe's parameters carry its number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
+Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From a side's second lobe on,
+the parameters carry the lobe's number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
 """
 
 from __future__ import annotations
@@ -9,16 +9,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.plain import Triple
+from lambent.materials.document import SIDES, Side
 
-Floats = NDArray[np.floating]
-Side = Literal["reflection", "transmission"]
-Value = float | tuple[float, float, float]
+Value = float | Triple
 Fixed = Mapping[str, Value]
 Ranges = Mapping[str, tuple[float, float]]
 
@@ -26,7 +25,7 @@ SHAPE = ("mx", "my", "r0", "alpha")  # the axes of the search, in this order
 BOUNDS = {"mx": (0.003, 1.5), "my": (0.003, 1.5), "r0": (0.004, 1.0), "alpha": (0.0, 1.0)}
 LEGAL = {"mx": (0.001, 4.0), "my": (0.001, 4.0), "r0": (0.0, 1.0), "alpha": (0.0, 1.0)}
 LEGAL_COEFFICIENT = (0.0, 1e6)
-R0_FLOOR = 1e-6  # r0 is searched in its logarithm
+R0_FLOOR = 1e-6  # the search uses the logarithm of r0
 LOGARITHMIC = np.array([True, True, True, False])
 
 
@@ -49,24 +48,23 @@ def parameter(side: Side, base: str, index: int = 0) -> str:
 
 
 def known_parameters(lobes: int) -> list[str]:
-    """Every name that `fix` and `ranges` may hold for that many lobes a side."""
-    sides: tuple[Side, ...] = ("reflection", "transmission")
-    names = [parameter(side, base, i) for side in sides for i in range(lobes) for base in ("k", *SHAPE)]
+    """Every name that `fix` and `ranges` may hold for this many lobes per side."""
+    names = [parameter(side, base, i) for side in SIDES for i in range(lobes) for base in ("k", *SHAPE)]
     return ["kd", "kt_d", *names]
 
 
 @dataclass(frozen=True)
 class Box:
-    """Where one lobe is sought.
+    """Search space of one lobe.
 
     Attributes
     ----------
     lo, hi : (4,) float64
         Bounds in search coordinates; equal where the parameter is fixed.
     tied : bool
-        Whether my follows mx (isotropic).
+        Whether my equals mx (isotropic).
     k_limits : tuple of (float, float)
-        Interval of the coefficient, per channel.
+        Interval of the coefficient per channel.
     """
 
     lo: Floats
@@ -79,8 +77,8 @@ def box_of(side: Side, index: int, isotropic: bool, channels: int, fix: Fixed, r
     """The search box of a lobe under the user's restrictions.
 
     An isotropic table ties my to mx, unless the user restricts my. r0 of a transmission lobe is fixed at 0 unless the
-    user says otherwise: with Schlick's F the lobe (3.5) holds kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so that only
-    the product kt (1 - r0) can be measured, and kt then is that product.
+    user restricts it: with Schlick's F the lobe (3.5) has kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so that only the
+    product kt (1 - r0) can be measured, and kt then is that product.
     """
     restrictions = dict(fix)
     if side == "transmission" and parameter(side, "r0", index) not in {**fix, **ranges}:
@@ -107,14 +105,14 @@ def scalar(value: Value, name: str) -> float:
 
 
 def per_channel(value: Value, channels: int) -> tuple[float, ...]:
-    """A coefficient as one value per channel of the table."""
+    """A coefficient as one value per channel."""
     if not isinstance(value, tuple):
         return (float(value),) * channels
     return value if channels == 3 else (sum(value) / 3,) * channels
 
 
 def check(fix: Fixed, ranges: Ranges, lobes: int) -> None:
-    """Raise `UserError` where a name is unknown, a value illegal or a parameter both fixed and ranged."""
+    """Raise `UserError` if a name is unknown, a value illegal, or a parameter both fixed and ranged."""
     known = known_parameters(lobes)
     for name in [*fix, *ranges]:
         if name not in known:
@@ -129,7 +127,7 @@ def check(fix: Fixed, ranges: Ranges, lobes: int) -> None:
     for name, (lo, hi) in ranges.items():
         if name in ("kd", "kt_d"):
             raise UserError(
-                "the diffuse term is read off the histogram, it has no range", field=name, hint="fix it instead"
+                "diffuse terms come from the histogram and have no range", field=name, hint="fix it instead"
             )
         _check_value(name, lo)
         _check_value(name, hi)
@@ -145,7 +143,7 @@ def _check_value(name: str, value: float) -> None:
 
 
 def parse_fix(options: Iterable[str]) -> dict[str, Value]:
-    """{'mx': .1, 'kd': (.1, .2, .3)} of options such as 'mx=.1' and 'kd=.1,.2,.3'."""
+    """{'mx': .1, 'kd': (.1, .2, .3)} from options such as 'mx=.1' and 'kd=.1,.2,.3'."""
     fix: dict[str, Value] = {}
     for option in options:
         name, text = _split(option, "name=value")
@@ -157,7 +155,7 @@ def parse_fix(options: Iterable[str]) -> dict[str, Value]:
 
 
 def parse_ranges(options: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """{'mx': (.05, .3)} of options such as 'mx=.05:.3'."""
+    """{'mx': (.05, .3)} from options such as 'mx=.05:.3'."""
     ranges = {}
     for option in options:
         name, text = _split(option, "name=lo:hi")

@@ -1,4 +1,4 @@
-"""Pictures of a fit beside its measurement (thesis figures 3.11, 3.12, 3.14): polar plots, in-plane curves, albedo."""
+"""Plots of a fit beside its measurement (thesis figures 3.11, 3.12, 3.14): polar plots, in-plane curves, albedo."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import direction
+from lambent.core.directions import Floats, direction
 from lambent.core.files import atomic_path
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Material
+from lambent.materials.document import BLACK, Material
 from lambent.materials.fitting.disks import (
     brightness,
     disk_directions,
@@ -24,13 +24,9 @@ from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.fitting.metrics import Metric
 from lambent.materials.fitting.slices import Slice
 from lambent.materials.measured.protocol import MeasuredSamples
+from lambent.materials.plots import DISK_PIXELS, SOURCE, colours_of, draw_rim, draw_source, new_figure, white_of
 
-Floats = NDArray[np.floating]
-
-DISK_PIXELS = 96
-WHITE_PERCENTILE = 99.8  # of cube-root p over all disks, shown as white
-MEASURED, MODEL, SOURCE = "#1a7f37", "#c62828", "#ffb300"
-UNKNOWN = (0.66, 0.78, 0.93)  # shade of directions that were not measured
+MEASURED, MODEL = "#1a7f37", "#c62828"
 COLUMNS = 4
 LABELS = {"m": "$m_x = m_y$", "mx": "$m_x$", "my": "$m_y$", "r0": "$r_0$", "alpha": "$\\alpha$"}
 
@@ -41,7 +37,7 @@ def save_plots(samples: MeasuredSamples, material: Material, folder: Path, stem:
     Raises
     ------
     UserError
-        Where a file cannot be written.
+        A file cannot be written.
     """
     gathered = incidences(samples)
     figures = {
@@ -58,23 +54,13 @@ def save_plots(samples: MeasuredSamples, material: Material, folder: Path, stem:
     return paths
 
 
-def _figure(width: float, height: float) -> Any:
-    """A figure of its own Agg canvas: no global state, no window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: bool) -> Any:
     """Figure: disks of measured and model brightness, rows theta_i and columns phi_i.
 
-    With one phi_i alone (isotropic tables) theta_i runs along the columns and the measurement stands above the model,
-    otherwise left of it; the far side stands below the near one, seen in the same azimuths. The source is at the top of
-    every disk (theta_o from the centre to the rim); the bars are the brushing direction, the axis along which the
-    fitted lobe is narrower.
+    With a single phi_i (isotropic tables) theta_i runs along the columns and the measurement is above the model,
+    otherwise left of it; the far side is below the near one, in the same azimuths. The source is at the top of
+    every disk (theta_o from the centre to the rim); the bars are the brushing direction, along which the fitted lobe is
+    narrower.
     """
     thetas = sorted({entry.theta_deg for entry in gathered})
     phis = sorted({entry.phi_deg for entry in gathered})
@@ -83,14 +69,13 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
     rows = len(sides) if upright else len(thetas) * len(sides)
     columns = len(thetas) if upright else len(phis)
     drawn = {(e.theta_deg, e.phi_deg, far): _disks(e, material, far) for e in gathered for far in sides}
-    known = np.concatenate([disk[np.isfinite(disk)] for pair in drawn.values() for disk in pair])
-    white = max(float(np.percentile(known, WHITE_PERCENTILE)), 1e-12)
+    white = white_of(disk for pair in drawn.values() for disk in pair)
     size = min(1.5, 10 / columns) if upright else min(1.05, 5.2 / columns)
     if upright:
-        figure = _figure(columns * size + 1.2, 2 * rows * size + 1.3)
+        figure = new_figure(columns * size + 1.2, 2 * rows * size + 1.3)
         halves = figure.subfigures(2, 1)
     else:
-        figure = _figure(2 * columns * size + 1.6, rows * size + 1.2)
+        figure = new_figure(2 * columns * size + 1.6, rows * size + 1.2)
         halves = figure.subfigures(1, 2)
     for which, (half, title) in enumerate(zip(halves, ("measured", "model"), strict=True)):
         half.suptitle(title, fontsize=11)
@@ -127,14 +112,14 @@ def _legend(figure: Any, title: str, brushed: bool) -> None:
 
 
 def _brushing(material: Material) -> float | None:
-    """phi in degrees of the axis along which the first lobe is narrower; None for isotropic materials."""
+    """phi in degrees of the axis along which the first lobe is narrower; None for an isotropic material."""
     if not material.lobes or material.lobes[0].mx == material.lobes[0].my:
         return None
     return 0.0 if material.lobes[0].mx < material.lobes[0].my else 90.0
 
 
 def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Floats]:
-    """Measured and model brightness, each (pixels, pixels, 3), NaN where nothing is known; the source is at the top."""
+    """Measured and model brightness, each (pixels, pixels, 3), NaN where unknown, with the source at the top."""
     wo, inside = disk_directions(DISK_PIXELS, entry.phi_deg, far)
     model = brightness(MaterialBSDF(material).eval(np.broadcast_to(entry.wi, wo.shape), wo), wo)
     model = np.where(inside[..., None], model, np.nan)
@@ -142,25 +127,23 @@ def _disks(entry: Incidence, material: Material, far: bool) -> tuple[Floats, Flo
 
 
 def _show_disk(ax: Any, image: Floats, theta_deg: float, phi_deg: float, brushing_deg: float | None) -> None:
-    shown = np.where(np.isnan(image), UNKNOWN, np.clip(image, 0, 1))[_inside_pixels()]
-    drawn = ax.imshow(shown, extent=(-1, 1, -1, 1), interpolation="nearest")
-    drawn.set_clip_path(_circle(ax))
-    rim = np.linspace(0, 2 * np.pi, 128)
-    ax.plot(np.cos(rim), np.sin(rim), color="0.5", lw=0.6)
+    from matplotlib.patches import Circle
+
+    drawn = ax.imshow(colours_of(image)[_inside_pixels()], extent=(-1, 1, -1, 1), interpolation="nearest")
+    drawn.set_clip_path(Circle((0, 0), 1, transform=ax.transData))
+    draw_rim(ax)
     if brushing_deg is not None:
         turned = np.radians(brushing_deg - phi_deg + 90)
         for end in (turned, turned + np.pi):
-            ax.plot(
-                [1.02 * np.cos(end), 1.18 * np.cos(end)], [1.02 * np.sin(end), 1.18 * np.sin(end)], color="0.4", lw=2
-            )
-    ax.plot(0, theta_deg / 90, "o", ms=3.2, mfc=SOURCE, mec="black", mew=0.4)
-    ax.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22), aspect="equal")
+            ends = np.array([1.02, 1.18])
+            ax.plot(ends * np.cos(end), ends * np.sin(end), color="0.4", lw=2)
+    draw_source(ax, theta_deg, 1.22)
 
 
 def _inside_pixels() -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """For each pixel of a disk's square the one to show: itself, or its neighbour where it lies across the rim.
+    """For each pixel of a disk's square the one to show: itself, or its inner neighbour across the rim.
 
-    The circle then cuts the picture, not the pixels.
+    The circle then clips the image instead of whole pixels.
     """
     steps = (np.arange(DISK_PIXELS) + 0.5) / DISK_PIXELS * 2 - 1
     x, y = np.meshgrid(steps, steps)
@@ -169,22 +152,16 @@ def _inside_pixels() -> tuple[NDArray[np.integer], NDArray[np.integer]]:
     return row, column
 
 
-def _circle(ax: Any) -> Any:
-    from matplotlib.patches import Circle
-
-    return Circle((0, 0), 1, transform=ax.transData)
-
-
 def in_plane(gathered: Sequence[Incidence], material: Material) -> Any:
-    """Figure: the plane of incidence, one panel per theta_i for phi_i nearest 0 and 90 degrees; mean over channels.
+    """Figure: the plane of incidence, one panel per theta_i for the phi_i nearest 0 and 90 degrees; mean over channels.
 
-    theta_o is negative on the source's side; transmitted values are drawn over the angle from the far normal.
+    theta_o is negative on the source's side; transmission is drawn over the angle from the far normal.
     """
     phis = sorted({entry.phi_deg for entry in gathered})
     shown = sorted({min(phis, key=lambda p: abs(p - target)) for target in (0.0, 90.0)})
     entries = [entry for phi in shown for entry in gathered if entry.phi_deg == phi]
     rows = -(-len(entries) // COLUMNS)
-    figure = _figure(2.7 * COLUMNS, 2.1 * rows + 0.8)
+    figure = new_figure(2.7 * COLUMNS, 2.1 * rows + 0.8)
     axes = figure.subplots(rows, COLUMNS, squeeze=False)
     for ax in axes.flat[len(entries) :]:
         ax.set_axis_off()
@@ -216,7 +193,7 @@ def _curve(ax: Any, entry: Incidence, material: Material, far: bool) -> None:
 
 def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
     """Figure: reflectivity (and transmissivity) over theta_i, mean over channels and phi_i."""
-    figure = _figure(6.4, 3.6)
+    figure = new_figure(6.4, 3.6)
     ax = figure.subplots()
     thetas = sorted({entry.theta_deg for entry in gathered})
     x = np.linspace(0, 85, 18)
@@ -240,15 +217,14 @@ def albedo(gathered: Sequence[Incidence], material: Material) -> Any:
 
 def _one_side(material: Material, far: bool) -> Material:
     lobes = material.transmission_lobes if far else material.reflection_lobes
-    dark = {"kd" if far else "kt_d": (0.0, 0.0, 0.0)}
-    return material.model_copy(update={"lobes": lobes, **dark})
+    return material.model_copy(update={"lobes": lobes, "kd" if far else "kt_d": BLACK})
 
 
 def error_slices(drawn: Sequence[Slice], metric: Metric, name: str) -> Any:
     """Figure: E around the optimum of the lobe called `name` (thesis figure 3.9), one panel per pair of parameters."""
     from matplotlib.ticker import LogLocator
 
-    figure = _figure(4.6 * len(drawn), 4.0)
+    figure = new_figure(4.6 * len(drawn), 4.0)
     for ax, one in zip(figure.subplots(1, len(drawn), squeeze=False).flat, drawn, strict=True):
         low = float(one.error.min())
         levels = low * np.geomspace(1, max(float(one.error.max()) / max(low, 1e-300), 1.01), 14)

@@ -1,4 +1,4 @@
-"""One side of a table, prepared so that a lobe of any shape is a few multiplications per tuple.
+"""One side of a table, prepared so that a lobe of any shape takes a few multiplications per tuple.
 
 ln f_lobe / k = ln F + base + ln D' - alpha ln(cos_i cos_o)   (3.3-3.5), with base = -ln(4 pi hz^4 cos_d) and
 D' = exp(-q) / (mx my) of Beckmann, 1 / (mx my (1 + q)^2) of GGX, q = hx^2/hz^2/mx^2 + hy^2/hz^2/my^2.
@@ -9,26 +9,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.materials.bsdf import coupling
+from lambent.materials.document import Distribution, Side
 from lambent.materials.fitting.metrics import BLOCK, Metric
-from lambent.materials.fitting.parameters import Side, from_search
+from lambent.materials.fitting.parameters import from_search
 from lambent.materials.fitting.scale import Channel
+from lambent.materials.fresnel import schlick_weight
 from lambent.materials.measured.protocol import MeasuredSamples
 
-Floats = NDArray[np.floating]
-Distribution = Literal["beckmann", "ggx"]
 MU, NU, R0, ALPHA = range(4)  # axes of the search coordinates
 PER_TUPLE = ("slope_x2", "slope_y2", "base", "log_cosines", "schlick", "diffuse", "measured", "c")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A lobe: its place in the search (4,), its coefficient per channel (C,)."""
+    """A lobe: its search coordinates (4,) and its coefficient per channel (C,)."""
 
     coordinates: Floats
     k: Floats
@@ -49,7 +49,7 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Problem:
-    """What the model of one side has to explain.
+    """The data that one side's model has to fit.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Problem:
         return self.slope_x2 / (mx * mx) + self.slope_y2 / (my * my)
 
     def density(self, mx: float, my: float) -> Floats:
-        """(N,) the factor of a lobe that depends on mx and my."""
+        """(N,) the factor of a lobe that mx and my determine."""
         q = self.slope2(mx, my)
         logarithm = -2 * np.log1p(q) if self.distribution == "ggx" else -q
         return np.asarray(np.exp(self.base - np.log(mx * my) + logarithm))
@@ -101,7 +101,7 @@ class Problem:
         return np.asarray(self.density(mx, my) * fresnel * np.exp(-alpha * self.log_cosines))
 
     def log_derivatives(self, shape: Floats, tied: bool) -> tuple[Floats, Floats, Floats, Floats]:
-        """(N,) each: the derivatives of ln basis by ln mx (and by ln my at once where `tied`), ln my, ln r0, alpha."""
+        """(N,) each: derivatives of ln basis by ln mx (and ln my at once if `tied`), ln my, ln r0 and alpha."""
         mx, my, r0, _ = (float(v) for v in shape)
         x, y = self.slope_x2 * (2 / (mx * mx)), self.slope_y2 * (2 / (my * my))
         if self.distribution == "ggx":
@@ -119,7 +119,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> tuple[Problem, ...]:
-        """The tuples in pieces small enough that what is computed of each stays in the processor's cache."""
+        """The tuples in pieces whose intermediate results stay in the processor's cache."""
         return tuple(
             replace(self, **{name: getattr(self, name)[..., i : i + BLOCK] for name in (*PER_TUPLE, "w")})
             for i in range(0, len(self), BLOCK)
@@ -131,7 +131,7 @@ class Problem:
         return np.asarray(self.metric.transform(self.c * self.measured))
 
     def remaining(self, mixture: Mixture) -> float:
-        """The metric's sum over all tuples, averaged over channels, that the model leaves: E to the metric's power."""
+        """The metric's sum over all tuples, averaged over channels: E to the metric's power."""
         return sum(block._remaining(mixture) for block in self.blocks)
 
     def _remaining(self, mixture: Mixture) -> float:
@@ -139,7 +139,7 @@ class Problem:
         return float(np.mean((np.abs(difference) if self.metric.power == 1 else difference * difference) @ self.w))
 
     def channels(self, others: Mixture) -> tuple[Channel, ...]:
-        """What one more lobe has to explain, per channel: the rest, clamped so that it is asked for nothing below 0."""
+        """Data for one more lobe, per channel: the rest, clamped so that the lobe is never negative."""
         diffuse = others.diffuse[:, None].astype(self.diffuse.dtype) * self.diffuse
         rest = np.maximum(self.measured - (self.evaluate(others) - diffuse), diffuse) if others.lobes else self.measured
         return tuple(Channel(m, b, self.w, self.c) for m, b in zip(rest, diffuse, strict=True))
@@ -150,11 +150,11 @@ class Problem:
         return replace(self, **taken, w=w.astype(dtype))
 
     def thinned(self, counts: Sequence[int], seed: int, dtypes: Sequence[type]) -> list[Problem]:
-        """For each count about so many tuples that estimate the metric without bias.
+        """For each count, about that many tuples that estimate the metric without bias.
 
         Systematic sampling along the storage order: half of the density follows the metric's weight, half follows
-        weight times the transformed measurement, so that narrow peaks are met; each tuple's weight is divided by its
-        density. The same seed gives the same tuples.
+        weight times the transformed measurement, so that narrow peaks are sampled; each tuple's weight is divided by
+        its density. The same seed gives the same tuples.
         """
         if len(self) > min(counts):
             height = np.abs(self.metric.transform(self.c * self.measured.mean(axis=0))) ** self.metric.power
@@ -176,8 +176,8 @@ class Problem:
 def problem_of(
     samples: MeasuredSamples, side: Side, metric: Metric, distribution: Distribution, coupled: bool
 ) -> Problem:
-    """The tuples of one side; `coupled` chooses the diffuse term of `bsdf.coupling`."""
-    here = np.flatnonzero(samples.transmitted if side == "transmission" else ~samples.transmitted)
+    """The tuples of one side; `coupled` selects the diffuse term of `bsdf.coupling`."""
+    here = np.flatnonzero(samples.on(side))
     wi, wo = (w[here].T.astype(np.float64) for w in (samples.wi, samples.wo))
     cos_i, cos_o = np.abs(wi[2]), np.abs(wo[2])
     hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
@@ -193,7 +193,7 @@ def problem_of(
         hy * hy / hz2,
         -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d),
         np.log(np.maximum(cos_i * cos_o, 1e-12)),
-        (1 - cos_d) ** 5,
+        schlick_weight(cos_d),
         diffuse_basis(cos_i, cos_o, coupled and side == "reflection"),
         np.ascontiguousarray(samples.f[here].T.astype(np.float64)),
         w[here],
@@ -203,7 +203,7 @@ def problem_of(
 
 def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -> Problem:
     """The same tuples under another metric."""
-    here = samples.transmitted == (problem.side == "transmission")
+    here = samples.on(problem.side)
     w, c = metric.terms(samples)
     return replace(problem, metric=metric, w=w[here], c=c[here])
 

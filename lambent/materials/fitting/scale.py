@@ -6,14 +6,13 @@ exact minimiser; under the squared metrics Gauss-Newton steps in log k start fro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.materials.fitting.metrics import Metric
-
-Floats = NDArray[np.floating]
 
 TINY = 1e-30
 STEP_LIMIT = 1.5  # of ln k per Gauss-Newton step, because far from the optimum the model is not linear in ln k
@@ -21,7 +20,7 @@ STEP_LIMIT = 1.5  # of ln k per Gauss-Newton step, because far from the optimum 
 
 @dataclass(frozen=True)
 class Channel:
-    """What is to be explained in one channel: all (N,), f in 1/sr; w and c are the metric's terms."""
+    """Data of one channel, all (N,): f in 1/sr, and the metric's terms w and c."""
 
     measured: Floats
     background: Floats
@@ -50,7 +49,7 @@ def weighted_median(values: Floats, weights: Floats) -> Floats:
 def solve_scale(
     metric: Metric, channel: Channel, basis: Floats, limits: tuple[float, float] = (0.0, np.inf), steps: int = 5
 ) -> tuple[Floats, Floats]:
-    """Best coefficient of each candidate basis and the sum it leaves.
+    """The best coefficient of each candidate basis, and its remainder.
 
     Parameters
     ----------
@@ -76,6 +75,14 @@ def solve_scale(
     model = channel.c * (channel.background + k[:, None] * basis)
     difference = np.abs(metric.transform(channel.c * channel.measured) - metric.transform(model))
     return k, (difference if metric.power == 1 else difference * difference) @ channel.w
+
+
+def solve_coefficients(
+    metric: Metric, channels: Sequence[Channel], basis: Floats, limits: Sequence[tuple[float, float]], steps: int = 5
+) -> Floats:
+    """(C,) float64 coefficient of one basis (1, N) in every channel, within its limits; see `solve_scale`."""
+    pairs = zip(channels, limits, strict=True)
+    return np.array([solve_scale(metric, one, basis, interval, steps)[0][0] for one, interval in pairs], dtype=float)
 
 
 def _median_scale(channel: Channel, basis: Floats) -> Floats:

@@ -1,7 +1,7 @@
-"""How E runs around the optimum of a fit (thesis figure 3.9): over two parameters of a lobe, all else held.
+"""E around the optimum of a fit (thesis figure 3.9): over two parameters of a lobe, with all others fixed.
 
-Only the lobe's own coefficient moves along: at each point it is solved for again. A narrow round pit means that the
-table determines both parameters; a valley, that it determines a combination of them.
+Only the lobe's own coefficient is solved again at each point. A narrow round pit means that the table determines both
+parameters; a valley, that it determines a combination of them.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.progress import Progress, silent
+from lambent.core.arrays import Floats
+from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.metrics import Metric
 from lambent.materials.fitting.parameters import BOUNDS
@@ -19,11 +19,9 @@ from lambent.materials.fitting.problem import Problem, problem_of
 from lambent.materials.fitting.scale import Channel, solve_scale
 from lambent.materials.measured.protocol import MeasuredSamples
 
-Floats = NDArray[np.floating]
-
 STEPS = 33  # along each axis
 TUPLES = 6000
-REACH = 4.0  # mx and my are drawn from the optimum divided by it to the optimum times it
+REACH = 4.0  # mx and my range from the optimum divided by it to the optimum times it
 SOLVER_STEPS = 6
 
 
@@ -36,9 +34,9 @@ class Slice:
     across, down : str
         Names of the parameters.
     x, y : (K,)
-        Their values; logarithmic steps but of alpha.
+        Their values, in logarithmic steps except for alpha.
     error : (K, K)
-        E in the metric's unit, rows along y; estimated from some of the tuples, so compare within a slice.
+        E in the metric's unit, rows along y; estimated from some of the tuples, so comparable only within a slice.
     best : (float, float)
         The lobe's own values.
     """
@@ -62,8 +60,8 @@ def slices(
 ) -> list[Slice]:
     """The slices of lobe `index` of `material`: over (mx, my) and (r0, alpha).
 
-    An isotropic table holds one azimuth of wi, which cannot tell mx from my: both move as one, and (m, alpha) stands in
-    place of (mx, my). Of a lobe of transmission r0 cannot be told from kt, so its slice has a roughness in its place.
+    An isotropic table holds one azimuth of wi, which cannot distinguish mx from my: both move as one, and (m, alpha)
+    replaces (mx, my). For a lobe of transmission r0 cannot be separated from kt, so a roughness replaces r0.
     """
     lobe = material.lobes[index]
     problem, rest = _prepared(samples, material, index, metric)
@@ -89,7 +87,7 @@ def _axis(name: str, best: float, steps: int) -> Floats:
 
 
 def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: Metric) -> tuple[Problem, Floats]:
-    """Some tuples of the lobe's side, and f (C, N) there of everything but the lobe."""
+    """Some tuples of the lobe's side, and f (C, N) of everything but the lobe at those."""
     lobe = material.lobes[index]
     problem = problem_of(samples, lobe.side, metric, lobe.distribution, material.kd_coupled)
     problem = problem.thinned([TUPLES], 0, [np.float64])[0]
@@ -103,7 +101,7 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
 
 
 def _basis(problem: Problem, lobe: Lobe) -> Floats:
-    """(N,) f of the lobe with coefficient 1; of an r0 per channel the mean stands for all."""
+    """(N,) f of the lobe with coefficient 1 and the mean of r0 over the channels."""
     shape = np.array([lobe.mx, lobe.my, float(np.mean(lobe.r0)), lobe.alpha])
     return replace(problem, distribution=lobe.distribution).basis(shape)
 
@@ -113,19 +111,18 @@ def _slice(problem: Problem, rest: Floats, lobe: Lobe, plane: tuple[str, str], s
     own = {"mx": lobe.mx, "my": lobe.my, "r0": float(np.mean(lobe.r0)), "alpha": lobe.alpha, "m": lobe.mx}
     x, y = (_axis(name, own[name], steps) for name in plane)
     error = np.empty((len(y), len(x)))
-    for row, value in enumerate(y):
-        progress(row, len(y), f"error over {across} and {down}")
+    for row in tracked(range(len(y)), progress, f"error over {across} and {down}"):
+        value = y[row]
         basis = np.stack([problem.basis(_shape(own | {down: float(value), across: float(v)}, plane)) for v in x])
         totals = np.zeros(len(x))
         for measured, background in zip(problem.measured, rest, strict=True):
             channel = Channel(measured, background, problem.w, problem.c)
             totals += solve_scale(problem.metric, channel, basis, steps=SOLVER_STEPS)[1]
         error[row] = (totals / len(rest)) ** (1 / problem.metric.power)
-    progress(len(y), len(y), f"error over {across} and {down}")
     return Slice(across, down, x, y, error, (own[across], own[down]))
 
 
 def _shape(values: dict[str, float], plane: tuple[str, str]) -> Floats:
-    """mx, my, r0, alpha of the named values; m stands for both roughnesses."""
+    """mx, my, r0, alpha of the named values; m is both roughnesses."""
     mx, my = (values["m"], values["m"]) if "m" in plane else (values["mx"], values["my"])
     return np.array([mx, my, values["r0"], values["alpha"]])

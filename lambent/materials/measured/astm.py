@@ -5,12 +5,12 @@
     VARS         theta_i,phi_i,theta_s,phi_s,R,G,B
     0.5236,3.1416,0.1745,0.0,0.041,0.052,0.31
 
-A line is a keyword in capitals and its value, until VARS, which names the columns and ends the header; then a tuple per
-line. This reader follows the files that are in circulation (Cornell's .astm and what libbsdf and ALTA read): values are
-the BRDF in 1/sr unless the name says cosine-corrected (CCBRDF, f_cos), or R,G,B, X,Y,Z or one column per wavelength.
-Angles are absolute; theta_s and phi_s are the scattered direction's. The standard does not fix their unit in the file:
-radians where no theta exceeds pi/2, else degrees. Where phi_i is neither a column nor a keyword it is the standard's
-180 degrees, so that phi_s = 0 lies ahead, where a mirror sends the light.
+A header line is a keyword in capitals and its value; VARS names the columns and ends the header; a tuple per line
+follows. The reader follows the files in circulation (Cornell's .astm, and those libbsdf and ALTA read): values are the
+BRDF in 1/sr unless the name says cosine-corrected (CCBRDF, f_cos), in one column, R,G,B, X,Y,Z or one per wavelength.
+Angles are absolute; theta_s and phi_s are the scattered direction's. The standard does not fix their unit: they are
+radians if no theta exceeds pi/2, else degrees. Without a column for phi_i it is the standard's 180 degrees, so that
+phi_s = 0 lies ahead, in the mirror direction.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.materials.measured.columns import assemble, layout_of, rows_of
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.text_numbers import head_text, read_text, without_comments
+from lambent.materials.measured.text_numbers import head_text, read_text, shown, without_comments
 
 NAME = "ASTM E1392"
 PHI_I_DEG = 180.0
@@ -46,31 +45,23 @@ def read(path: Path) -> MeasuredTable:
     Raises
     ------
     UserError
-        Where VARS is missing, a column is of no known kind, NUM_POINTS does not fit, or an angle is outside its range.
+        VARS is missing, a column is of no known kind, NUM_POINTS does not fit, or an angle is outside its range.
     """
     text = without_comments(read_text(path))
     found = _VARS.search(text)
     if found is None:
         raise UserError("has no line VARS", file=path)
-    keys = {key.decode(): value.decode("utf-8", "replace") for key, value in _KEYWORD.findall(text[: found.start()])}
-    names = [name for name in re.split(r"[\s,;]+", found[1].decode("utf-8", "replace").strip()) if name]
+    keys = {key.decode(): shown(value) for key, value in _KEYWORD.findall(text[: found.start()])}
+    names = [name for name in re.split(r"[\s,;]+", shown(found[1]).strip()) if name]
     layout = layout_of(names, path)
     layout = replace(layout, quantity=layout.quantity or "f")
     rows = rows_of(text[found.end() :], len(names), path)
-    _check_count(keys, len(rows), path)
-    columns = [layout.angles[name] for name in ("theta_i", "theta_o")]
-    radians = layout.radians or _in_radians(rows[:, columns])
+    stated = keys.get("NUM_POINTS")
+    if stated is not None and stated.split()[0] != str(len(rows)):
+        raise UserError("number of tuples does not fit", file=path, field="NUM_POINTS", got=len(rows), expected=stated)
+    theta = rows[:, [layout.angles["theta_i"], layout.angles["theta_o"]]]
+    finite = np.abs(theta[np.isfinite(theta)])
+    radians = layout.radians or (len(finite) > 0 and float(finite.max()) <= np.pi / 2 + 1e-3)
     notes = (f"angles are taken as {'radians' if radians else 'degrees'}, by their range",)
     name = keys.get("SAMPLE_NAME", Path(path).stem).strip("\"' ") or Path(path).stem
     return assemble(rows, replace(layout, radians=radians), PHI_I_DEG, path, NAME, name, notes)
-
-
-def _in_radians(theta: Floats) -> bool:
-    finite = theta[np.isfinite(theta)]
-    return len(finite) > 0 and float(np.abs(finite).max()) <= np.pi / 2 + 1e-3
-
-
-def _check_count(keys: dict[str, str], count: int, path: Path) -> None:
-    stated = keys.get("NUM_POINTS")
-    if stated is not None and stated.split()[0] != str(count):
-        raise UserError("number of tuples does not fit", file=path, field="NUM_POINTS", got=count, expected=stated)

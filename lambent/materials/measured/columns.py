@@ -1,11 +1,11 @@
-"""Plain columns of other people's programs: angles and values, under a line that names them in one of many ways.
+"""Plain columns of other programs: angles and values, under a line that names them in one of many conventions.
 
     # measured 2025-03-04
     theta_in, phi_in, theta_out, phi_out, BRDF
     30, 0, 10, 180, 0.041
 
-The line of names may be a comment. Angles are in degrees unless a name says (rad). Without a name for the quantity the
-file is refused: f and f cos theta_o look alike. Lambent's own gonio text is the strict case of this, see gonio_text.py.
+The line of names may be a comment. Angles are in degrees unless a name says (rad). A file that does not name its
+quantity is refused, because f and f cos theta_o look alike. Lambent's gonio text is the strict case, see gonio_text.py.
 """
 
 from __future__ import annotations
@@ -20,25 +20,18 @@ from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 from lambent.materials.measured import gonio_text
-from lambent.materials.measured.gonio_rows import (
-    LONGEST_NAME,
-    Quantity,
-    Rows,
-    check_angles,
-    quantity_of,
-    table_of,
-    to_f,
-)
-from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.gonio_rows import LONGEST_NAME, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.protocol import MeasuredTable, Quantity
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
-from lambent.materials.measured.table import isotropic_brdf, require_values
+from lambent.materials.measured.table import isotropic_brdf, require_values, usable_values
 from lambent.materials.measured.text_numbers import (
     HINT_DECIMAL_COMMA,
     has_decimal_commas,
     head_text,
     numbers,
     read_text,
+    shown,
     without_comments,
 )
 
@@ -54,7 +47,7 @@ _SCATTERED = 4  # fewer outgoing directions than this per incident one: no grid 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which column holds what.
+    """Contents of the columns.
 
     Attributes
     ----------
@@ -63,12 +56,11 @@ class Layout:
     values : tuple of int
         The value columns.
     quantity : {"f", "f_cos", "p"}, optional
-        None where no name says it.
+        None where no name gives it.
     kind : str
         grey, rgb, xyz or spectra.
     wavelengths_nm : tuple of float
         Of spectra.
-    radians : bool
     """
 
     angles: dict[str, int]
@@ -80,14 +72,14 @@ class Layout:
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line names angles and values, or the first two hold as many numbers, five at least."""
+    """Whether the first line names angles and values, or the first two hold equally many numbers, at least five."""
     text = head_text(head)
     if text is None or gonio_text.recognise(head, size):
         return False
     names, body = _split(text)
     if names is not None:
         return True
-    first = [_SEPARATORS.split(line.strip()) for line in body[: 1 << 12].decode("utf-8", "replace").split("\n")]
+    first = [_SEPARATORS.split(line.strip()) for line in shown(body[: 1 << 12]).split("\n")]
     first = [words for words in first if words != [""]][:2]
     same = len({len(words) for words in first}) == 1 and len(first[0]) >= _LEAST_NUMBERS
     return same and all(is_number(word) for words in first for word in words)
@@ -99,15 +91,14 @@ def read(path: Path) -> MeasuredTable:
     Raises
     ------
     UserError
-        Where no name says which quantity the values are, a row is broken, an angle is outside its range, or the
-        incident directions neither form a grid nor are scattered.
+        No name gives the quantity of the values, a row is broken, an angle is outside its range, or the incident
+        directions neither form a grid nor are scattered.
     """
     names, body = _split(read_text(path))
     if names is None:
-        first = body.strip().split(b"\n")[0]
-        if has_decimal_commas(body):
-            raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
-        got = f"{len(_SEPARATORS.split(first.decode('utf-8', 'replace').strip()))} columns without names"
+        _refuse_decimal_commas(body, path)
+        first = shown(body.strip().split(b"\n")[0])
+        got = f"{len(_SEPARATORS.split(first.strip()))} columns without names"
         raise UserError("nothing says which quantity the columns hold", file=path, got=got, hint=HINT_QUANTITY)
     layout = layout_of(names, path)
     if layout.quantity is None:
@@ -119,7 +110,7 @@ def read(path: Path) -> MeasuredTable:
 
 
 def _split(text: bytes) -> tuple[list[str] | None, bytes]:
-    """The names of the columns, where a line gives them, and what stands below."""
+    """The names of the columns, where a line gives them, and the rows below."""
     named: list[str] | None = None
     at = 0
     while at < len(text):
@@ -128,7 +119,7 @@ def _split(text: bytes) -> tuple[list[str] | None, bytes]:
         line = text[at:end].strip()
         comment = line.startswith((b"#", b"%", b"//"))
         if line:
-            words = _SEPARATORS.split(line.lstrip(b"#%/").decode("utf-8", "replace").strip(" \t,;"))
+            words = _SEPARATORS.split(shown(line.lstrip(b"#%/")).strip(" \t,;"))
             angles = {_angle(word) for word in words}
             if {"theta_i", "theta_o"} <= angles and len(words) > 2:
                 named = words
@@ -140,12 +131,12 @@ def _split(text: bytes) -> tuple[list[str] | None, bytes]:
 
 
 def layout_of(names: list[str], path: Path) -> Layout:
-    """What the columns of these names hold.
+    """The contents of columns with these names.
 
     Raises
     ------
     UserError
-        Where an angle is missing or named twice, or the value columns are of no known kind.
+        An angle is missing or named twice, or the value columns are of no known kind.
     """
     angles: dict[str, int] = {}
     for column, name in enumerate(names):
@@ -173,14 +164,14 @@ def layout_of(names: list[str], path: Path) -> Layout:
 
 
 def _stem(word: str, channel: str) -> str | None:
-    """The word without its channel: brdf of brdf_r, nothing of r, None where it is another channel's."""
+    """The word without its channel: brdf for brdf_r, "" for r, None for another channel."""
     if word == channel:
         return ""
     return word[:-2] if word.endswith(f"_{channel}") else None
 
 
 def _angle(name: str) -> str | None:
-    """theta_i, phi_i, theta_o, phi_o or dphi, where the name is one of the usual ones for it."""
+    """theta_i, phi_i, theta_o, phi_o or dphi, if the name is a usual one for it."""
     if len(name) > LONGEST_NAME:
         return None
     word = re.sub(r"\(.*?\)|\[.*?\]|_?(?:deg|rad)$", "", name.lower()).replace("-", "_").strip("_")
@@ -195,8 +186,7 @@ def _angle(name: str) -> str | None:
 
 def rows_of(body: bytes, columns: int, path: Path) -> Floats:
     """(N, columns) numbers, separated by blanks, commas or semicolons."""
-    if has_decimal_commas(body):
-        raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
+    _refuse_decimal_commas(body, path)
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
     lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
     if lines == 0:
@@ -207,23 +197,27 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
     return flat.reshape(-1, columns)
 
 
+def _refuse_decimal_commas(body: bytes, path: Path) -> None:
+    if has_decimal_commas(body):
+        raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
+
+
 def assemble(
     rows: Floats, layout: Layout, phi_i_deg: float, path: Path, reader: str, name: str, notes: tuple[str, ...]
 ) -> MeasuredTable:
-    """A gonio table where the incident directions form a grid, else a scattered one.
+    """A gonio table if the incident directions form a grid, else a scattered one.
 
     Parameters
     ----------
     phi_i_deg : float
-        Where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
-        normal, where a mirror sends the light.
+        Used where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
+        normal, in the mirror direction.
     """
     angles = _degrees(rows, layout, phi_i_deg)
     check_angles(angles, path)
     f, said = _values(rows[:, list(layout.values)], layout)
     f = to_f(f, layout.quantity or "f", angles[:, 2])
-    usable = np.asarray((np.isfinite(f) & (f >= 0)).all(axis=1))
-    require_values(f, usable, path)
+    require_values(f, usable_values(f), path)
     if "phi_i" not in layout.angles:
         notes += (f"phi_i not stated, taken as {phi_i_deg:g}",)
     incident = np.unique(np.round(angles[:, :2], 5), axis=0)
@@ -257,7 +251,5 @@ def _values(values: Floats, layout: Layout) -> tuple[Floats, tuple[str, ...]]:
         return rgb_of_xyz(values)
     if layout.kind == "spectra":
         order = np.argsort(layout.wavelengths_nm, kind="stable")
-        with np.errstate(invalid="ignore"):
-            usable = np.asarray((values >= 0).all(axis=1))
-        return rgb_of_measured(values[:, order], usable, np.array(layout.wavelengths_nm)[order])
+        return rgb_of_measured(values[:, order], usable_values(values), np.array(layout.wavelengths_nm)[order])
     return values, ()

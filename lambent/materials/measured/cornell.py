@@ -1,7 +1,8 @@
 """Cornell gonioreflectometer text, as pbrt-v2 reads it: isotropic BRDF at scattered directions, spectral.
 
-Numbers separated by blanks and line ends, `#` begins a comment: the number K of wavelengths, the K wavelengths in nm,
-then per measurement theta_i phi_i theta_o phi_o in radians and K values of f (no cosine: pbrt-v2 multiplies by it).
+Numbers are separated by blanks and line ends; `#` begins a comment. The file holds the number K of wavelengths, the K
+wavelengths in nm, then per measurement theta_i phi_i theta_o phi_o in radians and K values of f (without the cosine,
+which pbrt-v2 multiplies by).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured
-from lambent.materials.measured.table import isotropic_brdf, require_values
+from lambent.materials.measured.table import isotropic_brdf, require_values, usable_values
 from lambent.materials.measured.text_numbers import numbers, read_text, without_comments
 
 NAME = "Cornell / pbrt-v2 text"
@@ -41,7 +42,7 @@ def read(path: Path) -> ScatteredTable:
     Raises
     ------
     UserError
-        Where a word is not a number, the counts do not fit, an angle is outside its range, or nothing was measured.
+        A word is not a number, the counts do not fit, an angle is outside its range, or nothing was measured.
     """
     values = numbers(without_comments(read_text(path, LIMIT_BYTES)), path)
     if not (len(values) > 1 and 1 <= values[0] <= len(values)):
@@ -64,7 +65,7 @@ def read(path: Path) -> ScatteredTable:
 def _table(rows: Floats, wavelengths_nm: Floats, path: Path) -> ScatteredTable:
     """The table of rows (N, 4 + K): theta_i, phi_i, theta_o, phi_o in radians, then f at K wavelengths."""
     spectra = rows[:, 4:]
-    usable = np.asarray((np.isfinite(spectra) & (spectra >= 0)).all(axis=1))
+    usable = usable_values(spectra)
     require_values(spectra, usable, path)
     rgb, notes = rgb_of_measured(spectra, usable, wavelengths_nm)
     sizes = {"samples": len(rows), "wavelengths": len(wavelengths_nm)}

@@ -1,28 +1,26 @@
-"""What can be wrong with a measured table, each as a number, and in words where it matters."""
+"""Faults of a measured table: each as a number, and as a sentence where it matters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from lambent.core.directions import Floats, angles, direction, normalize
+from lambent.core.directions import HALF_TURN, Floats, angles, direction, normalize
 from lambent.core.sequences import r2
-from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.gonio import GonioTable, Symmetry, groups
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
-Symmetry = Literal["isotropic", "quadrant", "half", "none"]
 _PAIRS = 4096
-_REACH_DEG = 60  # of the pairs that are swapped: both are then inside the usual incident grids
+_REACH_DEG = 60  # of the swapped pairs, so that both directions are inside the usual incident grids
 _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 
-NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is said
+NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
 ASYMMETRIC = 0.05
-RETRO_RATIO = 1.5  # f around the light over f beside it, from which on it is a peak
+RETRO_RATIO = 1.5  # f around the light over f beside it, from which it is a peak
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
-_RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last two are what is beside it
+_RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last two are beside it
 _NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
@@ -30,7 +28,7 @@ _LEAST_TUPLES = 12
 
 @dataclass(frozen=True)
 class Retro:
-    """How much brighter the light's own direction is than what lies 18 to 24 degrees beside it."""
+    """f in the light's direction over f 18 to 24 degrees beside it, and at which theta_i."""
 
     ratio: float
     theta_i_deg: float
@@ -42,11 +40,10 @@ class Peak:
 
     Attributes
     ----------
-    theta_i_deg, phi_i_deg : float
     value, beside : float
-        f in 1/sr of the brightest tuple, and the mean of its neighbours'.
+        f in 1/sr of the brightest tuple, and the mean f of its neighbours.
     step_deg : float
-        Mean distance to those.
+        Mean distance to the neighbours.
     """
 
     theta_i_deg: float
@@ -57,7 +54,7 @@ class Peak:
 
 
 def non_reciprocity(table: MeasuredTable) -> float:
-    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f: evenly spread pairs, and pairs near the mirror direction."""
+    """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f, for even pairs and pairs near the mirror direction."""
     u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
     wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
     near = direction(*_mirrored(wi, u[:, 2:]))
@@ -66,10 +63,10 @@ def non_reciprocity(table: MeasuredTable) -> float:
 
 
 def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> float:
-    """How far a table is from the symmetry it claims: mean |f - f of the mirrored pair| over the mean of f.
+    """Deviation of a table from the symmetry it claims: mean |f - f of the mirrored pair| over the mean of f.
 
-    An isotropic material looks the same on both sides of any plane of incidence, a quadrant one of x = 0 and y = 0; one
-    of which half a turn was measured has only light along the normal to be tested by.
+    An isotropic material is symmetric about any plane of incidence, a quadrant one about x = 0 and y = 0; a table over
+    half a turn can be tested only with light along the normal.
     """
     if symmetry == "none":
         return 0.0
@@ -77,7 +74,7 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> float:
     theta_i = np.radians(np.linspace(0, _REACH_DEG, _PAIRS))
     if symmetry == "half":
         wi = np.broadcast_to(np.array([0.0, 0.0, 1.0]), wo.shape)
-        return _difference(table.eval(wi, wo), table.eval(wi, wo * (-1, -1, 1)))
+        return _difference(table.eval(wi, wo), table.eval(wi, wo * HALF_TURN))
     pairs = [(direction(theta_i, 0.0), np.array([1.0, -1.0, 1.0]))]
     if symmetry == "quadrant":
         pairs.append((direction(theta_i, np.pi / 2), np.array([-1.0, 1.0, 1.0])))
@@ -85,12 +82,12 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> float:
 
 
 def retro(table: MeasuredTable, samples: MeasuredSamples) -> Retro | None:
-    """The peak towards the light, where there is one: on rings about it, f falls from each to the next.
+    """The peak towards the light, if any: f falls from ring to ring about the light.
 
-    Asked at the table's own incident directions where it has a grid of them, so that no look-up between them makes or
-    hides a peak. A ring's median over its azimuths is taken, so that neither a lobe elsewhere nor one wrong reading
-    counts, the peak has to stand at most incident directions, not at one, and tuples near the light must have been
-    measured that show it too: the lamp often hides them, and what `eval` says there is a guess.
+    A table with a grid of incident directions is tested at those, so that interpolation neither makes nor hides a peak.
+    A ring counts by its median over azimuth, so that neither a lobe elsewhere nor one wrong reading counts. The peak
+    must stand at most incident directions, and measured tuples near the light must show it too: the lamp often hides
+    them, and `eval` then guesses.
     """
     if not _brighter_near_light(samples):
         return None
@@ -108,7 +105,7 @@ def retro(table: MeasuredTable, samples: MeasuredSamples) -> Retro | None:
 
 
 def under_sampled(samples: MeasuredSamples) -> list[Peak]:
-    """The incident directions whose brightest tuple stands alone: its four neighbours reach less than half of it."""
+    """The incident directions whose brightest tuple is isolated: its four neighbours reach less than half of it."""
     from scipy.spatial import cKDTree
 
     key = np.round(samples.wi, 5)
@@ -118,8 +115,7 @@ def under_sampled(samples: MeasuredSamples) -> list[Peak]:
     if len(incident) > _MOST_INCIDENT:
         return []
     peaks = []
-    order = np.argsort(which, kind="stable")
-    for rows in np.split(order, np.cumsum(np.bincount(which))[:-1]):
+    for _, rows in groups(which, np.arange(len(which))):
         points, first = np.unique(np.round(samples.wo[rows], 6), axis=0, return_index=True)
         if len(points) < _LEAST_TUPLES:
             continue
@@ -143,24 +139,21 @@ def in_words(
     towards_light: Retro | None,
     peaks: Sequence[Peak],
 ) -> list[str]:
-    """A sentence for every fault that matters, each with its number.
+    """A sentence with its number for every fault that matters.
 
     Parameters
     ----------
     counts : dict
-        What the tuples are that were left out -> their share in percent.
+        Why tuples were left out -> their share in percent.
     albedo : ((A,), (A, C))
         theta_i in degrees and the light returned.
-    non_reciprocal : float
     claimed : (symmetry, asymmetry)
-    towards_light : Retro, optional
-    peaks : list of Peak
     """
     said = [f"{_percent(share)} of the tuples are {what}, and left out" for what, share in counts.items() if share > 0]
     said += _too_bright(*albedo)
     if non_reciprocal > NON_RECIPROCAL:
         said.append(
-            f"swapping light and viewer changes f by {_percent(100 * non_reciprocal)} on the mean: "
+            f"swapping light and viewer changes f by {_percent(100 * non_reciprocal)} on average: "
             "a reciprocal model cannot fit closer than that"
         )
     symmetry, off = claimed
@@ -187,7 +180,7 @@ def _percent(value: float) -> str:
 
 
 def _too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
-    """More light than arrives, and where."""
+    """A line where more light returns than arrives."""
     if not (albedo > 1).any():
         return []
     row, channel = np.unravel_index(int(np.argmax(albedo)), albedo.shape)
@@ -216,7 +209,7 @@ def _mirrored(wi: Floats, u: Floats) -> tuple[Floats, Floats]:
 
 
 def _asked(table: MeasuredTable) -> list[tuple[float, float]]:
-    """Incident directions, in degrees, at which the way to the light and the mirror direction are well apart."""
+    """Incident directions in degrees at which the light and the mirror direction are well apart."""
     if not isinstance(table, GonioTable):
         return [(theta, 0.0) for theta in (30.0, 45.0, 60.0)]
     theta_i = [float(theta) for theta in table.theta_i_deg if 25 <= theta <= 65]

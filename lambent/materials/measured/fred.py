@@ -1,4 +1,4 @@
-"""FRED tabulated BSDF text: per direction of mirror reflection, any outgoing directions.
+"""FRED tabulated BSDF text: any outgoing directions per direction of mirror reflection.
 
     type bsdf_data
     format angles=deg bsdf=value scale=1
@@ -6,10 +6,10 @@
     0 0 0.0204
     5 10 0.0239
 
-Two numbers begin a block: theta and phi of the *specular* direction, so that the light is at phi + 180. Three are one
-measurement: theta and phi from the normal, not from the specular direction, and the BSDF in 1/sr without a cosine.
-A negative theta is on the other side of the normal. `angles=sin` gives direction cosines (x, y) in place of both
-angles, `bsdf=log` the decimal logarithm; every BSDF is multiplied by `scale`.
+A line of two numbers begins a block: theta and phi of the *specular* direction, so that the light is at phi + 180. A
+line of three is a measurement: theta and phi from the normal, not from the specular direction, and the BSDF in 1/sr
+without a cosine. A negative theta is on the other side of the normal. `angles=sin` gives direction cosines (x, y) in
+place of both angles, `bsdf=log` the decimal logarithm; every BSDF is multiplied by `scale`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.errors import UserError
+from lambent.core.plain import is_number
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.gonio_rows import Rows, check_angles, table_of
-from lambent.materials.measured.text_numbers import head_text, numbers, read_text, without_comments
+from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "FRED BSDF text"
 _FIRST = re.compile(rb"\s*type\s+bsdf_data\b", re.IGNORECASE)
@@ -33,8 +34,7 @@ _KNOWN = {"angles": ("deg", "sin"), "bsdf": ("value", "log")}
 
 def recognise(head: bytes, size: int) -> bool:
     """Whether the first line is the format's."""
-    text = head_text(head)
-    return text is not None and _FIRST.match(without_comments(text)) is not None
+    return begins_with(_FIRST, head)
 
 
 def read(path: Path) -> GonioTable:
@@ -43,8 +43,8 @@ def read(path: Path) -> GonioTable:
     Raises
     ------
     UserError
-        Where the second line is not understood, a line has neither two nor three numbers, an angle is outside its
-        range, or the incident directions do not form a grid.
+        The second line is not understood, a line has neither two nor three numbers, an angle is outside its range, or
+        the incident directions do not form a grid.
     """
     text = without_comments(read_text(path))
     found = _FORMAT.match(text)
@@ -63,21 +63,18 @@ def read(path: Path) -> GonioTable:
 
 def _options(words: bytes, path: Path) -> tuple[dict[str, str], float]:
     """The units of angles and BSDF, and the scale."""
-    given = dict(re.findall(r"(\w+)\s*=\s*(\S+)", words.decode("utf-8", "replace").lower()))
+    given = dict(re.findall(r"(\w+)\s*=\s*(\S+)", shown(words).lower()))
     for name, known in _KNOWN.items():
         if given.get(name) not in known:
             raise UserError("is unknown", file=path, field=name, got=given.get(name), expected=f"one of: {known}")
-    try:
-        scale = float(given.get("scale", "1"))
-    except ValueError:
-        scale = np.nan
+    scale = float(text) if is_number(text := given.get("scale", "1")) else np.nan
     if not (np.isfinite(scale) and scale > 0):
         raise UserError("is not a positive number", file=path, field="scale", got=given.get("scale"))
     return given, scale
 
 
-def _lines(body: bytes, path: Path) -> tuple[Floats, Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """(B, 2) blocks, (N, 3) measurements, and (N,) which block each is in."""
+def _lines(body: bytes, path: Path) -> tuple[Floats, Floats, Indices]:
+    """(B, 2) blocks, (N, 3) measurements, and (N,) the block of each."""
     body = re.sub(rb"[,;]", b" ", body) if re.search(rb"\d\s*;|\d,\s", body) else body
     flat = numbers(body, path)
     per_line = np.array([len(line.split()) for line in body.split(b"\n")], dtype=np.int64)
@@ -89,12 +86,8 @@ def _lines(body: bytes, path: Path) -> tuple[Floats, Floats, np.ndarray[tuple[in
     if (per_line == 3).sum() == 0 or per_line[0] != 2:
         raise UserError("holds no block with measurements", file=path)
     starts = np.cumsum(per_line) - per_line
-    heads, triples = starts[per_line == 2], starts[per_line == 3]
-    return (
-        flat[heads[:, None] + [0, 1]],
-        flat[triples[:, None] + [0, 1, 2]],
-        np.cumsum(per_line == 2)[per_line == 3] - 1,
-    )
+    blocks, rows = (flat[starts[per_line == count, None] + np.arange(count)] for count in (2, 3))
+    return blocks, rows, np.cumsum(per_line == 2)[per_line == 3] - 1
 
 
 def _angles(pairs: Floats, unit: str, path: Path) -> Floats:

@@ -1,6 +1,6 @@
-"""From single measurements (theta_i, phi_i, theta_o, phi_o, f) to a table: what the text formats of gonio data share.
+"""Shared by the text formats of gonio data: from rows (theta_i, phi_i, theta_o, phi_o, f) to a table.
 
-Incident directions form a grid. The outgoing directions of each may form one of their own, with holes, or none.
+Incident directions form a grid. The outgoing directions of each may form another, with holes, or none.
 """
 
 from __future__ import annotations
@@ -8,33 +8,34 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import cast
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import direction
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, AnySheet, GonioTable, Sheets, Symmetry
-from lambent.materials.measured.protocol import Flags
-from lambent.materials.measured.sheets import Indices, ScatteredSheet, Sheet, specular_frame
+from lambent.materials.measured.protocol import Quantity
+from lambent.materials.measured.sheets import ScatteredSheet, Sheet, specular_frame
 from lambent.materials.measured.table import sensible
 
-Quantity = Literal["f", "f_cos", "p"]
 QUANTITIES: tuple[Quantity, ...] = ("f", "f_cos", "p")
 _WORDS: dict[str, Quantity] = {
     **dict.fromkeys(("f", "fr", "ft", "fs", "brdf", "btdf", "bsdf", "integrated"), "f"),
     **dict.fromkeys(("fcos", "ccbrdf", "ccbtdf", "ccbsdf", "brdfcos", "btdfcos", "bsdfcos"), "f_cos"),
     **dict.fromkeys(("p", "transfer", "transferprobability"), "p"),
 }
-LONGEST_NAME = 64  # of a column; what is longer is no name
+LONGEST_NAME = 64  # of a column
 DECIMALS = 5  # of the angles in degrees: closer directions are the same
 _LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
-_PLANE_DEG = 0.1  # so close to the plane of incidence a scan is in it
+_PLANE_DEG = 0.1  # a scan this close to the plane of incidence is in it
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Measurements, and what their file says of them.
+    """Measurements with the metadata of their file.
 
     Attributes
     ----------
@@ -42,13 +43,8 @@ class Rows:
         theta_i, phi_i, theta_o, phi_o in absolute directions; theta_o > 90 is on the far side.
     f : (N, C)
         1/sr, NaN where it was not measured.
-    path : Path
-    format : str
-    name : str
-    stored : {"f", "f_cos", "p"}
     symmetry : str, optional
         As the file names it.
-    notes : tuple of str
     """
 
     angles_deg: Floats
@@ -75,14 +71,14 @@ def check_angles(angles_deg: Floats, path: Path) -> None:
 
 
 def quantity_of(word: str) -> Quantity | None:
-    """What a column of this name holds; None where the name does not say."""
+    """The quantity in a column of this name; None for other names."""
     if len(word) > LONGEST_NAME:
         return None
     return _WORDS.get(re.sub(r"\(.*?\)|\[.*?\]|[^a-z]", "", word.lower()))
 
 
 def to_f(values: Floats, quantity: Quantity, theta_o_deg: Floats) -> Floats:
-    """f (N, C) of stored values: f_cos and p are divided by |cos theta_o|; where that is 0 nothing was measured."""
+    """f (N, C) of stored values: f_cos and p are divided by |cos theta_o|; NaN where that is 0."""
     if quantity == "f":
         return values
     cos_o = np.abs(np.cos(np.radians(theta_o_deg)))[:, None]
@@ -96,8 +92,8 @@ def table_of(rows: Rows) -> GonioTable:
     Raises
     ------
     UserError
-        Where the symmetry is unknown or contradicted, the incident directions do not form a grid, or one of them has
-        no measured value.
+        The symmetry is unknown or contradicted, the incident directions do not form a grid, or one of them has no
+        measured value.
     """
     angles = np.round(rows.angles_deg, DECIMALS)
     theta_i, phi_i = np.unique(angles[:, 0]), np.unique(angles[:, 1])
@@ -129,19 +125,20 @@ def table_of(rows: Rows) -> GonioTable:
     )
 
 
-def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]:
-    """The symmetry named, or else the one that the phi_i span, with a note that says so."""
+def spanned_symmetry(phi_i_deg: Floats) -> Symmetry:
+    """The symmetry whose range the increasing phi_i span."""
     span = phi_i_deg[-1] - phi_i_deg[0]
+    return next((name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole), "none")
+
+
+def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]:
+    """The symmetry the file names, else the one that the phi_i span, with a note."""
     if rows.symmetry is None:
-        spanned: Symmetry = next((name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole), "none")
+        spanned = spanned_symmetry(phi_i_deg)
         return spanned, (f"symmetry not stated, taken as {spanned} from phi_i",)
     named, path = rows.symmetry, rows.path
-    if named not in PHI_I_RANGE_DEG:
-        hint = did_you_mean(named, PHI_I_RANGE_DEG)
-        known = ", ".join(PHI_I_RANGE_DEG)
-        raise UserError("unknown symmetry", file=path, field="symmetry", got=named, expected=known, hint=hint)
-    symmetry = named
-    if span > PHI_I_RANGE_DEG[symmetry]:
+    symmetry = cast(Symmetry, known("symmetry", named, PHI_I_RANGE_DEG, file=path, field="symmetry"))
+    if phi_i_deg[-1] - phi_i_deg[0] > PHI_I_RANGE_DEG[symmetry]:
         got = f"phi_i from {phi_i_deg[0]:g} to {phi_i_deg[-1]:g}"
         expected = f"a span of at most {PHI_I_RANGE_DEG[symmetry]:g} degrees"
         raise UserError("phi_i spans more than the symmetry", file=path, field=symmetry, got=got, expected=expected)
@@ -149,9 +146,9 @@ def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]
 
 
 def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
-    """Rows of an isotropic specimen, with mirror images where they cover one side of the plane of incidence alone.
+    """Rows of an isotropic specimen, their f, and which of them are images.
 
-    Returns the rows, their f, and which of them are images.
+    Mirror images are added where the rows cover only one side of the plane of incidence.
     """
     phi = np.round(angles_deg[:, 3] % 360, DECIMALS) % 360
     left, right = (phi > 0) & (phi < 180), phi > 180
@@ -161,12 +158,12 @@ def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
 
 
 def _pole_repeats(angles_deg: Floats) -> bool:
-    """Whether the file gives theta_o = 0 at several phi_o: then they are nodes of the grid like all others."""
+    """Whether the file gives theta_o = 0 at several phi_o, which are then ordinary nodes of the grid."""
     return len(np.unique(angles_deg[angles_deg[:, 2] == 0, 3])) > 1
 
 
 def _averaged(rows: tuple[Floats, Flags, Flags], f: Floats) -> tuple[tuple[Floats, Flags, Flags], Floats, int]:
-    """Angles, side and image of the rows sorted by direction, their f with repeats averaged, and how many repeats."""
+    """Angles, side and image of the rows sorted by direction, their f with repeats averaged, and how many repeat."""
     angles, far, images = rows
     order = np.lexsort((angles[:, 3], angles[:, 2], angles[:, 1], angles[:, 0], far))
     angles, f, far, images = angles[order], f[order], far[order], images[order]
@@ -181,7 +178,7 @@ def _averaged(rows: tuple[Floats, Flags, Flags], f: Floats) -> tuple[tuple[Float
 
 
 def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floats, Floats], path: Path) -> Sheets:
-    """The sheets of one side, by theta_i then phi_i; one measured at theta_i = 0 stands for every phi_i."""
+    """The sheets of one side, by theta_i then phi_i; one measured at theta_i = 0 serves every phi_i."""
     theta_i, phi_i = incident_deg
     if len(angles_deg) == 0:
         return ()
@@ -222,5 +219,5 @@ def sheet_of(angles_deg: Floats, f: Floats, images: Flags, path: Path) -> AnyShe
     repeats = np.zeros(grid.shape[:2], dtype=bool)
     repeats[:, np.setdiff1d(column[images], column[~images])] = True
     if theta[0] == 0 and (row == 0).sum() == 1:
-        grid[0], repeats[0] = f[0], np.arange(len(phi)) != column[0]  # a reading along n is that of every phi_o
+        grid[0], repeats[0] = f[0], np.arange(len(phi)) != column[0]  # a reading along n serves every phi_o
     return Sheet(theta, phi, grid, images=repeats)

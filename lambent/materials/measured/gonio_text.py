@@ -1,11 +1,12 @@
-"""Plain columns of a gonio-photometer, read and written. docs/formats.md gives the format.
+"""Lambent's own text format of gonio-photometer tables, read and written; docs/formats.md describes it.
 
     # name: rough copper
     # symmetry: isotropic
     theta_i phi_i theta_o phi_o p_r p_g p_b
     5 0 0 0 0.0213 0.0175 0.0141
 
-Degrees; theta_o > 90 is transmission; the name of the value columns says the quantity; nan or -1 is not measured.
+Angles are in degrees; theta_o > 90 is transmission; the value columns' names give the quantity; nan or -1 was not
+measured.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from lambent.core.directions import Floats, angles
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
 from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
-from lambent.materials.measured.gonio_rows import QUANTITIES, Quantity, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.gonio_rows import QUANTITIES, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.protocol import Quantity
 from lambent.materials.measured.sheets import Sheet
-from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text
+from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text, shown
 
 NAME = FORMAT
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
@@ -32,7 +34,7 @@ _NOT_MEASURED = -1.0
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line that is no comment names the four angles, and no quantity in other words (BRDF)."""
+    """Whether the first line that is no comment names the four angles, and no quantity by another name (BRDF)."""
     names = _names(head)
     if names is None or tuple(names[:4]) != ANGLES:
         return False
@@ -44,7 +46,7 @@ def _names(head: bytes) -> list[str] | None:
     for line in plain_text(head).split(b"\n"):
         text = line.split(b"#")[0].strip()
         if text:
-            return re.split(r"[\s,;]+", text.decode("utf-8", "replace").strip(",;"))
+            return re.split(r"[\s,;]+", shown(text).strip(",;"))
     return None
 
 
@@ -54,8 +56,8 @@ def read(path: Path) -> GonioTable:
     Raises
     ------
     UserError
-        Where a column or the symmetry is unknown, a row is broken, the incident directions do not form a grid, or one
-        of them has no measured value.
+        A column or the symmetry is unknown, a row is broken, the incident directions do not form a grid, or one of
+        them has no measured value.
     """
     content = read_text(path)
     names = _names(content[:_HEADER_BYTES])
@@ -64,18 +66,9 @@ def read(path: Path) -> GonioTable:
     quantity = _quantity(names[4:], path)
     rows = _rows(content, len(names), path)
     values = np.where(rows[:, 4:] == _NOT_MEASURED, np.nan, rows[:, 4:])
-    keys = _keys(content[:_HEADER_BYTES])
-    return table_of(
-        Rows(
-            angles_deg=rows[:, :4],
-            f=to_f(values, quantity, rows[:, 2]),
-            path=path,
-            format=NAME,
-            name=keys.get("name", Path(path).stem),
-            stored=quantity,
-            symmetry=keys.get("symmetry"),
-        )
-    )
+    f, keys = to_f(values, quantity, rows[:, 2]), _keys(content[:_HEADER_BYTES])
+    name, symmetry = keys.get("name", Path(path).stem), keys.get("symmetry")
+    return table_of(Rows(rows[:, :4], f, path, NAME, name, quantity, symmetry))
 
 
 def _quantity(columns: list[str], path: Path) -> Quantity:
@@ -101,9 +94,8 @@ def _rows(content: bytes, columns: int, path: Path) -> Floats:
         hint = HINT_DECIMAL_COMMA if has_decimal_commas(content) else None
         raise UserError(f"a row is broken ({str(error).splitlines()[0]})", file=path, hint=hint) from error
     if rows.shape[1] != columns:
-        raise UserError(
-            "a row has another number of columns than names", file=path, got=rows.shape[1], expected=columns
-        )
+        got = rows.shape[1]
+        raise UserError("a row has another number of columns than names", file=path, got=got, expected=columns)
     check_angles(rows[:, :4], path)
     rows[np.isinf(rows)] = np.nan
     return rows
@@ -112,16 +104,14 @@ def _rows(content: bytes, columns: int, path: Path) -> Floats:
 def _keys(head: bytes) -> dict[str, str]:
     """The `# key: value` comments."""
     found = re.findall(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*?)\s*$", head, re.MULTILINE)
-    return {key.decode(): value.decode("utf-8", "replace") for key, value in found}
+    return {key.decode(): shown(value) for key, value in found}
 
 
 def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None:
-    """Write `table` as gonio text with the quantity asked for, atomically; six significant digits of the values.
+    """Write `table` as gonio text, atomically, with six significant digits of the values.
 
     Parameters
     ----------
-    path : Path
-    table : GonioTable
     quantity : {"f", "f_cos", "p"}
         f_cos and p both hold f |cos theta_o|, in 1/sr.
     """
@@ -130,21 +120,17 @@ def write_gonio(path: Path, table: GonioTable, quantity: Quantity = "p") -> None
     formats = ["%.8g"] * len(ANGLES) + ["%.6g"] * len(channels)
     with atomic_path(Path(path)) as beside, beside.open("w", encoding="utf-8") as file:
         file.write(f"# name: {table.name}\n# symmetry: {table.symmetry}\n{names}\n")
-        for sheets, far in ((table.reflected, False), (table.transmitted, True)):
-            for theta_i, row in zip(table.theta_i_deg, sheets, strict=False):
-                for phi_i, sheet in zip(table.phi_i_deg, row, strict=True):
-                    np.savetxt(file, _columns(theta_i, phi_i, sheet, far, quantity), fmt=formats)
+        for entry in table.entries():
+            np.savetxt(file, _columns(*entry, quantity), fmt=formats)
 
 
 def _columns(theta_i_deg: float, phi_i_deg: float, sheet: AnySheet, far: bool, quantity: Quantity) -> Floats:
-    if isinstance(sheet, Sheet) and sheet.frame is None:  # phi is kept where theta is 0
+    if isinstance(sheet, Sheet) and sheet.frame is None:  # keeps phi where theta is 0
         theta, phi = (grid.ravel() for grid in np.meshgrid(sheet.theta_deg, sheet.phi_deg, indexing="ij"))
-        values = sheet.values
     else:
         theta, phi = (np.degrees(angle) for angle in angles(sheet.directions))
-        values = sheet.values
     kept = sheet.measured & (theta <= 90)
-    theta, phi, values = theta[kept], phi[kept], values[kept]
+    theta, phi, values = theta[kept], phi[kept], sheet.values[kept]
     if quantity != "f":
         values = values * np.cos(np.radians(theta))[:, None]
     fixed = np.broadcast_to((theta_i_deg, phi_i_deg), (len(theta), 2))

@@ -1,4 +1,4 @@
-"""What a measured table holds and what is wrong with it, as numbers and in words."""
+"""Inspect a measured table: its content and its faults, as numbers and sentences."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from lambent.core.directions import direction
 from lambent.materials.measured import faults
-from lambent.materials.measured.faults import Symmetry
-from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.gonio import GonioTable, Symmetry
 from lambent.materials.measured.protocol import MeasuredTable
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
@@ -18,7 +17,7 @@ _REASONS = {"not measured": "not measured, or below the horizon"}
 
 
 def inspect_table(table: MeasuredTable) -> dict[str, Any]:
-    """Format, dimensions, symmetry, albedo over theta_i, and faults of a table; plain values, fit for JSON.
+    """Format, dimensions, symmetry, albedo over theta_i, and faults of a table, as plain values for JSON.
 
     Returns
     -------
@@ -29,17 +28,14 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `faults`: `not_measured_percent`, `not_finite_percent`, `negative_percent` of the tuples, `albedo_max`,
         `energy_above_one` (whether it exceeds 1), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
         there is no peak towards the light), `under_sampled` (incident directions), see `faults`;
-        `findings`: the faults that matter, a sentence each.
+        `findings`: a sentence for each fault that matters.
     """
     info, samples = table.info, table.samples()
     wi = direction(np.radians(_THETA_I_DEG), 0.0)
     r, t = table.reflectivity(wi), table.transmissivity(wi)
     left_out, count = samples.left_out, len(samples) + samples.left_out.total
-    percent = {
-        "not measured": 100 * left_out.shadowed / count,
-        "not finite": 100 * left_out.not_finite / count,
-        "negative": 100 * left_out.negative / count,
-    }
+    counts = {"not measured": left_out.shadowed, "not finite": left_out.not_finite, "negative": left_out.negative}
+    percent = {what: 100 * number / count for what, number in counts.items()}
     symmetry = symmetry_of(table)
     non_reciprocal, off = faults.non_reciprocity(table), faults.asymmetry(table, symmetry)
     towards_light, peaks = faults.retro(table, samples), faults.under_sampled(samples)

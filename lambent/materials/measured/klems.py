@@ -1,12 +1,12 @@
 """Angle bases of LBNL's matrices, and f that is constant over their patches.
 
 A basis cuts the hemisphere into rings of theta and each ring into n_phis equal patches; the first patch of a ring is
-centred on phi = 0. The three of Klems (1994) are built in: full (145 patches), half (77) and quarter (41). What a patch
-counts for is its projected solid angle, the integral of cos(theta) over it: pi (cos^2 lower - cos^2 upper) / n_phis.
+centred on phi = 0. The three of Klems (1994) are built in: full (145 patches), half (77) and quarter (41). A patch's
+weight is its projected solid angle, the integral of cos(theta) over it: pi (cos^2 lower - cos^2 upper) / n_phis.
 
-Directions of a matrix are headings: the way light travels, projected on the sheet. A patch of incident light at phi = 0
-holds the light that comes from phi = 180 degrees, so that light that goes straight on leaves through the patch of the
-same number, and mirrored light as well.
+Directions of a matrix are headings: the direction light travels in, projected on the sheet. A patch of incident light
+at phi = 0 holds the light from phi = 180 degrees, so that straight and mirrored light leaves by the patch of the same
+number.
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, angles, direction
-
-Indices = NDArray[np.int64]
+from lambent.core.arrays import Floats, Indices
+from lambent.core.directions import HALF_TURN, angles, direction
 
 OUTSIDE = -1
 _TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0)
@@ -29,11 +27,10 @@ _THIRDS = 3  # pieces of a patch, in theta and in phi, that give a tuple each
 
 @dataclass(frozen=True)
 class AngleBasis:
-    """Patches of the hemisphere, ring by ring from the normal, phi rising within a ring.
+    """Patches of the hemisphere, numbered ring by ring from the normal, with rising phi within a ring.
 
     Attributes
     ----------
-    name : str
     edges_deg : tuple of R + 1 float
         Bounds of theta, from 0, increasing, at most 90.
     n_phis : tuple of R int
@@ -53,6 +50,21 @@ class AngleBasis:
         """(R,) number of the first patch of each ring."""
         return np.concatenate([[0], np.cumsum(self.n_phis)[:-1]]).astype(np.int64)
 
+    @cached_property
+    def rings(self) -> Indices:
+        """(count,) ring of each patch."""
+        return np.repeat(np.arange(len(self.n_phis)), self.n_phis)
+
+    @cached_property
+    def places(self) -> Indices:
+        """(count,) number of each patch within its ring."""
+        return np.arange(self.count) - self.starts[self.rings]
+
+    @cached_property
+    def _cos2(self) -> Floats:
+        """(R + 1,) cos^2 of the rings' bounds."""
+        return np.asarray(np.cos(np.radians(self.edges_deg)) ** 2)
+
     def index(self, w: Floats) -> Indices:
         """(N,) patch of unit directions (N, 3) of the upper hemisphere; OUTSIDE beyond the last ring."""
         theta, phi = angles(w)
@@ -66,32 +78,37 @@ class AngleBasis:
     @cached_property
     def projected_sr(self) -> Floats:
         """(count,) integral of cos(theta) over each patch, in sr; pi over a whole hemisphere."""
-        squares = np.cos(np.radians(self.edges_deg)) ** 2
         n = np.array(self.n_phis)
-        return np.asarray(np.repeat(-np.pi * np.diff(squares) / n, n))
+        return np.asarray(np.repeat(-np.pi * np.diff(self._cos2) / n, n))
 
     @cached_property
     def centres(self) -> Floats:
         """(count, 3) unit directions in the middle of the patches; the normal for a patch around it."""
         edges, n = np.radians(self.edges_deg), np.array(self.n_phis)
         middle = np.where((n == 1) & (edges[:-1] == 0), 0.0, (edges[:-1] + edges[1:]) / 2)
-        place = np.arange(self.count) - np.repeat(self.starts, n)
-        return direction(np.repeat(middle, n), 2 * np.pi * place / np.repeat(n, n))
+        return direction(middle[self.rings], 2 * np.pi * self.places / n[self.rings])
 
     @cached_property
     def opposite(self) -> Indices:
         """(count,) the patch at phi + 180 degrees; rings of an odd number of patches have the nearest one."""
-        return self.index(self.centres * (-1, -1, 1))
+        return self.index(self.centres * HALF_TURN)
 
     def points(self, patch: Indices, u: Floats) -> Floats:
         """(N, 3) directions in patches (N,) for u (N, 2) in [0, 1)^2, even in projected solid angle."""
-        n = np.array(self.n_phis)
-        ring = np.repeat(np.arange(len(n)), n)[patch]
-        squares = np.cos(np.radians(self.edges_deg)) ** 2
-        cos_squared = squares[ring] + u[:, 0] * (squares[ring + 1] - squares[ring])
-        phi = 2 * np.pi * (patch - self.starts[ring] + u[:, 1] - 0.5) / n[ring]
-        r, z = np.sqrt(np.maximum(1 - cos_squared, 0)), np.sqrt(np.maximum(cos_squared, 0))
+        ring = self.rings[patch]
+        cos2 = self._cos2[ring] + u[:, 0] * (self._cos2[ring + 1] - self._cos2[ring])
+        phi = 2 * np.pi * (self.places[patch] + u[:, 1] - 0.5) / np.array(self.n_phis)[ring]
+        r, z = np.sqrt(np.maximum(1 - cos2, 0)), np.sqrt(np.maximum(cos2, 0))
         return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+
+    def direct_share(self, f: Floats) -> float:
+        """Share of uniform incident light that leaves by the patch it came in by; f (count, count), 0 if f is black.
+
+        That is the patch of the mirrored or the straight direction.
+        """
+        projected = self.projected_sr
+        power = projected @ f @ projected
+        return float((projected**2) @ np.diagonal(f) / power) if power > 0 else 0.0
 
 
 KLEMS_FULL = AngleBasis("LBNL/Klems Full", (0, 5, 15, 25, 35, 45, 55, 65, 75, 90), (1, 8, 16, 20, 24, 24, 24, 16, 12))
@@ -102,13 +119,12 @@ BUILT_IN = (KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER)
 
 @dataclass(frozen=True)
 class PatchMatrix:
-    """f of one side and one way (reflection or transmission), constant over pairs of patches.
+    """f of reflection or transmission on one side, constant over pairs of patches.
 
     Attributes
     ----------
-    incident, outgoing : AngleBasis
     values : (outgoing.count, incident.count, C)
-        1/sr, finite; what is negative counts as 0 in all but `tuples`.
+        1/sr, finite; negative values count as 0 everywhere but in `tuples`.
     """
 
     incident: AngleBasis
@@ -130,12 +146,12 @@ class PatchMatrix:
 
     @property
     def negative(self) -> int:
-        """How many pairs of patches are below zero in any channel."""
+        """Number of pairs of patches below zero in any channel."""
         return int((self.values < 0).any(axis=-1).sum())
 
     @cached_property
     def f(self) -> Floats:
-        """`values` without what is negative."""
+        """`values`, negative ones as 0."""
         return np.maximum(self.values, 0) if self.negative else self.values
 
     def at(self, entering: Floats, leaving: Floats) -> Floats:
@@ -145,11 +161,11 @@ class PatchMatrix:
         return np.asarray(np.where(inside[:, None], self.f[o, i], 0.0))
 
     def hemispherical(self, entering: Floats) -> Floats:
-        """Share (N, C) of light with this heading that leaves: the exact sum over the outgoing patches."""
+        """Share (N, C) of light with this heading that is scattered: the exact sum over the outgoing patches."""
         return self._looked_up(np.tensordot(self.outgoing.projected_sr, self.f, 1), self.incident, entering)
 
     def hemispherical_reversed(self, leaving: Floats) -> Floats:
-        """The same for light that takes the ways of this part backwards, in at the heading by which it leaves here."""
+        """The same for reversed light, which enters at a heading by which light of this part leaves."""
         return self._looked_up(np.tensordot(self.f, self.incident.projected_sr, ((1,), (0,))), self.outgoing, leaving)
 
     @staticmethod
@@ -160,33 +176,31 @@ class PatchMatrix:
     def tuples(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Headings (M, 3) of light that enters and leaves, f (M, C), and a weight (M,) in sr, of every pair of patches.
 
-        Light enters in the middle of its patch and leaves at nine places of its own: at the middle alone a lobe far
-        narrower than the patch would fit, with any energy. The weights times the cosines of the leaving headings sum to
+        Light enters in the middle of its patch and leaves at nine places of its own: with the middle alone, a lobe far
+        narrower than the patch would fit with any energy. The weights times the cosines of the leaving headings sum to
         the patch's projected solid angle, so that sums over tuples are sums over patches.
         """
         o, i = np.indices(self.values.shape[:2]).reshape(2, -1)
-        places, share = _spread(self.outgoing)
-        leaving, weight = places[o].reshape(-1, 3), share[o].ravel()
-        return self._nine(self.incident.centres[i]), leaving, self._nine(self.values.reshape(-1, self.channels)), weight
+        return self._tuples(self.incident.centres[i], self.outgoing, o)
 
     def tuples_reversed(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """The same of light that takes the ways backwards; entering and leaving are those of the light that does."""
+        """The same for reversed light; `entering` and `leaving` are its own headings."""
         o, i = np.indices(self.values.shape[:2]).reshape(2, -1)
-        places, share = _spread(self.incident)
-        back = np.array((-1, -1, 1))
-        entering, leaving = self.outgoing.centres[o] * back, places[i].reshape(-1, 3) * back
-        return self._nine(entering), leaving, self._nine(self.values.reshape(-1, self.channels)), share[i].ravel()
+        entering, leaving, f, weight = self._tuples(self.outgoing.centres[o], self.incident, i)
+        return entering * HALF_TURN, leaving * HALF_TURN, f, weight
 
-    @staticmethod
-    def _nine(rows: Floats) -> Floats:
-        return np.repeat(rows, _THIRDS**2, axis=0)
+    def _tuples(self, entering: Floats, basis: AngleBasis, patch: Indices) -> tuple[Floats, Floats, Floats, Floats]:
+        """Tuples of light that enters with these headings and leaves by these patches."""
+        places, share = _spread(basis)
+        entering, f = (np.repeat(a, _THIRDS**2, axis=0) for a in (entering, self.values.reshape(-1, self.channels)))
+        return entering, places[patch].reshape(-1, 3), f, share[patch].ravel()
 
     @cached_property
     def anisotropy(self) -> float:
-        """How much f changes when the sheet is turned, over the mean of f, where turns carry patches to patches.
+        """Change of f when the sheet is turned, over the mean of f.
 
-        Compared are turns by 15 to 90 degrees that map the patches of both rings onto themselves; infinite where there
-        are none.
+        Turns by 15 to 90 degrees count that map the patches of both rings onto themselves; infinite where there are
+        none.
         """
         difference, size = 0.0, 0.0
         for a, n_i in enumerate(self.incident.n_phis):
@@ -209,14 +223,8 @@ class PatchMatrix:
 
     @property
     def direct_share(self) -> float:
-        """Share of the light, coming evenly from everywhere, that leaves by the patch it came in by; 0 of two bases.
-
-        That is the patch of the mirrored or the straight direction.
-        """
-        if self.incident != self.outgoing or self.dark:
-            return 0.0
-        projected, f = self.incident.projected_sr, self.f.sum(axis=-1)
-        return float((projected**2) @ np.diagonal(f) / (projected @ f @ projected))
+        """`AngleBasis.direct_share`; 0 where the two bases differ."""
+        return self.incident.direct_share(self.f.sum(axis=-1)) if self.incident == self.outgoing else 0.0
 
 
 def _spread(basis: AngleBasis) -> tuple[Floats, Floats]:
@@ -224,13 +232,12 @@ def _spread(basis: AngleBasis) -> tuple[Floats, Floats]:
 
     Theta and phi are cut in three each. A weight times the cosine is the projected solid angle of its piece.
     """
-    n = np.array(basis.n_phis)
+    n, ring = np.array(basis.n_phis), basis.rings
     lower, upper = np.radians(basis.edges_deg[:-1]), np.radians(basis.edges_deg[1:])
     cuts = lower[:, None] + (upper - lower)[:, None] * np.arange(_THIRDS + 1) / _THIRDS  # (R, 4)
-    sizes = -np.pi * np.diff(np.cos(cuts) ** 2) / (n * _THIRDS)[:, None]
-    theta, size = np.repeat((cuts[:, 1:] + cuts[:, :-1]) / 2, n, axis=0), np.repeat(sizes, n, axis=0)
-    place = (np.arange(basis.count) - np.repeat(basis.starts, n))[:, None] + (np.arange(_THIRDS) - 1) / _THIRDS
-    phi = 2 * np.pi * place / np.repeat(n, n)[:, None]
+    size = (-np.pi * np.diff(np.cos(cuts) ** 2) / (n * _THIRDS)[:, None])[ring]
+    theta = ((cuts[:, 1:] + cuts[:, :-1]) / 2)[ring]
+    phi = 2 * np.pi * (basis.places[:, None] + (np.arange(_THIRDS) - 1) / _THIRDS) / n[ring, None]
     places = direction(theta[:, :, None], phi[:, None, :])
     weight = np.broadcast_to((size / np.cos(theta))[:, :, None], places.shape[:-1])
     return places.reshape(basis.count, -1, 3), weight.reshape(basis.count, -1)

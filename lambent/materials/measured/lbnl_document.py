@@ -1,7 +1,7 @@
-"""The XML of LBNL's BSDF files (schema BSDF v1.4), taken apart: what a block of numbers is said to be, and its text.
+"""Parser of the XML of LBNL's BSDF files (schema BSDF v1.4): blocks of numbers as text, with their metadata.
 
-The file is untrusted. It is read by events, so nesting costs nothing; a document type declaration is refused, and with
-it every entity of the file's own; the elements, their depth and the length of a tag are limited.
+The file is untrusted. It is read by events, so nesting costs nothing. A document type declaration is refused, and so
+are the entities it could define; the number of elements, their depth and the length of a tag are limited.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _BLOCK = f"{_DATA}/WavelengthDataBlock"
 
 @dataclass
 class Basis:
-    """An angle basis as the file defines it: words, not yet numbers.
+    """An angle basis as the file defines it, as text.
 
     Attributes
     ----------
     rings : list of dict
-        `nPhis`, `LowerTheta` and `UpperTheta`, where they are given.
+        `nPhis`, `LowerTheta` and `UpperTheta`, where given.
     """
 
     name: str = ""
@@ -42,7 +42,7 @@ class Basis:
 
 @dataclass
 class Block:
-    """One ScatteringData and what the file says of it; "" where it says nothing."""
+    """One ScatteringData and its metadata; "" where the file gives none."""
 
     wavelength: str = ""
     direction: str = ""
@@ -55,7 +55,7 @@ class Block:
 
 @dataclass
 class Document:
-    """What the first layer with data holds.
+    """Content of the first layer with data.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Document:
     name, maker : str
         Of the material.
     layers : int
-        How many layers the file has.
+        Number of layers in the file.
     """
 
     structure: str = ""
@@ -99,7 +99,7 @@ _KNOWN = {"/".join(path.split("/")[:n]) for path in _FIELDS for n in range(1, pa
 
 
 def claims_to_be(head: bytes) -> bool:
-    """Whether a file that begins with `head` has the root element of this format; in UTF-16 as well."""
+    """Whether a file that begins with `head` has this format's root element, in UTF-8 or UTF-16."""
     plain = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     return plain.startswith(b"<") and _ROOT_TAG.search(plain) is not None
 
@@ -110,7 +110,7 @@ def parse(content: bytes, path: Path) -> Document:
     Raises
     ------
     UserError
-        Where it is not XML, another document, declares a document type, or is beyond the limits.
+        The content is not XML, another document, declares a document type, or is beyond the limits.
     """
     if b"\0" in content:
         raise UserError("holds NUL bytes", file=path, expected="XML in UTF-8")
@@ -127,20 +127,20 @@ def parse(content: bytes, path: Path) -> Document:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         raise UserError(f"not well-formed XML ({error})", file=path) from error
-    except (LookupError, ValueError) as error:  # an encoding Python does not know, or knows to be of several bytes
+    except (LookupError, ValueError) as error:  # an encoding unknown to Python, or of several bytes
         raise UserError(f"encoding cannot be read ({error})", file=path, expected="XML in UTF-8") from error
     return handler.document
 
 
 class _Handler:
-    """Collects the fields of the layer that is read; every other element is passed over."""
+    """Collects the fields of the first layer with data; other elements are skipped."""
 
     def __init__(self, path: Path) -> None:
         self.document = Document()
         self._file = path
-        self._open: list[str] = []  # paths of the open elements; "" where nothing of interest can be below
+        self._open: list[str] = []  # paths of the open elements; "" where no known element can be below
         self._elements = 0
-        self._skip = False  # this layer comes after the one whose data are read
+        self._skip = False  # this layer comes after the one with data
         self._text = bytearray()
         self._wavelength, self._first = "", 0  # of the open WavelengthData: its field, and its first block
         self._begin: dict[str, Callable[[], object]] = {
@@ -171,7 +171,7 @@ class _Handler:
         if where not in _FIELDS:
             return
         if where == _SCATTERING:
-            # What is not ASCII cannot be a number; the mark in its place makes the reader of numbers refuse it.
+            # Text that is not ASCII is no number; its replacement makes the reader of numbers refuse it.
             self._text += words.encode("ascii", "replace")
             return
         self._text += words.encode()

@@ -1,14 +1,15 @@
-"""From the words of a BSDF file to numbers: which blocks are used, on which bases, in which colour."""
+"""Make the parts of a BSDF file from its text: choose blocks, bases and colour, and parse the numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
+from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.materials.measured.equal_energy import rgb_of_xyz, within_rec709
 from lambent.materials.measured.klems import BUILT_IN, AngleBasis, PatchMatrix
@@ -19,6 +20,8 @@ from lambent.materials.measured.tree_part import TreePart
 Way = Literal["reflection", "transmission"]
 Side = Literal[1, -1]
 Where = tuple[Way, Side]
+Part = PatchMatrix | TreePart
+"""f of reflection or transmission on one side."""
 
 # The files' Back is +z: Radiance's front, from which its tools trace.
 _DIRECTIONS: dict[str, Where] = {
@@ -31,50 +34,26 @@ _STRUCTURES = ("Columns", "Rows", "TensorTree3", "TensorTree4")
 _QUANTITIES = ("", "btdf", "brdf", "bsdf")
 _LUMINANCE = ("visible", "cie-y")
 _CHROMA = {"cie-x": 0, "cie-z": 1, "cie-u": 0, "cie-v": 1}
-_SHIRLEY_CHIU = "lbnl/shirley-chiu"
+_SHIRLEY_CHIU = "LBNL/Shirley-Chiu"
 _MOST_RINGS = 46  # Radiance's limit
 _SAME_DEG = 1e-4
-_SATURATED = 1e-3  # of Y: what rounding in the file makes negative is not worth a word
-
-
-class Part(Protocol):
-    """f of one side and one way."""
-
-    @property
-    def channels(self) -> int: ...
-    @property
-    def dark(self) -> bool: ...
-    @property
-    def negative(self) -> int: ...
-    @property
-    def anisotropy(self) -> float: ...
-    @property
-    def direct_share(self) -> float: ...
-    @property
-    def sizes(self) -> dict[str, int]: ...
-    def at(self, entering: Floats, leaving: Floats) -> Floats: ...
-    def hemispherical(self, entering: Floats) -> Floats: ...
-    def hemispherical_reversed(self, leaving: Floats) -> Floats: ...
-    def tuples(self) -> tuple[Floats, Floats, Floats, Floats]: ...
-    def tuples_reversed(self) -> tuple[Floats, Floats, Floats, Floats]: ...
+_SATURATED = 1e-3  # of Y: smaller negative values come from rounding in the file
 
 
 def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[str, ...]]:
-    """The parts of a file by way and side, and what had to be chosen.
+    """The parts of a file by way and side, and notes on the choices made.
 
-    Parts that are zero throughout are left out, as Radiance leaves them out: of a transmission, the other side's stands
-    in.
+    Parts that are zero throughout are left out, as by Radiance: the other side's transmission then stands for both.
 
     Raises
     ------
     UserError
-        Where a basis, a structure, a quantity or a value is not one this format has, or nothing can be used.
+        A basis, structure, quantity or value is not of this format, or nothing can be used.
     """
     structure = next((s for s in _STRUCTURES if s.lower() == document.structure.lower()), None)
     if structure is None:
-        raise UserError(
-            "unknown", file=file, field="IncidentDataStructure", got=document.structure, expected=", ".join(_STRUCTURES)
-        )
+        got, expected = document.structure, ", ".join(_STRUCTURES)
+        raise UserError("unknown", file=file, field="IncidentDataStructure", got=got, expected=expected)
     chosen, notes = _choose(document, file)
     maker = _Matrices(document, structure, file) if structure in ("Columns", "Rows") else _Trees(structure, file)
     parts = {where: maker.part(blocks) for where, blocks in chosen.items()}
@@ -98,17 +77,12 @@ def sizes_of(parts: Iterable[Part]) -> dict[str, int]:
 
 
 def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Block | None]], list[str]]:
-    """Per way and side [luminance, X or u', Z or v'], and what was chosen; the last of equal blocks counts."""
+    """Blocks [luminance, X or u', Z or v'] per way and side, and notes; of equal blocks the last counts."""
     names = {block.wavelength.lower(): block.wavelength for block in document.blocks}
     main = next((n for n in (*_LUMINANCE, "solar") if n in names), None)
     if main is None:
-        raise UserError(
-            "has no block that can be used",
-            file=file,
-            field="Wavelength",
-            got=", ".join(names.values()) or None,
-            expected="Visible",
-        )
+        got = ", ".join(names.values()) or None
+        raise UserError("has no block that can be used", file=file, field="Wavelength", got=got, expected="Visible")
     chosen: dict[Where, list[Block | None]] = {}
     repeated = 0
     for block in document.blocks:
@@ -118,9 +92,8 @@ def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Block | No
         if where is None or slot is None:
             continue
         if block.quantity.lower() not in _QUANTITIES:
-            raise UserError(
-                "unknown", file=file, field="ScatteringDataType", got=block.quantity, expected="BTDF or BRDF, in 1/sr"
-            )
+            expected = "BTDF or BRDF, in 1/sr"
+            raise UserError("unknown", file=file, field="ScatteringDataType", got=block.quantity, expected=expected)
         slots = chosen.setdefault(where, [None, None, None])
         repeated += slots[slot] is not None
         slots[slot] = block
@@ -144,12 +117,12 @@ def _wavelength_notes(
     if ignored:
         notes.append(f"ignored: {', '.join(ignored)}")
     if repeated:
-        notes.append(f"{repeated} blocks stand there twice: the later one counts")
+        notes.append(f"{repeated} blocks occur twice: the later one counts")
     return notes
 
 
 class _Matrices:
-    """Makes parts of blocks stored by columns or rows."""
+    """Makes parts from blocks stored by columns or rows."""
 
     def __init__(self, document: Document, structure: str, file: Path) -> None:
         self.notes: list[str] = []
@@ -162,13 +135,14 @@ class _Matrices:
         if not defined.name or not defined.rings:
             return
         basis = _basis_of(defined, self._file)
-        known = self._bases.get(basis.name.lower())
-        if known is not None and not _same(known, basis):
+        usual = self._bases.get(basis.name.lower())
+        if usual is not None and _same(usual, basis):
+            return
+        if usual is not None:
             self.notes.append(
                 f"{basis.name} is not the usual one; taken as the file defines it, which Radiance does not"
             )
-        if known is None or not _same(known, basis):
-            self._bases[basis.name.lower()] = basis
+        self._bases[basis.name.lower()] = basis
 
     def part(self, blocks: list[Block | None]) -> Part:
         channels = [self._matrix(block) for block in blocks if block is not None]
@@ -181,7 +155,7 @@ class _Matrices:
             rgb = rgb_of_xyz(values[..., [1, 0, 2]])
             outside = int((rgb.min(axis=-1) < -_SATURATED * values[..., 0])[read[..., 0]].sum())
             if outside:
-                self.notes.append(f"{outside} values are more saturated than Rec.709: drawn towards their grey")
+                self.notes.append(f"{outside} values are more saturated than Rec.709 and were desaturated")
             values = np.where(read, within_rec709(rgb), -1.0)
         return PatchMatrix(incident, outgoing, values)
 
@@ -194,18 +168,20 @@ class _Matrices:
         if words != shape[0] * shape[1]:
             expected = f"{shape[0]} x {shape[1]} values"
             raise UserError("count does not fit", file=self._file, field=block.direction, got=words, expected=expected)
-        values = _finite(_numbers(block, self._file), block, self._file)
+        try:
+            values = _finite(numbers_of(block.text), block, self._file)
+        except Malformed as error:
+            raise UserError(f"holds {error}", file=self._file, field=block.direction) from error
         return incident, outgoing, values.reshape(shape[::-1]).T if self._by_rows else values.reshape(shape)
 
     def _basis(self, name: str, field: str) -> AngleBasis:
         if name.lower() not in self._bases:
-            known = ", ".join(basis.name for basis in self._bases.values())
-            raise UserError("unknown angle basis", file=self._file, field=field, got=name or "none", expected=known)
+            known("angle basis", name or "none", [b.name for b in self._bases.values()], file=self._file, field=field)
         return self._bases[name.lower()]
 
 
 class _Trees:
-    """Makes parts of tensor trees."""
+    """Makes parts from tensor trees."""
 
     def __init__(self, structure: str, file: Path) -> None:
         self.notes: list[str] = []
@@ -216,24 +192,15 @@ class _Trees:
         return TreePart(tuple(self._tree(block) for block in blocks if block is not None))
 
     def _tree(self, block: Block) -> TensorTree:
-        if block.angles.lower() != _SHIRLEY_CHIU:
+        if block.angles.lower() != _SHIRLEY_CHIU.lower():
             got = block.angles or "none"
-            raise UserError(
-                "unknown angle basis", file=self._file, field="AngleBasis", got=got, expected="LBNL/Shirley-Chiu"
-            )
+            raise UserError("unknown angle basis", file=self._file, field="AngleBasis", got=got, expected=_SHIRLEY_CHIU)
         try:
             tree = parse_tree(block.text, self._rank)
         except Malformed as error:
             raise UserError(f"tensor tree is broken ({error})", file=self._file, field=block.direction) from error
         _finite(tree.values, block, self._file)
         return tree
-
-
-def _numbers(block: Block, file: Path) -> Floats:
-    try:
-        return numbers_of(block.text)
-    except Malformed as error:
-        raise UserError(f"holds {error}", file=file, field=block.direction) from error
 
 
 def _finite(values: Floats, block: Block, file: Path) -> Floats:
@@ -244,7 +211,7 @@ def _finite(values: Floats, block: Block, file: Path) -> Floats:
 
 
 def _basis_of(defined: Basis, file: Path) -> AngleBasis:
-    """The basis of its words, or a `UserError`."""
+    """The basis that the file defines, or a `UserError`."""
 
     def refuse(why: str) -> UserError:
         return UserError(f"impossible angle basis: {why}", file=file, field=defined.name)

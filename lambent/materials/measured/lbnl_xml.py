@@ -1,8 +1,8 @@
 """BSDF files of LBNL WINDOW and Radiance: Klems and other matrices, tensor trees, both sides of a sheet.
 
-n = +z is the side the files call Back and Radiance calls front; both take x and y as they stand. f is what Radiance
-evaluates, without its jitter: constant over patches or leaves, never interpolated. A transmission that is given for one
-side alone is used backwards for the other; a reflection that is not given is black.
+n = +z is the side the files call Back and Radiance calls front; both take x and y as given. f is Radiance's own,
+without its jitter: constant over patches or leaves, never interpolated. A transmission given for one side alone is
+reversed for the other; a reflection that is not given is black.
 
 Sources: Klems 1994, "A new method for predicting the solar heat gain of complex fenestration systems"; Ward, Kurt &
 Bonneel 2012, "A practical framework for sharing and rendering real-world bidirectional scattering distribution
@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.directions import HALF_TURN, Floats, raised
 from lambent.core.files import read_bytes
 from lambent.materials.measured import lbnl_document, lbnl_parts
-from lambent.materials.measured.lbnl_parts import Part, Side, Way
+from lambent.materials.measured.lbnl_parts import Part, Side, Way, Where
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
+from lambent.materials.measured.table import IntegratedTable, on_flat_pairs
 
 NAME = "LBNL BSDF XML"
 LIMIT_BYTES = 1 << 30
 ISOTROPIC_WITHIN = 0.02  # of the mean of f
 _DIRECT_SHARE = 0.5
 
-Where = tuple[Way, Side]
 _NAMES: dict[Where, str] = {
     ("reflection", 1): "reflection of the side +z",
     ("reflection", -1): "reflection of the side -z",
@@ -47,28 +47,26 @@ def read(path: Path) -> LbnlTable:
     Raises
     ------
     UserError
-        Where it is not well-formed, declares a document type, names an unknown basis, holds another count of values
+        The file is not well-formed, declares a document type, names an unknown basis, holds another count of values
         than its bases need, a word that is no number or a value that is not finite, or nothing above zero.
     """
-    content = read_bytes(path, LIMIT_BYTES)
-    document = lbnl_document.parse(content, path)
-    del content
+    document = lbnl_document.parse(read_bytes(path, LIMIT_BYTES), path)
     parts, notes = lbnl_parts.parts_of(document, path)
     return LbnlTable(path.name, parts, notes)
 
 
 @dataclass(frozen=True)
 class Use:
-    """How light that comes from one side is answered: by a part of the file, or by the other side's backwards."""
+    """The part used for light from one side: its own, or the other side's with reversed light."""
 
     part: Part
     backwards: bool
 
 
-class LbnlTable:
+class LbnlTable(IntegratedTable):
     """Both sides of a sheet, each with reflection and transmission, as far as the file has them.
 
-    `uses` says by (way, side of the light) which part answers.
+    `uses` maps (way, side of the light) to the part to use.
 
     Parameters
     ----------
@@ -77,7 +75,7 @@ class LbnlTable:
     parts : dict
         (way, side) -> part; side +1 is light from +z.
     notes : tuple of str
-        What the reading of the file had to choose.
+        On the choices made when the file was read.
     """
 
     def __init__(self, file: str, parts: dict[Where, Part], notes: tuple[str, ...] = ()) -> None:
@@ -98,23 +96,23 @@ class LbnlTable:
 
     @property
     def has_a_back(self) -> bool:
-        """Whether the table says anything of light from -z."""
+        """Whether the table holds data of light from -z."""
         return any(side == -1 for _, side in self.uses)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr of wi, wo (..., 3) on any side; 0 at the horizon."""
-        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-        shape = wi.shape[:-1]
-        wi, wo = wi.reshape(-1, 3), wo.reshape(-1, 3)
+        return on_flat_pairs(self._eval, wi, wo)
+
+    def _eval(self, wi: Floats, wo: Floats) -> Floats:
         f = np.zeros((len(wi), self.info.channels))
         for (way, side), use in self.uses.items():
             far = -side if way == "transmission" else side
             here = (wi[:, 2] * side > 0) & (wo[:, 2] * far > 0)
-            entering, leaving = _entering(wi[here]), _leaving(wo[here])
+            entering, leaving = _entering(wi[here]), raised(wo[here])
             if use.backwards:
-                entering, leaving = leaving * _BACK, entering * _BACK
+                entering, leaving = leaving * HALF_TURN, entering * HALF_TURN
             f[here] = use.part.at(entering, leaving)
-        return f.reshape(*shape, -1)
+        return f
 
     def reflectivity(self, wi: Floats) -> Floats:
         """r (..., C): the exact sum over patches or leaves, on the side of wi."""
@@ -124,29 +122,21 @@ class LbnlTable:
         """t (..., C): the exact sum over patches or leaves, on the far side."""
         return self._hemispherical(wi, "transmission")
 
-    def albedo(self, wi: Floats) -> Floats:
-        """r + t (..., C)."""
-        return np.asarray(self.reflectivity(wi) + self.transmissivity(wi))
-
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """Tuples of the side +z: the middles of all pairs of patches, or of leaves at an even choice of wi.
+        """Tuples of the side +z: all pairs of patches, or the leaves at an even choice of wi.
 
-        Of a file that knows light from -z alone the sheet is turned over, z for -z.
+        A file with light from -z alone is turned over, z for -z.
         """
         side: Side = -1 if self._turned else 1
-        columns: list[list[Floats]] = [[], [], [], []]
+        tuples = []
         for (way, from_side), use in self.uses.items():
             if from_side == side:
                 entering, leaving, f, weight = use.part.tuples_reversed() if use.backwards else use.part.tuples()
+                f = np.broadcast_to(f, (len(f), self.info.channels))
                 far = -1.0 if way == "transmission" else 1.0
-                new = (entering * _BACK, leaving * (1, 1, far), self._in_channels(f), weight)
-                for column, values in zip(columns, new, strict=True):
-                    column.append(values)
-        wi, wo, f, weight = (np.concatenate(column) for column in columns)
+                tuples.append((entering * HALF_TURN, leaving * (1, 1, far), f, weight))
+        wi, wo, f, weight = (np.concatenate(column) for column in zip(*tuples, strict=True))
         return collect(wi, wo, f, weight, self.info, np.zeros(len(f), dtype=bool), max_count)
-
-    def _in_channels(self, f: Floats) -> Floats:
-        return np.broadcast_to(f, (len(f), self.info.channels))
 
     def _hemispherical(self, wi: Floats, way: Way) -> Floats:
         flat = np.asarray(wi, float).reshape(-1, 3)
@@ -155,11 +145,8 @@ class LbnlTable:
             here = flat[:, 2] * side > 0
             if way_of != way or not here.any():
                 continue
-            entering = _entering(flat[here])
-            if use.backwards:
-                total[here] = use.part.hemispherical_reversed(entering * _BACK)
-            else:
-                total[here] = use.part.hemispherical(entering)
+            look_up = use.part.hemispherical_reversed if use.backwards else use.part.hemispherical
+            total[here] = look_up(_entering(flat[here]) * (HALF_TURN if use.backwards else 1.0))
         return total.reshape(*wi.shape[:-1], -1)
 
     def _notes(self, anisotropy: float) -> list[str]:
@@ -169,9 +156,9 @@ class LbnlTable:
                 if where[0] == "reflection":
                     notes.append(f"{name} is not in the file, or zero: black")
             elif self.uses[where].backwards:
-                notes.append(f"{name} is not in the file, or zero: the other side's backwards, as Radiance does")
+                notes.append(f"{name} is not in the file, or zero: reversed from the other side, as in Radiance")
         if self._turned:
-            notes.append("the file knows light from -z alone: for a fit the sheet is turned over")
+            notes.append("the file holds light from -z alone: for a fit the sheet is turned over")
         if 0 < anisotropy <= ISOTROPIC_WITHIN:
             notes.append(f"turning the sheet changes f by {100 * anisotropy:.2g} %: taken as isotropic")
         for where, part in self.parts.items():
@@ -181,22 +168,15 @@ class LbnlTable:
         if direct:
             shares = ", ".join(f"{100 * share:.0f} % of the {_NAMES[where]}" for where, share in direct.items())
             notes.append(
-                f"{shares} is in the patch of the mirrored or the straight direction: how much sharper than a patch "
-                "that is, the file does not say, and no fit can; a width below the patch's is a guess"
+                f"{shares} is in the patch of the mirrored or the straight direction: neither the file nor a fit can "
+                "tell how much sharper than a patch that is; a width below the patch's is a guess"
             )
         return notes
 
 
-_BACK = np.array((-1.0, -1.0, 1.0))  # turns a heading round: light that comes from where it went
-
-
 def _entering(wi: Floats) -> Floats:
-    """Headings (N, 3), z >= 0, of light that comes from wi: the way it travels, projected on the sheet."""
-    return np.column_stack([-wi[:, 0], -wi[:, 1], np.abs(wi[:, 2])])
-
-
-def _leaving(wo: Floats) -> Floats:
-    return np.column_stack([wo[:, 0], wo[:, 1], np.abs(wo[:, 2])])
+    """Headings (N, 3), z >= 0, of light from wi."""
+    return np.asarray(raised(wi) * HALF_TURN)
 
 
 def _use(parts: dict[Where, Part], where: Where) -> Use | None:

@@ -1,55 +1,42 @@
-"""Warp of the unit square by a tabulated density, and its inverse, between which two parameters interpolate.
+"""Warp of the unit square by a tabulated density with two parameters, and its inverse.
 
 Dupuy & Jakob 2018, "An adaptive parameterization for efficient material acquisition and rendering", section 4: the
 density is bilinear between nodes; the row is drawn from its marginal and the column from its conditional distribution.
-Values, marginals and conditionals of neighbouring parameters are interpolated each by itself, as the renderers that
-define the format do it; so f depends on this very order.
+Values, marginals and conditionals of neighbouring parameters are interpolated separately, as in the renderers that
+define the format; f depends on this order.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
-
-Indices = NDArray[np.int64]
+from lambent.core.arrays import Floats, Indices
+from lambent.materials.measured.table import bracket
 
 
 class Corners:
     """Slices of a two-parameter table around each query, and their weights: (N, 4) each."""
 
     def __init__(self, nodes: tuple[Floats, Floats], at: tuple[Floats, Floats]) -> None:
-        (i0, i1, u), (j0, j1, v) = (_bracket(n, x) for n, x in zip(nodes, at, strict=True))
+        (i0, i1, u), (j0, j1, v) = (bracket(n, x) for n, x in zip(nodes, at, strict=True))
         columns = len(nodes[1])
         self.slices = np.stack([i0 * columns + j0, i0 * columns + j1, i1 * columns + j0, i1 * columns + j1], axis=-1)
         self.weights = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v], axis=-1)
 
     def blend(self, table: Floats, *index: Indices) -> Floats:
         """table (slices, ...) at (slice, *index), blended over the four corners: (N, ...)."""
-        value = table[(self.slices[:, 0], *index)] * _rising(self.weights[:, 0], table.ndim - 1 - len(index))
-        for k in range(1, 4):
-            value = value + table[(self.slices[:, k], *index)] * _rising(
-                self.weights[:, k], table.ndim - 1 - len(index)
-            )
-        return np.asarray(value)
+        extra = table.ndim - 1 - len(index)
+        parts = [table[(self.slices[:, k], *index)] * _rising(self.weights[:, k], extra) for k in range(4)]
+        return np.asarray(sum(parts[1:], parts[0]))
 
 
 def _rising(weight: Floats, dimensions: int) -> Floats:
+    """The array with so many more dimensions of size 1."""
     return weight.reshape(weight.shape + (1,) * dimensions)
 
 
-def _bracket(nodes: Floats, x: Floats) -> tuple[Indices, Indices, Floats]:
-    """Indices on either side of x and the share of the upper one; x is clamped to the nodes."""
-    if len(nodes) == 1:
-        zero = np.zeros(x.shape, dtype=np.int64)
-        return zero, zero, np.zeros(x.shape)
-    low = (np.searchsorted(nodes, x, side="left") - 1).clip(0, len(nodes) - 2)
-    return low, low + 1, ((x - nodes[low]) / (nodes[low + 1] - nodes[low])).clip(0, 1)
-
-
 def _cell(shape: tuple[int, ...], xy: Floats) -> tuple[Indices, Indices, Floats, Floats]:
-    """(column, row, x, y): the patch of a (rows, columns) grid of nodes that xy (N, 2) lies in, and the place in it."""
+    """(column, row, x, y): the patch of a (rows, columns) grid of nodes that holds xy (N, 2), and the place in it."""
     scaled = xy.clip(0, 1) * (shape[1] - 1, shape[0] - 1)
     column = scaled[:, 0].astype(np.int64).clip(0, shape[1] - 2)
     row = scaled[:, 1].astype(np.int64).clip(0, shape[0] - 2)
@@ -67,7 +54,7 @@ def bilinear(table: Floats, corners: Corners, xy: Floats) -> Floats:
 
 
 class Warp:
-    """Density on the unit square per slice, normalised to 1; `sample` and `invert` are inverses of each other.
+    """Density on the unit square per slice, normalised to 1; `sample` and `invert` are mutual inverses.
 
     Parameters
     ----------
@@ -87,7 +74,7 @@ class Warp:
         self.marginal = np.pad(marginal / total[:, None], ((0, 0), (1, 0)))
 
     def invert(self, corners: Corners, xy: Floats) -> tuple[Floats, Floats]:
-        """The uniform point (N, 2) that `sample` takes to xy (N, 2), and the density (N,) there."""
+        """The uniform point (N, 2) that `sample` warps to xy (N, 2), and the density (N,) there."""
         rows, columns = self.density.shape[1:]
         column, row, x, y = _cell((rows, columns), xy)
         c0, c1 = (self._between_rows(corners, self.density, row, y, column + k) for k in (0, 1))
@@ -128,7 +115,7 @@ def _integral(x: Floats, v0: Floats, v1: Floats) -> Floats:
 
 
 def _solve(mass: Floats, v0: Floats, v1: Floats) -> Floats:
-    """x in [0, 1] whose `_integral` is `mass`; the form without cancellation for v0 near v1."""
+    """x in [0, 1] whose `_integral` is `mass`, in the form that does not cancel for v0 near v1."""
     root = np.sqrt(np.maximum(v0 * v0 + 2 * mass * (v1 - v0), 0))
     denominator = v0 + root
     x: Floats = np.divide(2 * mass, denominator, out=np.zeros_like(mass), where=denominator > 0)

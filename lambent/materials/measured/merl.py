@@ -12,12 +12,12 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, direction, normalize, reflect
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, collect
+from lambent.materials.measured.protocol import LARGEST_F, MeasuredSamples, collect
 from lambent.materials.measured.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
@@ -25,8 +25,6 @@ SCALES = np.array([1.0, 1.15, 1.66]) / 1500
 LIMIT_BYTES = 1 << 30
 _HEADER_BYTES = 12
 _USUAL = (90, 90, 180)
-
-Indices = NDArray[np.int64]
 
 
 def recognise(head: bytes, size: int) -> bool:
@@ -44,7 +42,7 @@ def read(path: Path) -> MerlTable:
     Raises
     ------
     UserError
-        Where the size does not fit the header, the byte order is foreign, or nothing was measured.
+        The size does not fit the header, the byte order is big-endian, or nothing was measured.
     """
     content = read_bytes(path, LIMIT_BYTES)
     shape = struct.unpack_from("<3i", content)
@@ -68,13 +66,12 @@ class MerlTable(ReflectionTable):
     ----------
     planes : (3, theta_h, theta_d, phi_d)
         R, G, B as stored, before MERL's scales.
-    path : Path
     """
 
     def __init__(self, planes: Floats, path: Path) -> None:
         self._raw = planes
         with np.errstate(invalid="ignore"):
-            # Channel by channel: a million bins as one array of flags would take as much memory as a plane.
+            # Channel by channel, because flags of a million bins at once would take as much memory as a plane.
             bounds = [scale * LARGEST_F for scale in 1 / SCALES]
             self._measured = np.logical_and.reduce(
                 [(plane >= 0) & (plane <= bound) for plane, bound in zip(planes, bounds, strict=True)]
@@ -86,7 +83,7 @@ class MerlTable(ReflectionTable):
     @cached_property
     def _filled(self) -> Floats:
         """(bins, 3) f in 1/sr without holes, phi_d fastest."""
-        with np.errstate(invalid="ignore", over="ignore"):  # in cells that are filled from their neighbours
+        with np.errstate(invalid="ignore", over="ignore"):  # in holes, filled below
             f = np.moveaxis(self._raw, 0, -1) * SCALES
         return fill_holes(f, self._measured).reshape(-1, 3)
 
@@ -105,38 +102,43 @@ class MerlTable(ReflectionTable):
         return value
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """One tuple per bin whose directions are above the surface; wi stands at phi_i = 0.
+        """One tuple per bin whose directions are above the surface, with wi at phi_i = 0.
 
         The weight is the bin's share of d_wi d_wo = 4 cos(theta_d) d_wh d_wd (Rusinkiewicz 1998), in sr^2.
         """
         shape = self._measured.shape
-        i, j, k = np.ogrid[tuple(slice(0, n) for n in shape)]
-        theta_h = ((i + 0.5) / shape[0]) ** 2 * np.pi / 2
-        theta_d, phi_d = (j + 0.5) / shape[1] * np.pi / 2, (k + 0.5) / shape[2] * np.pi
+        theta_h, theta_d, phi_d = bin_centres(shape)
         wi, wo, exists = _above_horizon(theta_h, theta_d, phi_d)
+        i = np.arange(shape[0])[:, None, None]
         cell_h = (((i + 1) / shape[0]) ** 2 - (i / shape[0]) ** 2) * np.pi / 2
-        turns = 2 * np.pi * 2  # phi_h runs round, and phi_d + pi is the same bin
+        turns = 2 * np.pi * 2  # phi_h covers the circle, and phi_d + pi is the same bin
         cell_d = (np.pi / 2 / shape[1]) * (np.pi / shape[2]) * np.sin(theta_d)
         weight = 4 * np.cos(theta_d) * np.sin(theta_h) * cell_h * cell_d * turns
         f = np.empty((len(wi), 3))
-        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts what is not finite
+        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts values that are not finite
             for channel, (plane, scale) in enumerate(zip(self._raw, SCALES, strict=True)):
                 np.multiply(plane[exists], scale, out=f[:, channel])
         shadowed = np.asarray((f < 0).any(axis=1))
         return collect(wi, wo, f, np.broadcast_to(weight, shape)[exists], self.info, shadowed, max_count)
 
 
+def bin_centres(shape: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
+    """theta_h (A, 1, 1), theta_d (1, B, 1) and phi_d (1, 1, C) at the bins' centres."""
+    i, j, k = np.ogrid[tuple(slice(0, n) for n in shape)]
+    return ((i + 0.5) / shape[0]) ** 2 * np.pi / 2, (j + 0.5) / shape[1] * np.pi / 2, (k + 0.5) / shape[2] * np.pi
+
+
 def _between(unit: Floats, count: int) -> tuple[Indices, Floats]:
-    """The bin centre at or before the place `unit` in [0, 1], from -1 on, and the share of the next one."""
+    """Index of the bin centre at or before `unit` in [0, 1], from -1 on, and the share of the next one."""
     place = unit * count - 0.5
     low = np.floor(place)
     return low.astype(np.int64), np.asarray(place - low)
 
 
 def _above_horizon(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Floats, Floats, Flags]:
-    """wi (N, 3) at phi_i = 0 and wo (N, 3) of the half and difference angles' grid where both are above the surface.
+    """wi (N, 3) at phi_i = 0 and wo (N, 3) on the grid of half and difference angles, where both are above the surface.
 
-    Written out by component: a million bins as whole (..., 3) arrays take four times the memory.
+    By component, because whole (..., 3) arrays of a million bins take four times the memory.
     """
     across, along = np.cos(theta_h) * np.sin(theta_d) * np.cos(phi_d), np.sin(theta_h) * np.cos(theta_d)
     up, tilt = np.cos(theta_h) * np.cos(theta_d), np.sin(theta_h) * np.sin(theta_d) * np.cos(phi_d)
@@ -154,9 +156,8 @@ def _above_horizon(theta_h: Floats, theta_d: Floats, phi_d: Floats) -> tuple[Flo
 
 def half_difference_angles(wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
     """(theta_h, theta_d, phi_d) of Rusinkiewicz 1998; phi_d in [0, pi), because phi_d + pi swaps wi and wo."""
-    h = normalize(wi + wo)
-    theta_h = np.arctan2(np.hypot(h[..., 0], h[..., 1]), h[..., 2])
-    phi_h = np.arctan2(h[..., 1], h[..., 0])
+    h = half_vector(wi, wo)
+    theta_h, phi_h = elevation(h), np.arctan2(h[..., 1], h[..., 0])
     c, s = np.cos(phi_h), np.sin(phi_h)
     x, y = c * wi[..., 0] + s * wi[..., 1], c * wi[..., 1] - s * wi[..., 0]
     c, s = np.cos(theta_h), np.sin(theta_h)

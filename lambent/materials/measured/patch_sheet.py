@@ -1,15 +1,15 @@
-"""A sheet of patch matrices as a renderer looks it up and samples it: exactly, patch by patch.
+"""A sheet of patch matrices that a renderer looks up and samples exactly, patch by patch.
 
-f is constant over pairs of patches, so nothing is resampled: a direction's patch is found in the bounds of its basis'
-rings, f is one number of the matrix, and a sample is the light's patch by the row's CDF (mean of the channels times
-projected solid angle), then a direction even in projected solid angle within it. So f cos(theta_i) / pdf is the same
-for all samples of a row, in the mean of the channels: the albedo.
+f is constant over pairs of patches, so nothing is resampled: a direction's patch follows from the bounds of its basis'
+rings, f is one entry of the matrix, and a sample is the light's patch by the row's CDF (mean of the channels times
+projected solid angle), then a direction even in projected solid angle within it. f cos(theta_i) / pdf, mean over the
+channels, is therefore the same for all samples of a row: the albedo.
 
-Roles: the viewer (wo) is given, the light (wi) is sampled. Radiance's matrices need not be reciprocal, so the row is
-that of all incident patches for one outgoing patch; `reverse` exchanges the roles, for photons.
+Roles: the viewer (wo) is given, the light (wi) is sampled. Radiance's matrices need not be reciprocal, so a row holds
+all incident patches of one outgoing patch; `reverse` exchanges the roles, for photons.
 
-Conventions are those of half_vector_grid.py: components, f in 1/sr without the cosine, `ops` names the array library.
-Both cosines of a patch's place are looked up, sin^2 and cos^2: neither is left to cancel in float32.
+Conventions are those of half_vector_grid.py: components, f in 1/sr without the cosine, `ops` is the array library.
+A patch's sin^2 and cos^2 are both stored, so that neither cancels in float32.
 """
 
 from __future__ import annotations
@@ -20,26 +20,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, silent
-from lambent.materials.lobes import COS_MIN, Vector
-from lambent.materials.measured.half_vector_grid import (
-    NUMPY,
-    GridOps,
-    GridShape,
-    HalfVectorGrid,
-    grid_of,
-    turns,
-)
-from lambent.materials.measured.klems import AngleBasis, Indices, PatchMatrix
+from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector
+from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid, chosen_side, first_above, turns
+from lambent.materials.measured.half_vector_resampling import grid_of
+from lambent.materials.measured.klems import AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_parts import Side, Way
 from lambent.materials.measured.lbnl_xml import LbnlTable, Use
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
-_BEYOND = 4.0  # as sin^2(theta): no direction is there
-_WHOLE_DEG = 90 - 1e-3  # a basis up to here has the horizon
+_BEYOND = 4.0  # as sin^2(theta): above that of any direction
+_WHOLE_DEG = 90 - 1e-3  # a basis up to here reaches the horizon
 _BOUNDS = 6
 _SLIVER = 1e-5  # rad; float32 bounds of phi are no better
 _BELOW_ONE = 1 - 2.0**-24
@@ -47,7 +41,7 @@ _BELOW_ONE = 1 - 2.0**-24
 
 @dataclass(frozen=True)
 class PatchSheet:
-    """Flat arrays of numpy, or of the path tracer. A page is a face of the viewer and a kind of scattering.
+    """Flat arrays of numpy or of the path tracer. A page is a face of the viewer and a kind of scattering.
 
     Attributes
     ----------
@@ -58,7 +52,7 @@ class PatchSheet:
     patches : int
         Of the largest basis; the others are padded.
     rings : int
-        Likewise, plus one for what is beyond the last ring.
+        Of the largest basis, plus one for directions beyond the last ring.
     viewer_edges : (faces, kinds, rings) flat float32
         sin^2 of the upper theta of the rings of the viewer's basis.
     viewer_counts, viewer_starts : (faces, kinds, rings) flat float32
@@ -66,17 +60,17 @@ class PatchSheet:
     light_edges, light_counts, light_starts
         The same of the light's basis.
     signs : (faces, kinds, 2) flat float32
-        -1 where headings point against the direction: to the viewer, to the light.
+        -1 where headings are opposite to the direction: to the viewer, to the light.
     values : (faces, kinds, patches of the viewer, patches of the light, 3) flat float32
         f in 1/sr, linear RGB; grey is repeated.
     cdf : (faces, kinds, patches of the viewer, patches of the light) flat float32
-        Probability of the light's patches up to and with this one.
+        Cumulative probability of the light's patches.
     density : like cdf
-        Of the light's direction over its cosine, in 1/sr.
+        Density of the light's direction over its cosine, in 1/sr.
     bounds : (faces, kinds, patches of the light, 6) flat float32
         sin^2 theta, cos^2 theta, each lower and upper, first phi and width, of directions to the light.
     albedo, peak : (faces, kinds, patches of the viewer) flat float32
-        Of f cos(theta_i), mean of the channels: its integral over the side, and its least upper bound in 1/sr.
+        Integral of f cos(theta_i) over the side, and its least upper bound in 1/sr; means over the channels.
     """
 
     ARRAYS: ClassVar[tuple[str, ...]] = (
@@ -113,53 +107,48 @@ class PatchSheet:
 
     @property
     def anisotropic(self) -> bool:
-        """Patches turn with the sheet."""
+        """True: patches turn with the sheet."""
         return True
 
-    def evaluate(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Vector:
+    def evaluate(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Vector:
         """f in 1/sr per RGB channel, without the cosine."""
         pair, seen = self._pair(wi, wo, ops)
         red, green, blue = (ops.select(seen, ops.gather(self.values, 3 * pair + c), 0.0) for c in range(3))
         return red, green, blue
 
-    def pdf(self, wi: Vector, wo: Vector, ops: GridOps = NUMPY) -> Any:
+    def pdf(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
         """Density of `sample` in 1/sr."""
         pair, seen = self._pair(wi, wo, ops)
         across = self.share_across(wo, ops)
         share = ops.select(wi[2] * wo[2] < 0, across, 1 - across)
         return ops.select(seen, ops.gather(self.density, pair) * ops.abs(wi[2]) * share, 0.0)
 
-    def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: GridOps = NUMPY) -> Vector:
-        """wi; u_* uniform in [0, 1). Where nothing is scattered, or at the horizon, it comes back with wi.z = 0."""
-        share = self.share_across(wo, ops)
-        across = u_select < share
-        u_select = ops.select(
-            across, u_select / ops.maximum(share, 1e-9), (u_select - share) / ops.maximum(1 - share, 1e-9)
-        )
+    def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
+        """wi; u_* uniform in [0, 1). wi.z = 0 at the horizon, and where nothing is scattered."""
+        across, u_select = chosen_side(u_select, self.share_across(wo, ops), ops)
         page = self._page(wo, across, ops)
         row, inside = self._viewer_row(wo, page, ops)
-        first = row * self.patches
-        light = _drawn(ops.minimum(u_select, _BELOW_ONE), self.cdf, first, self.patches, ops)
+        light = first_above(ops.minimum(u_select, _BELOW_ONE), self.cdf, row * self.patches, self.patches, ops)
         at = _BOUNDS * (page * self.patches + light)
-        sin2, cos2, phi0, width = self._bounds_at(at, u1, ops)
+        s0, s1, c0, c1, phi0, width = (ops.gather(self.bounds, at + k) for k in range(_BOUNDS))
         phi = phi0 + u2 * width
-        sin_theta, z = ops.sqrt(sin2), ops.sqrt(cos2)
+        sin_theta, z = ops.sqrt(s0 + u1 * (s1 - s0)), ops.sqrt(c0 + u1 * (c1 - c0))
         z = ops.select(inside & (z > COS_MIN) & (ops.gather(self.albedo, row) > 0), z, 0.0)
         return sin_theta * ops.cos(phi), sin_theta * ops.sin(phi), ops.select((wo[2] > 0) == across, -z, z)
 
-    def share_across(self, wo: Vector, ops: GridOps = NUMPY) -> Any:
+    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
         """Probability of a transmitted sample."""
         if self.kinds == 1:
             return 0.0 * wo[2]
         near, far = (self.albedo_of(wo, across, ops) for across in (wo[2] > 2, wo[2] < 2))
         return far / ops.maximum(near + far, 1e-30)
 
-    def albedo_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
-        """Share of the light that is reflected or transmitted, mean of the channels."""
+    def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
+        """Share of the light that is reflected or transmitted, mean over the channels."""
         return self._of_viewer(self.albedo, wo, across, ops)
 
-    def peak_of(self, wo: Vector, across: Any, ops: GridOps = NUMPY) -> Any:
-        """Upper bound of f cos(theta_i), mean of the channels, in 1/sr."""
+    def peak_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
+        """Upper bound of f cos(theta_i), mean over the channels, in 1/sr."""
         return self._of_viewer(self.peak, wo, across, ops)
 
     def cell_borders(self, wo: Floats) -> Floats:
@@ -172,22 +161,22 @@ class PatchSheet:
         above, below = (reflected, other) if wo[2] > 0 else (other, reflected)
         return np.array(sorted([*above, *((-high, -low, a, b) for low, high, a, b in below)]))
 
-    def _of_viewer(self, table: Any, wo: Vector, across: Any, ops: GridOps) -> Any:
+    def _of_viewer(self, table: Any, wo: Vector, across: Any, ops: ArrayOps) -> Any:
         row, inside = self._viewer_row(wo, self._page(wo, across, ops), ops)
         return ops.select(inside & ~(across & (self.kinds == 1)), ops.gather(table, row), 0.0)
 
-    def _page(self, wo: Vector, across: Any, ops: GridOps) -> Any:
+    def _page(self, wo: Vector, across: Any, ops: ArrayOps) -> Any:
         face = ops.whole(ops.select((wo[2] < 0) & (self.faces == 2), 1.0, 0.0))
         return face * self.kinds + ops.whole(ops.select(across & (self.kinds == 2), 1.0, 0.0))
 
-    def _viewer_row(self, wo: Vector, page: Any, ops: GridOps) -> tuple[Any, Any]:
+    def _viewer_row(self, wo: Vector, page: Any, ops: ArrayOps) -> tuple[Any, Any]:
         """Number of the viewer's patch among all pages', and whether there is one."""
         basis = self.viewer_edges, self.viewer_counts, self.viewer_starts
         patch, inside = self._patch(wo, ops.gather(self.signs, 2 * page), page, basis, ops)
         return page * self.patches + patch, inside
 
-    def _pair(self, wi: Vector, wo: Vector, ops: GridOps) -> tuple[Any, Any]:
-        """Place of the pair of patches in the matrices, and whether light goes that way."""
+    def _pair(self, wi: Vector, wo: Vector, ops: ArrayOps) -> tuple[Any, Any]:
+        """Index of the pair of patches in the matrices, and whether it scatters light."""
         across = wi[2] * wo[2] < 0
         page = self._page(wo, across, ops)
         row, inside = self._viewer_row(wo, page, ops)
@@ -196,21 +185,16 @@ class PatchSheet:
         seen = inside & lit & (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN)
         return row * self.patches + light, seen & ((wi[2] * wo[2] > 0) | (self.kinds == 2))
 
-    def _patch(self, w: Vector, sign: Any, page: Any, basis: tuple[Any, Any, Any], ops: GridOps) -> tuple[Any, Any]:
-        """Patch of a direction, as `AngleBasis.index` finds it; and whether it is within the basis."""
+    def _patch(self, w: Vector, sign: Any, page: Any, basis: tuple[Any, Any, Any], ops: ArrayOps) -> tuple[Any, Any]:
+        """Patch of a direction, as from `AngleBasis.index`, and whether it is within the basis."""
         edges, counts, starts = basis
         first = page * self.rings
         x, y = sign * w[0], sign * w[1]
-        ring = first + _drawn(x * x + y * y, edges, first, self.rings, ops)
+        ring = first + first_above(x * x + y * y, edges, first, self.rings, ops)
         count = ops.gather(counts, ring)
         place = ops.floor(turns(y, x, ops) * count + 0.5)
         place = ops.select(place > count - 0.5, 0.0, place)
         return ops.whole(ops.gather(starts, ring) + place), count > 0.5
-
-    def _bounds_at(self, at: Any, u: Any, ops: GridOps) -> tuple[Any, Any, Any, Any]:
-        """sin^2 and cos^2 at a share `u` of a patch's projected solid angle, its first phi and its width."""
-        s0, s1, c0, c1, phi0, width = (ops.gather(self.bounds, at + k) for k in range(_BOUNDS))
-        return s0 + u * (s1 - s0), c0 + u * (c1 - c0), phi0, width
 
 
 Lookup = HalfVectorGrid | PatchSheet
@@ -220,9 +204,9 @@ _TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow
 def lookup_of(
     table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent, *, reverse: bool = False
 ) -> Lookup:
-    """The patches of a table that is made of them, else its dense grid, of which `shape` speaks.
+    """The patches of a table made of patch matrices, else its dense grid of the given `shape`.
 
-    `reverse`: the light's direction is given and the viewer's is sampled; `wi` and `wo` are exchanged in all methods.
+    `reverse`: the light's direction is given and the viewer's is sampled; all methods exchange `wi` and `wo`.
     """
     sheet = patch_sheet_of(table, reverse=reverse)
     if sheet is not None:
@@ -233,7 +217,7 @@ def lookup_of(
 
 
 def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:
-    """The sheet of a table that is patch matrices throughout, else None; `reverse` as of `lookup_of`."""
+    """The sheet of a table made of patch matrices alone, else None; `reverse` as in `lookup_of`."""
     if not isinstance(table, LbnlTable):
         return None
     matrices = [use.part for use in table.uses.values() if isinstance(use.part, PatchMatrix)]
@@ -254,7 +238,7 @@ def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet
 
 
 def _page_of(use: Use | None, reverse: bool, patches: int, rings: int) -> dict[str, Floats]:
-    """The arrays of one page; of a part that is missing, black ones."""
+    """The arrays of one page; black ones for a missing part."""
     if use is None:
         dark = AngleBasis("", (0.0, 90.0), (1,))
         return _arrays(dark, 1.0, dark, 1.0, np.zeros((1, 1, 3)), patches, rings)
@@ -272,14 +256,14 @@ def _page_of(use: Use | None, reverse: bool, patches: int, rings: int) -> dict[s
 def _arrays(
     viewer: AngleBasis, viewer_sign: float, light: AngleBasis, light_sign: float, f: Floats, patches: int, rings: int
 ) -> dict[str, Floats]:
-    """Of f (viewer.count, light.count, 3). CDF and density are those of the CDF as stored, rounded to float32."""
+    """The arrays of f (viewer.count, light.count, 3); the density follows from the stored CDF, rounded to float32."""
     values = np.zeros((patches, patches, 3), np.float32)
     values[: viewer.count, : light.count] = f
     mean = f.mean(axis=-1)
     mass = np.zeros((patches, patches))
     mass[: viewer.count, : light.count] = mean * light.projected_sr
     total = mass.sum(axis=-1)
-    # what is not drawn must not be: rows end at 1 with their last patch that scatters
+    # rows reach 1 at their last patch that scatters, so that none beyond it is drawn
     cdf = np.cumsum(mass, axis=-1) / np.where(total > 0, total, 1.0)[:, None]
     cdf = np.where(np.arange(patches) < patches - 1 - np.argmax(mass[:, ::-1] > 0, axis=-1)[:, None], cdf, 1.0)
     cdf = cdf.astype(np.float32)
@@ -308,9 +292,7 @@ def _rings(basis: AngleBasis, rings: int) -> tuple[Floats, Floats, Floats]:
 
 def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:
     """(patches, 6) as `PatchSheet.bounds`."""
-    n = np.array(basis.n_phis)
-    ring: Indices = np.repeat(np.arange(len(n)), n)
-    place = np.arange(basis.count) - basis.starts[ring]
+    n, ring, place = np.array(basis.n_phis), basis.rings, basis.places
     edges_deg = np.array(basis.edges_deg)
     cos2 = np.where(edges_deg < _WHOLE_DEG, np.cos(np.radians(edges_deg)) ** 2, 0.0)
     sin2 = np.where(edges_deg < _WHOLE_DEG, np.sin(np.radians(edges_deg)) ** 2, 1.0)
@@ -322,7 +304,7 @@ def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:
 
 
 def _strips(bounds: Floats) -> list[tuple[float, float, float, float]]:
-    """Ranges of z >= 0 and phi, in [0, 2 pi], of patches (N, 6); what is beyond the last ring is one more."""
+    """Ranges of z >= 0 and phi, in [0, 2 pi], of patches (N, 6), and of the rest beyond the last ring."""
     used = bounds[bounds[:, 5] > 0]
     strips = []
     edges = np.sqrt(np.unique(used[:, 2:4]))
@@ -332,13 +314,3 @@ def _strips(bounds: Floats) -> list[tuple[float, float, float, float]]:
         cuts = [0.0, *starts[(starts > _SLIVER) & (starts < 2 * np.pi - _SLIVER)], 2 * np.pi]
         strips += [(low, high, a, b) for a, b in pairwise(cuts)]
     return strips if edges[0] == 0 else [(0.0, float(edges[0]), 0.0, 2 * np.pi), *strips]
-
-
-def _drawn(u: Any, table: Any, first: Any, count: int, ops: GridOps) -> Any:
-    """Number of the first entry above `u` in the rising `table[first:first + count]`, whose last one is above."""
-    found, step = 0 * first, 1 << (count - 1).bit_length() >> 1
-    while step:
-        probe = ops.minimum(found + (step - 1), count - 1)
-        found = ops.select(ops.gather(table, first + probe) <= u, found + step, found)
-        step //= 2
-    return found

@@ -1,32 +1,31 @@
-"""What every measured table offers, whatever its file format.
+"""The protocol of measured tables, whatever their file format.
 
 Conventions: directions are unit vectors (..., 3) in the local frame with n = +z, pointing away from the surface; `wi`
 to the light, `wo` to the viewer. f is in 1/sr per channel and holds no cosine; the transfer probability is
-p(wo|wi) = f |cos theta_o| (2.4), and a reader converts what its file holds to f. One channel is grey; three are linear
+p(wo|wi) = f |cos theta_o| (2.4), and a reader converts its file's quantity to f. One channel is grey; three are linear
 RGB with Rec.709 primaries.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
+from lambent.materials.document import SIDES, Side
 
-Floats = NDArray[np.floating]
-Flags = NDArray[np.bool_]
-
-GRAZING_DEG = 84.0  # beyond this, gonio-photometers and grids see mostly their own errors
+GRAZING_DEG = 84.0  # beyond it, errors of gonio-photometers and grids prevail
 LARGEST_F = 1e9  # 1/sr; no surface is that bright, and its square still fits float32
 _COS_GRAZING = float(np.cos(np.radians(GRAZING_DEG)))
+Quantity = Literal["f", "f_cos", "p"]
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """How many raw tuples are not fit to be used, by the first reason that holds, in this order."""
+    """Number of raw tuples that cannot be used, by the first reason that holds, in this order."""
 
     shadowed: int = 0  # not measured: the device was in the way, or the file marks the cell as empty
     not_finite: int = 0
@@ -35,29 +34,29 @@ class LeftOut:
 
     @property
     def total(self) -> int:
-        return self.shadowed + self.not_finite + self.negative + self.grazing
+        return sum(asdict(self).values())
 
 
 @dataclass(frozen=True)
 class TableInfo:
-    """What a file says about itself.
+    """Metadata of a measured table.
 
     Attributes
     ----------
     file : str
-        Name of the file, without folders; the specimen's name for a table that was made in memory.
+        Name of the file, without folders; the specimen's name for a table made in memory.
     format : str
-        Name of the reader that took it.
+        Name of the reader.
     isotropic, transmits : bool
         Whether f depends on phi_i - phi_o alone; whether tuples with theta_o > 90 degrees exist.
     channels : int
         1 (grey) or 3 (linear RGB, Rec.709 primaries).
     stored : str
-        The quantity as the file holds it; `eval` and `samples` give f in 1/sr all the same.
+        The quantity in the file; `eval` and `samples` give f in 1/sr in any case.
     sizes : dict
         Grid dimensions by name, as stored.
     notes : tuple of str
-        What the reader repaired or assumed, for the user to read.
+        Repairs and assumptions of the reader, for the user to read.
     """
 
     file: str
@@ -65,7 +64,7 @@ class TableInfo:
     isotropic: bool
     transmits: bool
     channels: int
-    stored: Literal["f", "f_cos", "p"]
+    stored: Quantity
     sizes: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     units: Literal["1/sr"] = "1/sr"
@@ -82,12 +81,11 @@ class MeasuredSamples:
     f : (N, C) float64
         BSDF in 1/sr, without the cosine; C = 1 or 3; finite and >= 0.
     weight : (N,) float64
-        Solid angle that the tuple stands for, in sr: sin(theta_o) dtheta_o dphi_o of its cell where the table has
-        incident directions (the sin(theta_o) of (3.7)); the share of the joint measure d_wi d_wo, in sr^2, where it has
-        none (MERL, Cornell). Only ratios within a table have a meaning.
+        Solid angle of the tuple, in sr: sin(theta_o) dtheta_o dphi_o of its cell where the table has incident
+        directions (the sin(theta_o) of (3.7)); the share of the joint measure d_wi d_wo, in sr^2, where it has none
+        (MERL, Cornell). Only ratios within a table have a meaning.
     left_out : LeftOut
-        Tuples of the table that are not among these.
-    info : TableInfo
+        Tuples of the table that were left out.
     """
 
     wi: Floats
@@ -109,6 +107,15 @@ class MeasuredSamples:
     def transmitted(self) -> Flags:
         """(N,) whether wo is on the far side."""
         return np.asarray(self.wo[:, 2] < 0)
+
+    def on(self, side: Side) -> Flags:
+        """(N,) whether the tuple is one of reflection or of transmission."""
+        return self.transmitted if side == "transmission" else ~self.transmitted
+
+    @property
+    def sides(self) -> list[Side]:
+        """The sides that have tuples."""
+        return [side for side in SIDES if self.on(side).any()]
 
 
 class MeasuredTable(Protocol):
@@ -141,7 +148,7 @@ class MeasuredTable(Protocol):
 def collect(
     wi: Floats, wo: Floats, f: Floats, weight: Floats, info: TableInfo, shadowed: Flags, max_count: int | None = None
 ) -> MeasuredSamples:
-    """`MeasuredSamples` of raw tuples: leaves out and counts what cannot be used, then thins.
+    """`MeasuredSamples` of raw tuples: leaves out and counts unusable tuples, then thins.
 
     Parameters
     ----------
@@ -151,12 +158,12 @@ def collect(
     shadowed : (N,) bool
         Tuples the file marks as not measured.
     max_count : int, optional
-        Keep at most so many, spread evenly in storage order with a fixed seed.
+        Keep at most this many, spread evenly in storage order with a fixed seed.
 
     Raises
     ------
     UserError
-        Where nothing is left.
+        Nothing is left.
     """
     finite = (np.isfinite(f) & (f <= LARGEST_F)).all(axis=1)
     negative = (np.where(np.isfinite(f), f, 0) < 0).any(axis=1)
@@ -171,13 +178,16 @@ def collect(
     if len(chosen) == 0:
         raise UserError("holds no measured value", file=info.file, got=f"{len(f)} tuples, {describe(left_out)}")
     if max_count is not None and len(chosen) > max_count:
-        jitter = np.random.default_rng(0).random(max_count)
-        chosen = chosen[((np.arange(max_count) + jitter) * (len(chosen) / max_count)).astype(np.int64)]
+        chosen = chosen[even_choice(len(chosen), max_count)]
     return MeasuredSamples(wi[chosen], wo[chosen], f[chosen], weight[chosen], left_out, info)
+
+
+def even_choice(count: int, most: int) -> Indices:
+    """(most,) numbers below `count` >= `most`, jittered and evenly spread, always the same."""
+    return ((np.arange(most) + np.random.default_rng(0).random(most)) * (count / most)).astype(np.int64)
 
 
 def describe(left_out: LeftOut) -> str:
     """The counts in words, such as '12 shadowed, 3 negative'."""
-    named = {"shadowed": left_out.shadowed, "not finite": left_out.not_finite}
-    named |= {"negative": left_out.negative, "grazing": left_out.grazing}
-    return ", ".join(f"{count} {reason}" for reason, count in named.items() if count) or "none left out"
+    counts = asdict(left_out).items()
+    return ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in counts if count) or "none left out"

@@ -6,23 +6,21 @@ A reader is a module of this package that has `NAME` (str), `recognise(head: byt
 
 from __future__ import annotations
 
-import codecs
-import importlib
-import pkgutil
+import sys
 from functools import cache
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Protocol
 
-import lambent.materials.measured as package
+from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.text_numbers import UTF16, is_utf16
 
 HEAD_BYTES = 1 << 16
-_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 class Reader(Protocol):
-    """What a format's module offers."""
+    """A format's module."""
 
     NAME: str
 
@@ -38,32 +36,31 @@ class Reader(Protocol):
 @cache
 def readers() -> tuple[Reader, ...]:
     """Every reader found in the package, by name."""
-    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
-    found = [cast(Reader, m) for m in modules if hasattr(m, "recognise") and hasattr(m, "read")]
-    return tuple(sorted(found, key=lambda reader: reader.NAME))
+    package = sys.modules[__name__.rpartition(".")[0]]  # imports this module, so importing it would be a circle
+    return tuple(sorted(modules_in(package, having="recognise").values(), key=lambda reader: reader.NAME))
 
 
 def load(path: Path | str) -> MeasuredTable:
-    """Read a measured material, in whichever known format it is.
+    """Read a measured material of any known format.
 
     Raises
     ------
     UserError
-        Where the file is missing, of no known format, or broken.
+        The file is missing, of no known format, or broken.
     """
     path = Path(path)
     head, size = _head(path)
     reader = _reader_of(head, size)
     if reader is not None:
         return reader.read(path)
-    if head.startswith(_UTF16):
-        raise UserError("is UTF-16", file=path, expected="plain text or UTF-8", hint="save it again as UTF-8")
+    if head.startswith(UTF16):
+        raise is_utf16(path)
     known = ", ".join(reader.NAME for reader in readers())
     raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
 
 
 def is_known(path: Path | str) -> bool:
-    """Whether some reader takes the file, sound or not."""
+    """Whether some reader recognises the file, sound or not."""
     return _reader_of(*_head(Path(path))) is not None
 
 

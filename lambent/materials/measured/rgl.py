@@ -1,9 +1,9 @@
 """RGL material database (Dupuy & Jakob 2018): BRDF over a warp of the square that follows the material's own lobe.
 
-The file gives f cos(theta_o) = spectra(u) D(u_m) / (4 sigma(u_i)), with u the point that the
-distribution of visible normals warps to the half vector's u_m. Mappings: u_theta = sqrt(2 theta / pi),
-u_phi = (phi + pi) / (2 pi). Isotropic files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may
-cover half or a quarter of the circle of phi_i, the rest follows by mirroring.
+The file gives f cos(theta_o) = spectra(u) D(u_m) / (4 sigma(u_i)), with u the point that the distribution of visible
+normals warps to the half vector's u_m. Mappings: u_theta = sqrt(2 theta / pi), u_phi = (phi + pi) / (2 pi). Isotropic
+files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may cover half or a quarter of the circle of
+phi_i, and the rest follows by mirroring.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, direction, normalize, reflect
+from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
-from lambent.materials.measured.protocol import Flags, MeasuredSamples, TableInfo, collect
+from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import ReflectionTable, fill_holes, require_values, sensible
+from lambent.materials.measured.table import ReflectionTable, fill_holes, mirrored_to_range, require_values, sensible
 from lambent.materials.measured.tensor_file import MAGIC, read_tensors
 
 NAME = "RGL tensor file"
@@ -38,7 +39,7 @@ def read(path: Path) -> RglTable:
     Raises
     ------
     UserError
-        Where the container or a tensor in it is broken, or no value is usable.
+        The container or a tensor in it is broken, or no value is usable.
     """
     tensors = read_tensors(path)
     for name, dimensions in _DIMENSIONS.items():
@@ -67,7 +68,7 @@ def _require(holds: bool, path: Path, field: str, what: str) -> None:
 
 
 def _values_rgb(tensors: Tensors, path: Path) -> Floats:
-    """(phi, theta, rows, columns, 3) linear RGB of the file's `rgb` or `spectra`."""
+    """Linear RGB (phi, theta, rows, columns, 3) of the file's `rgb` or `spectra`."""
     name = "rgb" if "rgb" in tensors else "spectra"
     _require(name in tensors, path, "rgb", "is missing, and so is spectra")
     values = tensors[name]
@@ -85,7 +86,7 @@ def _values_rgb(tensors: Tensors, path: Path) -> Floats:
 
 
 class RglTable(ReflectionTable):
-    """BRDF of an RGL file, evaluated as the renderers that read the format do, then divided by cos(theta_o).
+    """BRDF of an RGL file, evaluated as in the renderers that define the format, then divided by cos(theta_o).
 
     Parameters
     ----------
@@ -93,7 +94,6 @@ class RglTable(ReflectionTable):
         The file's checked tensors.
     values : (phi, theta, rows, columns, 3)
         Linear RGB at the nodes of the warped square, as stored: negative and not finite values included.
-    path : Path
     """
 
     def __init__(self, tensors: Tensors, values: Floats, path: Path) -> None:
@@ -113,32 +113,24 @@ class RglTable(ReflectionTable):
         notes = [f"{negative} of {values.size} stored values are negative; eval takes them as 0"] if negative else []
         if not finite.all():
             notes.append(f"{int((~finite).sum())} nodes are not finite; eval takes the nearest node")
-        self.info = TableInfo(
-            file=Path(path).name,
-            format=NAME,
-            isotropic=self._isotropic,
-            transmits=False,
-            channels=3,
-            stored="f_cos",
-            sizes=dict(zip(("phi_i", "theta_i", "rows", "columns"), values.shape[:4], strict=True)),
-            notes=tuple(notes),
-        )
+        sizes = dict(zip(("phi_i", "theta_i", "rows", "columns"), values.shape[:4], strict=True))
+        self.info = TableInfo(Path(path).name, NAME, self._isotropic, False, 3, "f_cos", sizes, tuple(notes))
 
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
         """f (N, 3) in 1/sr; negative values become 0."""
         cos_o = wo[:, 2:]
         wi, wo = self._reduced(wi, wo)
-        theta_i, phi_i = _elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])
-        m = normalize(wi + wo)
+        theta_i, phi_i = elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])
+        m = half_vector(wi, wo)
         phi_m = np.arctan2(m[:, 1], m[:, 0]) - (phi_i if self._isotropic else 0)
-        u_m = np.stack([_u_of_theta(_elevation(m)), _u_of_phi(phi_m) % 1.0], axis=-1)
+        u_m = np.stack([_u_of_theta(elevation(m)), _u_of_phi(phi_m) % 1.0], axis=-1)
         corners = Corners((self._phi, self._theta), (phi_i, theta_i))
         u, _ = self._warp.invert(corners, u_m)
         value = bilinear(self._values, corners, u) * self._factor(u_m, theta_i, phi_i)
         return np.maximum(value, 0) / cos_o
 
     def _factor(self, u_m: Floats, theta_i: Floats, phi_i: Floats) -> Floats:
-        """(N, 1) D / (4 sigma), or 1 of a file that stores f cos itself."""
+        """(N, 1) D / (4 sigma), or 1 for a file that stores f cos itself."""
         if not self._with_jacobian:
             return np.ones((len(u_m), 1))
         whole = Corners((np.zeros(1), np.zeros(1)), (theta_i, phi_i))
@@ -148,13 +140,8 @@ class RglTable(ReflectionTable):
         return factor[:, None]
 
     def _reduced(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
-        """The pair mirrored into the part of the circle that the file covers."""
-        if self._reduction < 2:
-            return wi, wo
-        flip_y = np.where(wi[:, 1] > 0, -1.0, 1.0)
-        flip_x = np.where(wi[:, 0] > 0, -1.0, 1.0) if self._reduction == 4 else flip_y
-        flip = np.stack([flip_x, flip_y, np.ones_like(flip_y)], axis=-1)
-        return wi * flip, wo * flip
+        """The pair, mirrored into the file's part of the circle."""
+        return mirrored_to_range(wi, wo, -1.0, quadrant=self._reduction == 4) if self._reduction > 1 else (wi, wo)
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
         """One tuple per node of the warped square; nodes whose wo is below the surface count as shadowed.
@@ -166,27 +153,32 @@ class RglTable(ReflectionTable):
         corners = Corners((self._phi, self._theta), (self._phi[i], self._theta[j]))
         u = np.stack([x / (columns - 1), y / (rows - 1)], axis=-1)
         u_m, density = self._warp.sample(corners, u)
-        theta_m, phi_m = u_m[:, 0] ** 2 * np.pi / 2, (2 * u_m[:, 1] - 1) * np.pi
         wi = direction(self._theta[j], self._phi[i])
-        m = direction(theta_m, phi_m + (self._phi[i] if self._isotropic else 0))
+        m = half_vectors_at(u_m, self._phi[i] if self._isotropic else 0)
         wo = reflect(wi, m)
-        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts what is not finite
+        with np.errstate(invalid="ignore", over="ignore"):  # collect leaves out and counts values that are not finite
             value = self._raw.reshape(-1, 3) * self._factor(u_m, self._theta[j], self._phi[i])
         below: Flags = (wo[:, 2] <= 0) | (density <= 0)
         f = np.divide(value, wo[:, 2:], out=np.zeros_like(value, dtype=float), where=~below[:, None])
-        jacobian = 2 * np.pi**2 * u_m[:, 0] * np.sin(theta_m) * 4 * np.sum(wi * m, axis=-1)
         share = _share(x, columns) * _share(y, rows)
-        weight = np.divide(share * jacobian, density, out=np.zeros(len(f)), where=~below)
+        weight = np.divide(share * d_wo_d_um(u_m, wi, m), density, out=np.zeros(len(f)), where=~below)
         return collect(wi, wo, f, weight, self.info, below, max_count)
 
 
+def half_vectors_at(u_m: Floats, turned_rad: Floats | float) -> Floats:
+    """Half vectors (N, 3) at points (N, 2) of the square, turned about n by an angle."""
+    return direction(u_m[:, 0] ** 2 * np.pi / 2, (2 * u_m[:, 1] - 1) * np.pi + turned_rad)
+
+
+def d_wo_d_um(u_m: Floats, wi: Floats, m: Floats) -> Floats:
+    """Solid angle (N,) of wo per area of the square, for wi (N, 3) and the half vectors m (N, 3) at u_m (N, 2)."""
+    theta_m = u_m[:, 0] ** 2 * np.pi / 2
+    return np.asarray(2 * np.pi**2 * u_m[:, 0] * np.sin(theta_m) * 4 * np.sum(wi * m, axis=-1))
+
+
 def _share(index: NDArray[np.integer], count: int) -> Floats:
-    """Share of [0, 1] that a node of an even grid stands for: half of it at the ends."""
+    """Weight of a node of an even grid on [0, 1], by the trapezoidal rule."""
     return np.where((index == 0) | (index == count - 1), 0.5, 1.0) / (count - 1)
-
-
-def _elevation(w: Floats) -> Floats:
-    return np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])
 
 
 def _u_of_theta(theta: Floats) -> Floats:

@@ -1,14 +1,14 @@
-"""Scattering from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then a new direction.
+"""Scatter from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then a new direction.
 
-Two samplers of the new direction, to be chosen by what `docs/performance.md` measured:
+Two samplers of the new direction; `docs/performance.md` compares them:
 
 - `Rejection`, the thesis's 3.2: uniform low-discrepancy candidates, accepted with p / (largest p of the row). It
   follows the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
   for satin, 40 000 for chrome.
-- `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; its small deviation from the table is in the
-  weight, so estimates follow the table all the same. Of patch matrices it is that of `patch_sheet`, and exact.
+- `Tabulated`: the CDF of `half_vector_grid`, one candidate per sample; the weight corrects its small deviation from the
+  table, so estimates follow the table. For patch matrices it is the CDF of `patch_sheet`, which is exact.
 
-`TableBSDF` gives a table the face of a BSDF (eval, pdf, sample), for materials.check and whoever traces paths.
+`TableBSDF` makes a table a BSDF (eval, pdf, sample), for materials.check and path tracers.
 
 A photon's incident direction is `wi`, its new one `wo`; p(wo|wi) = f |cos theta_o|.
 """
@@ -20,26 +20,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, angles, direction, normalize
+from lambent.core.directions import Floats, angles, direction, half_vector, raised, reflect
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components
 from lambent.materials.chi_square import ChiSquare, chi_square
 from lambent.materials.lobes import COS_MIN
-from lambent.materials.measured import half_vector_grid
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import lookup_of, patch_sheet_of
 from lambent.materials.measured.protocol import MeasuredTable
-from lambent.materials.measured.two_sided import Sheet
+from lambent.materials.measured.two_sided import TwoSided
 
 ABSORBED, REFLECTED, TRANSMITTED = 0, 1, 2
-CANDIDATES_LIMIT = 200_000  # per sample, before rejection is given up
+CANDIDATES_LIMIT = 200_000  # per sample, before rejection gives up
 _STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # the root of x^4 = x + 1
 
 
 @dataclass(frozen=True)
 class Scattered:
-    """What became of photons.
+    """Scattered photons.
 
     Attributes
     ----------
@@ -48,11 +47,11 @@ class Scattered:
     fate : (N,) int8
         ABSORBED, REFLECTED or TRANSMITTED.
     weight : (N, C)
-        What the survivors carry, per channel; their mean over channels is 1 of exact samplers. 0 where absorbed.
+        Weight per channel; 0 where absorbed. For exact samplers the mean over channels of the others is 1.
     proposals : int
-        Candidates that were tried.
+        Number of candidates tried.
     exceeded : int
-        Accepted candidates whose p was above the row's bound: where not 0, too few of those were drawn.
+        Accepted candidates whose p was above the row's bound; if not 0, such directions are drawn too rarely.
     """
 
     wo: Floats
@@ -65,11 +64,11 @@ class Scattered:
 class TableBSDF:
     """A measured table as a BSDF: `eval` is the table's own, `pdf` and `sample` those of its patches or its grid.
 
-    It is the `Sheet` that the path tracer renders: two-sided, unless the table has a back of its own.
+    It is the two-sided sheet that the path tracer renders.
     """
 
     def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
-        self.sheet = Sheet(table)
+        self.sheet = TwoSided(table)
         self.lookup = lookup_of(table, shape, progress)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
@@ -89,13 +88,13 @@ class TableBSDF:
         return np.stack(self.lookup.sample(components(wo), u_select, u1, u2), axis=-1)
 
     def looked_up(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., 3) in 1/sr as the path tracer has it: of a grid not quite `eval`."""
+        """f (..., 3) in 1/sr as the path tracer looks it up; on a grid it deviates a little from `eval`."""
         return np.stack(self.lookup.evaluate(components(wi), components(wo)), axis=-1)
 
     def steps(self, w: Floats, reverse: bool = False) -> Floats | None:
-        """(N, 4) cells of z and phi within which f is constant; None of tables that are not patches.
+        """(N, 4) cells of z and phi within which f is constant; None for tables that are not patches.
 
-        They are of the light's directions given the viewer's w (3,); `reverse`: of the viewer's given the light's.
+        Cells of the light's directions, given the viewer's w (3,); with `reverse`, of the viewer's, given the light's.
         """
         sheet = patch_sheet_of(self.sheet.table, reverse=reverse)
         return None if sheet is None else sheet.cell_borders(w)
@@ -113,43 +112,41 @@ class TableBSDF:
         )
 
     def _chi_square_in_half_vectors(self, wo: Floats, grid: HalfVectorGrid, samples: int, seed: int) -> ChiSquare:
-        """A transmitted direction is the half vector of its mirror image, below the surface."""
+        """Test in half vectors; a transmitted direction counts by that of its mirror image, below the surface."""
         theta, phi = (float(a) for a in angles(wo))
-        wo = direction(theta, 0.0) if not grid.anisotropic else direction(theta, phi)
-        up, side = wo * [1, 1, np.sign(wo[2])], np.sign(wo[2])
+        wo = direction(theta, phi if grid.anisotropic else 0.0)
+        up, side = raised(wo), np.sign(wo[2])
 
         def half_vectors(u: Floats) -> Floats:
             wi = self.sample(np.broadcast_to(wo, u.shape), u)
-            h = normalize(wi * [1, 1, 0] + np.abs(wi) * [0, 0, 1] + up)
+            h = half_vector(raised(wi), up)
             h[:, 2] *= np.sign(wi[:, 2] * side)
             return h
 
         def density(h: Floats) -> Floats:
-            upper = h * [1, 1, 0] + np.abs(h) * [0, 0, 1]
-            cos_d = upper @ up
-            wi = 2 * cos_d[:, None] * upper - up
+            cos_d = raised(h) @ up
+            wi = reflect(up, raised(h))
             possible = (wi[:, 2] > 0) & (cos_d > 0)
             wi[:, 2] *= side * np.sign(h[:, 2])
             return np.where(possible, self.pdf(wi, np.broadcast_to(wo, wi.shape)) * 4 * cos_d, 0.0)
 
-        cells = half_vector_grid.cell_borders(grid.shape, grid.kinds)
-        return chi_square(half_vectors, density, samples=samples, seed=seed, cells=cells)
+        return chi_square(half_vectors, density, samples=samples, seed=seed, cells=grid.cell_borders())
 
 
 class _Photons:
-    """What both samplers share: the fate of photons by r and t, tabulated over the incident directions."""
+    """Base of both samplers: the fate of photons by r and t, tabulated over the incident directions."""
 
     def __init__(self, table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent) -> None:
-        self.sheet = Sheet(table)
+        self.sheet = TwoSided(table)
         self.lookup = lookup_of(table, shape, progress, reverse=True)
 
     def albedo(self, wi: Floats) -> tuple[Floats, Floats]:
-        """r and t (N,), means over the channels, of wi (N, 3); of a grid interpolated between its nodes."""
+        """r and t (N,), means over the channels, of wi (N, 3); a grid interpolates between its nodes."""
         r, t = (self.lookup.albedo_of(components(wi), np.full(len(wi), across)) for across in (False, True))
         return r, t
 
     def _fates(self, wi: Floats, u: Floats) -> tuple[NDArray[np.int8], Floats, Floats]:
-        """What 3.1 makes of u (N,) uniform in [0, 1), and the probability of either side; over 1 none is absorbed."""
+        """Fates (3.1) for u (N,) uniform in [0, 1), and the probability of each side; r + t > 1 absorbs none."""
         r, t = self.albedo(wi)
         whole = np.maximum(r + t, 1.0)
         r, t = r / whole, t / whole
@@ -159,9 +156,9 @@ class _Photons:
 class Rejection(_Photons):
     """Rejection sampling of the table (thesis M, 3.2).
 
-    The candidates of all photons of a call are one low-discrepancy sequence, dealt out in random order: evenly spread
-    as a whole, independent for each photon. A photon that walked along the sequence by itself would be biased, because
-    where it comes next depends on where it was rejected.
+    The candidates of all photons of a call form one low-discrepancy sequence, dealt out in random order: evenly spread
+    as a whole, independent for each photon. A photon that took consecutive points would be biased, because the next
+    point depends on the one it rejected.
     """
 
     def scatter(self, wi: Floats, seed: int = 0, progress: Progress = silent) -> Scattered:
@@ -170,7 +167,7 @@ class Rejection(_Photons):
         Raises
         ------
         UserError
-            Where a lobe is so narrow that CANDIDATES_LIMIT candidates per photon do not find it.
+            A lobe is so narrow that CANDIDATES_LIMIT candidates per photon do not find it.
         """
         rng = np.random.default_rng(seed)
         fate, _, _ = self._fates(wi, rng.random(len(wi)))
@@ -184,13 +181,13 @@ class Rejection(_Photons):
             if rounds > CANDIDATES_LIMIT:
                 hint = "use the tabulated sampler, or fit lobes"
                 raise UserError("lobe too narrow for rejection sampling", file=self.sheet.info.file, hint=hint)
-            many = max(1, min(64, 4096 // len(waiting)))  # of the last photons, several candidates at once
+            many = max(1, min(64, 4096 // len(waiting)))  # the last photons try several candidates at once
             asked = rng.permutation(np.repeat(waiting, many))
             wo, x = self._candidates(_even(proposals, len(asked), offset), wi[asked], fate[asked])
             f = self.sheet.eval(wi[asked], wo)
             p = f.mean(axis=1) * np.abs(wo[:, 2])
             accepted = np.flatnonzero(x * bound[asked] < p)
-            photons, first = np.unique(asked[accepted], return_index=True)  # the first that was accepted
+            photons, first = np.unique(asked[accepted], return_index=True)  # the first accepted one
             chosen = accepted[first]
             found[photons] = wo[chosen]
             weight[photons] = f[chosen] / f[chosen].mean(axis=1, keepdims=True)
@@ -205,7 +202,7 @@ class Rejection(_Photons):
 
     @staticmethod
     def _candidates(u: Floats, wi: Floats, fate: NDArray[np.int8]) -> tuple[Floats, Floats]:
-        """Uniform directions of the side of each photon's fate from u (N, 3), and the number that decides."""
+        """Uniform directions on the side of each photon's fate from u (N, 3), and the number that decides."""
         wo = direction(np.arccos(1 - u[:, 0]), 2 * np.pi * u[:, 1])
         wo[:, 2] *= np.where((wi[:, 2] > 0) == (fate == REFLECTED), 1.0, -1.0)
         return wo, u[:, 2]
@@ -219,7 +216,7 @@ def _even(first: int, count: int, offset: Floats) -> Floats:
 
 
 class Tabulated(_Photons):
-    """Directions by the CDF of the table's patches or grid; what a grid's cells smooth away is in the weight."""
+    """Directions by the CDF of the table's patches or grid; the weight corrects a grid's deviation from the table."""
 
     def scatter(self, wi: Floats, seed: int = 0) -> Scattered:
         """Fates and directions of photons from wi (N, 3)."""
@@ -227,7 +224,7 @@ class Tabulated(_Photons):
         fate, r, t = self._fates(wi, rng.random(len(wi)))
         u_select, u1, u2 = rng.random((3, len(wi)))
         across = self.lookup.share_across(components(wi))
-        # the sampler's own choice of the side is replaced by the fate that was drawn
+        # the fate drawn replaces the sampler's own choice of the side
         u_select = np.where(fate == TRANSMITTED, u_select * across, across + u_select * (1 - across))
         wo = np.stack(self.lookup.sample(components(wi), u_select, u1, u2), axis=-1)
         pdf = self.lookup.pdf(components(wo), components(wi))
@@ -235,6 +232,5 @@ class Tabulated(_Photons):
         drawn, wanted = np.where(fate == TRANSMITTED, (across, t), (1 - across, r))
         gain = np.divide(np.abs(wo[:, 2]) * drawn, pdf * wanted, out=np.zeros(len(wi)), where=alive)
         wo[~alive] = 0
-        return Scattered(
-            wo, np.where(alive, fate, ABSORBED).astype(np.int8), self.sheet.eval(wi, wo) * gain[:, None], len(wi)
-        )
+        fate = np.where(alive, fate, ABSORBED).astype(np.int8)
+        return Scattered(wo, fate, self.sheet.eval(wi, wo) * gain[:, None], len(wi))

@@ -1,9 +1,9 @@
-"""Isotropic tables of single measurements without any grid: look-up by a moving plane through the nearest of them."""
+"""Isotropic tables of measurements without a grid, looked up by a moving plane through the nearest of them."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,39 +11,36 @@ from lambent.core.directions import Floats, direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.measured.merl import half_difference_angles
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import IntegratedTable, sensible
+from lambent.materials.measured.table import ReflectionTable, sensible, usable_values
 
 NEIGHBOURS = 16
-_SLOPE_PENALTY = (
-    1e-4  # of the plane, in units of the neighbourhood's radius: keeps it flat where the data are on a line
-)
-_DARK = 0.05  # share of the median f that the logarithm is shifted by: what is darker counts as alike
-_BEYOND = 4.0  # times the brightest neighbour: a plane of logarithms runs away where it leaves the data
+_SLOPE_PENALTY = 1e-4  # of the plane, per radius of the neighbourhood: keeps it flat where the data are on a line
+_DARK = 0.05  # share of the median f by which the logarithm is shifted: darker values count as alike
+_BEYOND = 4.0  # times the brightest neighbour: a plane of logarithms diverges beyond the data
 _PEAK_RAD = 0.1  # theta_h within which distances count most
 _POINTS_PER_TUPLE, _WEIGHT_POINTS = 90, (1 << 12, 1 << 18)  # of the Monte Carlo weights, and their bounds
-_QUERIES_AT_ONCE = 1 << 11
 
 
-class ScatteredTable(IntegratedTable):
+class ScatteredTable(ReflectionTable):
     """Isotropic reflection at scattered directions.
 
-    `eval` fits log(f + dark) of the 16 nearest tuples as linear in theta_h, cos theta_d and phi_d, weighed by
+    `eval` fits log(f + dark) of the 16 nearest tuples as linear in theta_h, cos theta_d and phi_d, weighted by
     (1 - d^2)^2 / d^2 with d the distance as a share of that to the 16th (Shepard's interpolation with local planes;
-    Franke & Nielson 1980). It is continuous and takes the measured value at a tuple. Left out one in twenty, the tuples
-    of the Cornell files are met with a third of the absolute error of weights distance^-2 alone.
+    Franke & Nielson 1980). It is continuous and takes the measured value at a tuple. With one tuple in twenty left out,
+    its absolute error at those of the Cornell files is a third of that of weights distance^-2 alone.
 
     Parameters
     ----------
     wi, wo : (N, 3)
-    f : (N, C)
+    f : (N, 3)
         1/sr; NaN where it was not measured, negative as measured.
-    info : TableInfo
     """
+
+    QUERIES_AT_ONCE: ClassVar[int] = 1 << 11
 
     def __init__(self, wi: Floats, wo: Floats, f: Floats, info: TableInfo) -> None:
         self._wi, self._wo, self._f, self.info = wi, wo, f, info
-        with np.errstate(invalid="ignore"):
-            self._usable = sensible(f) & (f >= 0).all(axis=1)
+        self._usable = sensible(f) & usable_values(f)
 
     @cached_property
     def _tree(self) -> Any:  # scipy's class is imported where it is needed
@@ -55,26 +52,15 @@ class ScatteredTable(IntegratedTable):
     def _variables(self) -> Floats:
         return _variables(self._wi[self._usable], self._wo[self._usable])
 
-    def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., C) in 1/sr; that of a tuple at a tuple; 0 where wi or wo is below the surface."""
-        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
-        f = np.zeros((len(flat_i), self.info.channels))
-        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
-        for start in range(0, len(above), _QUERIES_AT_ONCE):
-            part = above[start : start + _QUERIES_AT_ONCE]
-            f[part] = self._at(flat_i[part], flat_o[part])
-        return f.reshape(*wi.shape[:-1], -1)
-
-    def _at(self, *pair: Floats) -> Floats:
+    def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
         values = self._f[self._usable]
         dark = max(_DARK * float(np.median(values)), 1e-9)
         k = min(NEIGHBOURS, len(values))
-        distance, index = self._tree.query(_place(*pair), k=list(range(1, k + 1)))
+        distance, index = self._tree.query(_place(wi, wo), k=list(range(1, k + 1)))
         d = distance / np.maximum(distance[:, -1:] * (1 + 1e-3), 1e-9)
         weight = (1 - d**2) ** 2 / np.maximum(d, 1e-6) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
-        offset = self._variables[index] - _variables(*pair)[:, None]
+        offset = self._variables[index] - _variables(wi, wo)[:, None]
         offset /= np.sqrt((offset**2).mean(axis=1, keepdims=True)) + 1e-12
         columns = np.concatenate([np.ones((*d.shape, 1)), offset], axis=-1)
         weighed = np.swapaxes(columns * weight[..., None], 1, 2)
@@ -85,7 +71,7 @@ class ScatteredTable(IntegratedTable):
         return np.asarray(np.maximum(f, 0))
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """The file's tuples; the weight is the share of d_wi d_wo that lies nearest to the tuple, in sr^2."""
+        """The file's tuples; the weight is the part of d_wi d_wo nearest to the tuple, in sr^2."""
         from scipy.spatial import cKDTree
 
         count = int(np.clip(_POINTS_PER_TUPLE * len(self._f), *_WEIGHT_POINTS))
@@ -106,15 +92,15 @@ def _place(wi: Floats, wo: Floats) -> Floats:
 
 
 def _variables(wi: Floats, wo: Floats) -> Floats:
-    """(..., 3) what log f is taken to be linear in; cos theta_d, because f is even in theta_d."""
+    """(..., 3) variables in which log f is taken as linear; cos theta_d, because f is even in theta_d."""
     theta_h, theta_d, folded = _angles(wi, wo)
     return np.stack([theta_h, np.cos(theta_d), folded], axis=-1)
 
 
 def _angles(wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
-    """theta_h and theta_d, and phi_d in [0, 1]: folded by reciprocity and the mirror symmetry of isotropic materials.
+    """theta_h and theta_d, and phi_d in [0, 1], folded by reciprocity and the mirror symmetry of isotropic materials.
 
-    Where its circle is small (theta_h or theta_d near 0), phi_d counts for little.
+    phi_d is scaled by the size of its circle, which is small for theta_h or theta_d near 0.
     """
     theta_h, theta_d, phi_d = half_difference_angles(wi, wo)
     return theta_h, theta_d, np.minimum(phi_d, np.pi - phi_d) * (2 / np.pi) * np.sin(theta_h) * np.sin(theta_d)

@@ -1,28 +1,27 @@
-"""What one incident direction sends to one side: a grid of outgoing directions, about any pole, or a scattered set.
+"""f of one incident direction on one side: a grid of outgoing directions about any pole, or a scattered set.
 
-Directions here are in the frame of their side: z is the side's own normal, so that a direction transmitted straight
-through has z = 1, and phi runs from t towards b on either side.
+Directions are in the frame of their side: z is the side's own normal, so that light transmitted straight through at
+normal incidence has z = 1, and phi runs from t towards b on either side.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, angles, direction
+from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import angles, direction
 from lambent.core.sequences import r2
-from lambent.materials.measured.protocol import Flags
-from lambent.materials.measured.table import fill_holes, sensible
+from lambent.materials.measured.table import bracket, fill_holes, sensible
 
-Indices = NDArray[np.int64]
+LookUp = Callable[[Floats], Floats]
 _IN_PLANE = 1e-3  # radians off a plane through the pole that still count as in it
 _LEAST_TRIANGULATED = 4
 _WEIGHT_POINTS = (1 << 12, 1 << 16)
-_HEAVIEST = 4.0  # times the median: a tuple at a gap or at the rim does not stand for all that lies beyond
+_HEAVIEST = 4.0  # times the median weight: a tuple at a gap or at the rim does not stand for all beyond
 
 
 @dataclass(frozen=True)
@@ -32,14 +31,13 @@ class Sheet:
     Attributes
     ----------
     theta_deg : (T,) increasing, from 0
-        From the grid's pole, the normal of the side unless `frame` says otherwise; at most 90 about the normal,
-        at most 180 about another pole.
+        From the grid's pole, by default the side's normal; at most 90 about the normal, at most 180 about another pole.
     phi_deg : (P,) increasing in [0, 360)
-        One turn, spaced as it was measured.
+        One turn, spaced as measured.
     f : (T, P, C)
-        1/sr; NaN where it was not measured; negative as the sensor said. Nodes below the horizon are never used.
+        1/sr; NaN where it was not measured; negative as the sensor read. Nodes below the horizon are never used.
     frame : (3, 3), optional
-        Rows: the directions that phi = 0 and phi = 90 run to from the pole, and the pole; orthonormal.
+        Orthonormal rows: the directions of phi = 0 and phi = 90 from the pole, and the pole.
     images : (T, P) bool, optional
         Nodes that repeat another: across the plane of incidence, where only one side was measured, or along the pole.
     """
@@ -52,7 +50,7 @@ class Sheet:
 
     @property
     def measured(self) -> Flags:
-        """(T P,) the nodes that stand for a reading of their own."""
+        """(T P,) the nodes with a reading of their own."""
         return np.ones(self.f.shape[:2], dtype=bool).ravel() if self.images is None else ~self.images.ravel()
 
     @cached_property
@@ -77,18 +75,17 @@ class Sheet:
         return np.concatenate([filled, filled[:, :1]], axis=1)
 
     def at(self, w: Floats) -> Floats:
-        """f (N, C) of directions (N, 3), bilinear; beyond the grid's theta its last ring."""
+        """f (N, C) of directions (N, 3), bilinear; beyond the grid's theta, that of its last ring."""
         theta, phi = angles(w if self.frame is None else w @ self.frame.T)
-        t, u = bracket(self.theta_deg, np.degrees(theta))
+        t, t1, u = bracket(self.theta_deg, np.degrees(theta))
         turn = np.append(self.phi_deg, self.phi_deg[0] + 360)
-        p, v = bracket(turn, (np.degrees(phi) - turn[0]) % 360 + turn[0])
-        t1, p1 = np.minimum(t + 1, len(self.theta_deg) - 1), p + 1
+        p, p1, v = bracket(turn, (np.degrees(phi) - turn[0]) % 360 + turn[0])
         u, v, f = u[:, None], v[:, None], self._whole
         low, high = f[t, p] * (1 - v) + f[t, p1] * v, f[t1, p] * (1 - v) + f[t1, p1] * v
         return np.asarray(low * (1 - u) + high * u)
 
     def solid_angles(self) -> Floats:
-        """(T P,) sin(theta) dtheta dphi of the nodes' cells, in sr; the cells tile what the grid spans."""
+        """(T P,) sin(theta) dtheta dphi of the nodes' cells, in sr; the cells tile the grid's extent."""
         theta, turn = np.radians(self.theta_deg), np.radians(np.append(self.phi_deg, self.phi_deg[0] + 360))
         half = np.diff(theta) / 2 if len(theta) > 1 else np.array([np.pi])
         edges = np.concatenate([theta[:1] - half[:1], theta[:-1] + half[: len(theta) - 1], theta[-1:] + half[-1:]])
@@ -97,7 +94,7 @@ class Sheet:
         return np.outer(rings, (widths + np.roll(widths, 1)) / 2).ravel()
 
     def weights(self) -> Floats:
-        """(T P,) solid angles, those of images given to what they repeat."""
+        """(T P,) solid angles; those of images go to the nodes they repeat."""
         weight = self.solid_angles().reshape(self.f.shape[:2])
         if self.images is None or not self.images.any():
             return weight.ravel()
@@ -114,17 +111,17 @@ class Sheet:
 
 @dataclass(frozen=True)
 class ScatteredSheet:
-    """Outgoing directions without a grid; those of a scan in the plane of incidence are the usual case.
+    """Outgoing directions without a grid, usually a scan in the plane of incidence.
 
     Attributes
     ----------
     directions : (N, 3)
     values : (N, C)
-        1/sr; NaN where it was not measured; negative as the sensor said.
+        1/sr; NaN where it was not measured; negative as the sensor read.
     specular : (3, 3)
         `specular_frame` of the incident direction.
     images : (N,) bool
-        Directions that mirror the plane of incidence's other side, where only one was measured.
+        Mirror images of directions across the plane of incidence, where only one side was measured.
     """
 
     directions: Floats
@@ -134,7 +131,7 @@ class ScatteredSheet:
 
     @property
     def measured(self) -> Flags:
-        """(N,) the directions that are no mirror images."""
+        """(N,) the directions that are not mirror images."""
         return ~self.images
 
     @cached_property
@@ -142,25 +139,25 @@ class ScatteredSheet:
         return sensible(self.values)
 
     @cached_property
-    def _lookup(self) -> Any:
+    def _lookup(self) -> LookUp:
         w, f = self.directions[self._usable], np.maximum(self.values[self._usable], 0)
         if len(w) == 0:
             return lambda asked: np.zeros((len(asked), f.shape[1]))
         if np.abs(w @ self.specular[1]).max() < _IN_PLANE:
-            return _PlaneScan(w, f, self.specular)
-        return _Triangulated(w, f)
+            return _plane_scan(w, f, self.specular)
+        return _triangulated(w, f)
 
     def at(self, w: Floats) -> Floats:
         """f (N, C) of directions (N, 3).
 
-        Of a scan in the plane of incidence: by the angle from the mirror direction, which the lobe is taken to be
-        turned about from one half of the plane to the other. Otherwise linear over the triangles of the directions,
-        beyond them the nearest.
+        A scan in the plane of incidence is looked up by the angle from the mirror direction; the lobe is taken as
+        turned about it from one half of the plane to the other. Other sets are interpolated linearly over the triangles
+        of their directions, beyond them by the nearest.
         """
-        return np.asarray(self._lookup(w))
+        return self._lookup(w)
 
     def solid_angles(self) -> Floats:
-        """(N,) the part of the hemisphere that is nearest to each direction, in sr."""
+        """(N,) the part of the hemisphere nearest to each direction, in sr."""
         from scipy.spatial import cKDTree
 
         count = int(np.clip(16 * len(self.directions), *_WEIGHT_POINTS))
@@ -175,44 +172,38 @@ class ScatteredSheet:
         return self.solid_angles() * np.where(aside & self.images.any(), 2.0, 1.0)
 
 
-class _PlaneScan:
+def _plane_scan(w: Floats, f: Floats, frame: Floats) -> LookUp:
     """Look-up in a scan of the plane of incidence."""
+    nodes, order = np.unique(np.arctan2(w @ frame[0], w @ frame[2]), return_index=True)
 
-    def __init__(self, w: Floats, f: Floats, frame: Floats) -> None:
-        self._frame = frame
-        self._angle, order = np.unique(np.arctan2(w @ frame[0], w @ frame[2]), return_index=True)
-        self._f = f[order]
+    def along(angle: Floats) -> Floats:
+        return np.stack([np.interp(angle, nodes, channel) for channel in f[order].T], axis=-1)
 
-    def __call__(self, w: Floats) -> Floats:
-        local = w @ self._frame.T
-        from_pole, aside = angles(local)
+    def look_up(asked: Floats) -> Floats:
+        from_pole, aside = angles(asked @ frame.T)
         share = ((1 + np.cos(aside)) / 2)[:, None]
-        return share * self._along(from_pole) + (1 - share) * self._along(-from_pole)
+        return np.asarray(share * along(from_pole) + (1 - share) * along(-from_pole))
 
-    def _along(self, angle: Floats) -> Floats:
-        return np.stack([np.interp(angle, self._angle, channel) for channel in self._f.T], axis=-1)
+    return look_up
 
 
-class _Triangulated:
+def _triangulated(w: Floats, f: Floats) -> LookUp:
     """Linear look-up over the Delaunay triangles of the directions in the plane theta (cos phi, sin phi)."""
+    from scipy.interpolate import LinearNDInterpolator
+    from scipy.spatial import QhullError, cKDTree
 
-    def __init__(self, w: Floats, f: Floats) -> None:
-        from scipy.interpolate import LinearNDInterpolator
-        from scipy.spatial import QhullError, cKDTree
+    tree = cKDTree(w)
+    try:
+        inside = LinearNDInterpolator(_flat(w), f) if len(w) >= _LEAST_TRIANGULATED else None
+    except QhullError:  # directions on one line, or all the same: the nearest serves
+        inside = None
 
-        self._tree, self._f, self._inside = cKDTree(w), f, None
-        if len(w) >= _LEAST_TRIANGULATED:
-            try:
-                self._inside = LinearNDInterpolator(_flat(w), f)
-            except QhullError:  # directions on one line, or all the same: the nearest has to do
-                self._inside = None
-
-    def __call__(self, w: Floats) -> Floats:
-        nearest = np.asarray(self._f[self._tree.query(w)[1]])
-        if self._inside is None:
-            return nearest
-        value = np.asarray(self._inside(_flat(w)))
+    def look_up(asked: Floats) -> Floats:
+        nearest = f[tree.query(asked)[1]]
+        value = np.nan if inside is None else np.asarray(inside(_flat(asked)))
         return np.asarray(np.where(np.isfinite(value), value, nearest))
+
+    return look_up
 
 
 def _flat(w: Floats) -> Floats:
@@ -221,21 +212,12 @@ def _flat(w: Floats) -> Floats:
 
 
 def specular_frame(theta_i_deg: float, phi_i_deg: float) -> Floats:
-    """(3, 3) frame about the mirror direction of wi; its x runs towards the normal, its y is counter-clockwise to it.
+    """(3, 3) frame about the mirror direction of wi; its x points towards the normal, its y is counter-clockwise.
 
-    On the far side, whose directions are mirrored into the near one, the same frame is the one about the direction
-    straight through.
+    On the far side, whose directions are mirrored into the near one, it is the frame about straight transmission.
     """
     theta, phi = np.radians(theta_i_deg), np.radians(phi_i_deg)
     back = np.array([np.cos(phi), np.sin(phi), 0.0])
     normal = np.array([0.0, 0.0, 1.0])
     x, pole = np.cos(theta) * back + np.sin(theta) * normal, np.cos(theta) * normal - np.sin(theta) * back
     return np.stack([x, np.cross(pole, x), pole])
-
-
-def bracket(nodes: Floats, x: Floats) -> tuple[Indices, Floats]:
-    """Index of the node below x and the share of the next one; x beyond the nodes takes the last."""
-    if len(nodes) == 1:
-        return np.zeros(x.shape, dtype=np.int64), np.zeros(x.shape)
-    low = (np.searchsorted(nodes, x, side="right") - 1).clip(0, len(nodes) - 2)
-    return low, ((x - nodes[low]) / (nodes[low + 1] - nodes[low])).clip(0, 1)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from lambent.core.arrays import Flags, Floats
 from lambent.core.colour import XYZ_TO_RGB, xyz_to_rgb
-from lambent.core.directions import Floats
-from lambent.materials.measured.protocol import Flags
 
 
 def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
-    """(3, K) matrix that takes K spectral values of a reflectance or BSDF to linear RGB (Rec.709).
+    """Matrix (3, K) that converts K spectral values of a reflectance or BSDF to linear RGB (Rec.709).
 
     CIE 1931 2 degree observer under illuminant D65, whose white is the white of Rec.709: a flat spectrum of value v
     becomes (v, v, v). Between the wavelengths the spectrum is taken as linear, beyond them as constant. Saturated
@@ -33,7 +32,7 @@ def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
 
 
 def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """(N, 3) linear RGB of spectra (N, K), and what has to be said: NaN stays NaN, a negative spectrum becomes -1."""
+    """Linear RGB (N, 3) of spectra (N, K), and notes; NaN stays NaN, a negative spectrum becomes -1."""
     rgb = np.full((len(spectra), 3), np.nan)
     rgb[usable] = spectra[usable] @ rgb_of_spectra(wavelengths_nm).T
     outside = int((rgb[usable] < 0).any(axis=1).sum())
@@ -47,7 +46,7 @@ def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> t
 
 
 def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """(..., 3) linear RGB of tristimulus values whose white is D65, and what has to be said; negative ones stay so."""
+    """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative ones stay negative."""
     rgb = xyz_to_rgb(values)
     with np.errstate(invalid="ignore"):
         outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(values >= 0, axis=-1, keepdims=True)

@@ -1,18 +1,19 @@
-"""A gonio-photometer in software: incident grid, outgoing grid, sensor noise, and directions the lamp's arm hides.
+"""A gonio-photometer in software: incident grid, outgoing grid, sensor noise, and directions hidden by the lamp's arm.
 
-It records any function f(wi, wo): a material document here, whatever the path tracer knows in the bake.
+It measures any function f(wi, wo): a material document here, any of the path tracer's BSDFs in `bake`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
+from lambent.core.directions import FLIP_Z, Floats, direction
 from lambent.core.errors import UserError
-from lambent.core.progress import Progress, silent
+from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Symmetry
@@ -24,17 +25,17 @@ Evaluate = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class Setup:
-    """How the device measures.
+    """Settings of the device.
 
     Attributes
     ----------
     theta_i_deg, phi_i_deg : tuple of float
         Incident grid.
     symmetry : str
-        What the specimen is taken to have, see `GonioTable`.
+        The specimen's, see `GonioTable`.
     step_deg, fine_deg, fine_reach_deg : float
-        Spacing of the outgoing directions, and the closer one within `fine_reach_deg` of the mirror direction
-        (of the straight one on the far side).
+        Spacing of the outgoing directions, and the finer one within `fine_reach_deg` of the mirror direction (of
+        straight transmission on the far side).
     noise : float
         Standard deviation of a reading as a share of it.
     floor : float
@@ -80,53 +81,39 @@ ISOTROPIC = Setup((0, 5, 19, 33, 47, 61, 75))
 def record(
     evaluate: Evaluate, name: str, setup: Setup, *, transmits: bool = False, progress: Progress = silent
 ) -> GonioTable:
-    """Measure `evaluate` with the device of `setup`.
+    """Measure `evaluate`, a specimen called `name`, with the device of `setup`.
 
     Parameters
     ----------
     evaluate : callable
-        f (N, C) of wi, wo (N, 3); wo.z < 0 is asked only where `transmits`.
-    name : str
-        Name of the specimen.
+        f (N, C) of wi, wo (N, 3); wo.z < 0 only with `transmits`.
     """
-    sides: list[list[tuple[Sheet, ...]]] = [[], []]
-    count = len(setup.theta_i_deg) * len(setup.phi_i_deg)
-    for a, theta_i in enumerate(setup.theta_i_deg):
-        rows: list[list[Sheet]] = [[], []]
-        for b, phi_i in enumerate(setup.phi_i_deg):
-            index = a * len(setup.phi_i_deg) + b
-            progress(index, count, f"measuring {name}")
-            noise = np.random.default_rng([setup.seed, index])
-            for far in range(1 + transmits):
-                rows[far].append(_sheet(evaluate, theta_i, phi_i, bool(far), setup, noise))
-        for side, row in zip(sides, rows, strict=True):
-            side.append(tuple(row))
-    progress(count, count, f"measuring {name}")
-    return GonioTable(
-        name=name,
-        theta_i_deg=np.array(setup.theta_i_deg, float),
-        phi_i_deg=np.array(setup.phi_i_deg, float),
-        reflected=tuple(sides[0]),
-        transmitted=tuple(sides[1]) if transmits else (),
-        symmetry=setup.symmetry,
-    )
+    sides: list[list[Sheet]] = [[], []]
+    incident = list(product(setup.theta_i_deg, setup.phi_i_deg))
+    for index, (theta_i, phi_i) in enumerate(tracked(incident, progress, f"measuring {name}")):
+        noise = np.random.default_rng([setup.seed, index])
+        for far in range(1 + transmits):
+            sides[far].append(_sheet(evaluate, theta_i, phi_i, bool(far), setup, noise))
+    theta, phi = np.array(setup.theta_i_deg, float), np.array(setup.phi_i_deg, float)
+    near, far_side = (tuple(tuple(s[k : k + len(phi)]) for k in range(0, len(s), len(phi))) for s in sides)
+    return GonioTable(name, theta, phi, near, far_side, setup.symmetry)
 
 
 def synthesise(material: Material, setup: Setup | None = None, progress: Progress = silent) -> GonioTable:
-    """Table of a material document whose answer is therefore known; the thesis's grids where no setup is given."""
+    """The table of a material document, whose fit is therefore known; by default on the thesis's grids."""
     setup = setup or (ANISOTROPIC if any(lobe.mx != lobe.my for lobe in material.lobes) else ISOTROPIC)
     evaluate = MaterialBSDF(material).eval
     return record(evaluate, material.name, setup, transmits=material.transmits, progress=progress)
 
 
 def outgoing_grid(theta_i_deg: float, phi_i_deg: float, setup: Setup) -> tuple[Floats, Floats]:
-    """(theta_o, phi_o) in degrees for one incident direction: regular, and closer around the mirror direction."""
+    """(theta_o, phi_o) in degrees for one incident direction: regular, and finer around the mirror direction."""
     step, fine, reach = setup.step_deg, setup.fine_deg, setup.fine_reach_deg
     theta = np.arange(0, setup.grazing_deg + 1e-9, step)
     near = theta_i_deg + np.arange(-reach, reach + 1e-9, fine)
     theta = np.union1d(theta, near[(near >= 0) & (near <= setup.grazing_deg)].round(6))
     phi = np.arange(0, 360, step)
-    across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # a step in phi is so much shorter on the sphere
+    across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # factor by which a step in phi is shorter on the sphere
     if fine / across < step:
         near = phi_i_deg + 180 + np.arange(-reach, reach + 1e-9, fine) / across
         phi = np.union1d(phi, (near % 360).round(4) % 360)
@@ -139,7 +126,7 @@ def _sheet(
     theta, phi = outgoing_grid(theta_i, phi_i, setup)
     wo = direction(*np.radians(np.meshgrid(theta, phi, indexing="ij")))
     wi = np.broadcast_to(direction(np.radians(theta_i), np.radians(phi_i)), wo.shape)
-    towards = wo * (1, 1, -1) if far else wo
+    towards = wo * FLIP_Z if far else wo
     f = np.asarray(evaluate(wi.reshape(-1, 3), towards.reshape(-1, 3)), dtype=float).reshape(*wo.shape[:2], -1)
     f = f * (1 + setup.noise * noise.standard_normal(f.shape)) + setup.floor * noise.standard_normal(f.shape)
     hidden = np.sum(wi * wo, axis=-1) > np.cos(np.radians(setup.sector_deg))

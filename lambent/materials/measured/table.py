@@ -1,31 +1,32 @@
-"""What tables of every format share: albedos by quadrature, filled holes, and the refusal of files without values."""
+"""Shared by the tables of all formats: albedos by quadrature, interpolation, filled holes, refusal of empty files."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.protocol import LARGEST_F, Flags, MeasuredSamples, TableInfo
+from lambent.materials.measured.protocol import LARGEST_F, MeasuredSamples, TableInfo
 
-# The quadrature draws from a mixture that is nowhere much narrower or wider than a measured lobe can be.
+# The quadrature's mixture has lobes of all widths that measured lobes can have.
 _WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 _PROPOSAL = Material(
     kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
 )
 _QUADRATURE_POINTS = 4096
-_QUERIES_AT_ONCE = 1 << 17
 
 
 class IntegratedTable(ABC):
-    """Base of the tables: `eval` and `samples` are the format's, reflectivity and transmissivity follow from `eval`."""
+    """Base of the tables: reflectivity and transmissivity follow from the format's `eval`."""
 
     info: TableInfo
 
@@ -36,11 +37,11 @@ class IntegratedTable(ABC):
     def samples(self, max_count: int | None = None) -> MeasuredSamples: ...
 
     def reflectivity(self, wi: Floats) -> Floats:
-        """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % of a smooth table."""
+        """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % for a smooth table."""
         return self._integral(wi, 1.0)
 
     def transmissivity(self, wi: Floats) -> Floats:
-        """t (..., C): the integral of f |cos theta_o| over the far side (2.8); 0 of an opaque table."""
+        """t (..., C): the integral of f |cos theta_o| over the far side (2.8); 0 for an opaque table."""
         if not self.info.transmits:
             return np.zeros((*wi.shape[:-1], self.info.channels))
         return self._integral(wi, -1.0)
@@ -73,7 +74,9 @@ def _quadrature() -> Floats:
 
 
 class ReflectionTable(IntegratedTable):
-    """Base of three-channel tables of reflection alone: look-ups in pieces, 0 where wi or wo is below the surface."""
+    """Base of three-channel tables of reflection alone; f is 0 where wi or wo is below the surface."""
+
+    QUERIES_AT_ONCE: ClassVar[int] = 1 << 17
 
     @abstractmethod
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
@@ -81,38 +84,60 @@ class ReflectionTable(IntegratedTable):
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3) in 1/sr; 0 where wi or wo is below the surface."""
-        wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
-        flat_i, flat_o = wi.reshape(-1, 3), wo.reshape(-1, 3)
-        f = np.zeros((len(flat_i), 3))
-        above = np.flatnonzero((flat_i[:, 2] > 0) & (flat_o[:, 2] > 0))
-        for start in range(0, len(above), _QUERIES_AT_ONCE):
-            part = above[start : start + _QUERIES_AT_ONCE]
-            f[part] = self._eval_above(flat_i[part], flat_o[part])
-        return f.reshape(wi.shape)
+        return on_flat_pairs(self._eval_flat, wi, wo)
+
+    def _eval_flat(self, wi: Floats, wo: Floats) -> Floats:
+        f = np.zeros((len(wi), 3))
+        above = np.flatnonzero((wi[:, 2] > 0) & (wo[:, 2] > 0))
+        for start in range(0, len(above), self.QUERIES_AT_ONCE):
+            part = above[start : start + self.QUERIES_AT_ONCE]
+            f[part] = self._eval_above(wi[part], wo[part])
+        return f
+
+
+def on_flat_pairs(evaluate: Callable[[Floats, Floats], Floats], wi: Floats, wo: Floats) -> Floats:
+    """f (..., C) for wi, wo (..., 3) of a function that takes pairs (N, 3)."""
+    wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
+    f = evaluate(wi.reshape(-1, 3), wo.reshape(-1, 3))
+    return f.reshape(*wi.shape[:-1], f.shape[-1])
 
 
 def isotropic_brdf(path: Path, reader: str, sizes: dict[str, int], notes: tuple[str, ...]) -> TableInfo:
-    """What a file says about itself that holds f of an opaque isotropic material, as linear RGB."""
-    return TableInfo(
-        file=Path(path).name,
-        format=reader,
-        isotropic=True,
-        transmits=False,
-        channels=3,
-        stored="f",
-        sizes=sizes,
-        notes=notes,
-    )
+    """Metadata of a file that holds f of an opaque isotropic material, as linear RGB."""
+    return TableInfo(Path(path).name, reader, True, False, 3, "f", sizes, notes)
+
+
+def mirrored_to_range(wi: Floats, wo: Floats, sign: float, *, quadrant: bool) -> tuple[Floats, Floats]:
+    """The pair (N, 3), mirrored so that wi.y has this sign: turned by 180 degrees, or in x and y for a quadrant."""
+    flip_y = np.where(wi[:, 1] * sign < 0, -1.0, 1.0)
+    flip_x = np.where(wi[:, 0] * sign < 0, -1.0, 1.0) if quadrant else flip_y
+    flip = np.stack([flip_x, flip_y, np.ones_like(flip_y)], axis=-1)
+    return wi * flip, wo * flip
+
+
+def bracket(nodes: Floats, x: Floats) -> tuple[Indices, Indices, Floats]:
+    """Indices of the nodes around x and the share of the upper one; x is clamped to the nodes, which increase."""
+    if len(nodes) == 1:
+        zero = np.zeros(x.shape, dtype=np.int64)
+        return zero, zero, np.zeros(x.shape)
+    low = (np.searchsorted(nodes, x, side="right") - 1).clip(0, len(nodes) - 2)
+    return low, low + 1, ((x - nodes[low]) / (nodes[low + 1] - nodes[low])).clip(0, 1)
 
 
 def sensible(values: Floats) -> Flags:
-    """(...) whether all channels of values (..., C) are finite and no brighter than any surface."""
+    """(...) whether all channels of values (..., C) are finite and possible for a surface."""
     with np.errstate(invalid="ignore"):
         return np.asarray((np.isfinite(values) & (values <= LARGEST_F)).all(axis=-1))
 
 
+def usable_values(values: Floats) -> Flags:
+    """(...) whether all channels of values (..., C) are finite and not negative."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.isfinite(values) & (values >= 0)).all(axis=-1))
+
+
 def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:
-    """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, in cells.
+    """`values` (grid..., C) with every cell that was not measured set to the nearest measured one, counted in cells.
 
     Parameters
     ----------
@@ -140,7 +165,7 @@ def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None
 
 
 def require_values(values: Floats, measured: Flags, file: Path | str) -> None:
-    """`UserError` where no cell of values (grid..., C) was measured; the message counts what is there instead."""
+    """`UserError` where no cell of values (grid..., C) was measured; the message counts the values found."""
     if measured.any():
         return
     with np.errstate(invalid="ignore"):

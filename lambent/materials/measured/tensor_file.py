@@ -28,7 +28,7 @@ def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
     Raises
     ------
     UserError
-        Where the header is broken or a tensor does not lie inside the file.
+        The header is broken, or a tensor lies outside the file.
     """
     content = read_bytes(path, LIMIT_BYTES)
     try:
@@ -49,14 +49,13 @@ def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
         at += 2 + length
         dimensions, kind, offset = struct.unpack_from("<HBQ", content, at)
         if kind not in _TYPES or dimensions > _DIMENSIONS_MAX:
-            raise UserError(
-                "unknown kind of tensor", file=path, field=name, got=f"type {kind}, {dimensions} dimensions"
-            )
+            got = f"type {kind}, {dimensions} dimensions"
+            raise UserError("unknown kind of tensor", file=path, field=name, got=got)
         shape = struct.unpack_from(f"<{dimensions}Q", content, at + 11)
         at += 11 + 8 * dimensions
         dtype = np.dtype(_TYPES[kind])
         end = offset + math.prod(shape) * dtype.itemsize
-        # A size of 0 makes the product 0 whatever the others are.
+        # One size of 0 makes the product 0, so the others are checked too.
         if end > len(content) or max(shape, default=0) > len(content):
             got, expected = f"shape {shape} at byte {offset}", f"to end by byte {len(content)}"
             raise UserError("tensor lies outside the file", file=path, field=name, got=got, expected=expected)
@@ -65,7 +64,7 @@ def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
 
 
 def tensor_bytes(tensors: dict[str, NDArray[np.generic]]) -> bytes:
-    """The file that `read_tensors` reads as these tensors, in their order; each begins at a multiple of 8 bytes."""
+    """A file of these tensors for `read_tensors`, in their order; each begins at a multiple of 8 bytes."""
     kinds = {np.dtype(name): kind for kind, name in _TYPES.items()}
     names = {name: name.encode("utf-8") for name in tensors}
     offset = len(MAGIC) + 6 + sum(13 + len(names[name]) + 8 * tensor.ndim for name, tensor in tensors.items())

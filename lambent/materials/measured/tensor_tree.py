@@ -1,13 +1,13 @@
 """Tensor trees of Radiance: f that is constant over cells of a disk map, finer where it varies.
 
-A direction is a place in the unit square: its projection on the sheet, a point of the unit disk, carried to the square
-by the equal-area map of Shirley & Chiu 1997, "A low distortion map between disk and square". A cell of side s therefore
-has the projected solid angle pi s^2. Rank 4 has the incident heading and the outgoing direction; rank 3 is isotropic:
-its first coordinate is (1 - sin theta_i) / 2, of which only [0, 1/2] is used, and the outgoing direction is turned so
-that the incident heading lies at phi = 0.
+A direction is a place in the unit square: its projection on the sheet, a point of the unit disk, is mapped to the
+square by the equal-area map of Shirley & Chiu 1997, "A low distortion map between disk and square". A cell of side s
+therefore has the projected solid angle pi s^2. Rank 4 has the incident heading and the outgoing direction; rank 3 is
+isotropic: its first coordinate is (1 - sin theta_i) / 2, of which only [0, 1/2] is used, and the outgoing direction is
+turned so that the incident heading lies at phi = 0.
 
-As text a tree is nested braces. Braces in braces are the 2^rank halves of a cell; the first coordinate is the lowest
-bit of a branch's number. Numbers in braces are a grid of 2^(rank k) leaves, the last coordinate fastest.
+As text, a tree is nested braces. Braces in braces are the 2^rank halves of a cell; the first coordinate is the lowest
+bit of a branch's number. Numbers in braces are a grid of 2^(rank k) leaves, with the last coordinate fastest.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 
-Indices = NDArray[np.int64]
 Rank = Literal[3, 4]
 
-DEEPEST = 24  # levels; a cell of that size is far below what any device or sampler resolves
+DEEPEST = 24  # levels; a cell of that size is far below the resolution of any device or sampler
 _TINY = 1e-6  # keeps the normal within the used half of rank 3, as Radiance does
 _BELOW_ONE = 1 - 2**-40
 _OPEN, _CLOSE = ord("{"), ord("}")
@@ -36,7 +35,7 @@ _CHUNK = 1 << 16  # letters of a text at a time
 
 
 class Malformed(ValueError):
-    """The text is not what the format says; the message says why."""
+    """The text does not follow the format; the message says why."""
 
 
 def disk_of(square: Floats) -> Floats:
@@ -63,32 +62,35 @@ def square_of(disk: Floats) -> Floats:
 
 def coordinates(rank: Rank, entering: Floats, leaving: Floats) -> Floats:
     """Places (N, rank) in the unit cube for headings (N, 3) of light that enters and leaves."""
-    if rank == 4:
-        return np.concatenate([square_of(entering[:, :2]), square_of(leaving[:, :2])], axis=1)
-    turn = -np.arctan2(entering[:, 1], entering[:, 0])
-    cos, sin = np.cos(turn), np.sin(turn)
-    x, y = leaving[:, 0], leaving[:, 1]
-    turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-    return np.concatenate([_first_of_three(entering)[:, None], square_of(turned)], axis=1)
-
-
-def _first_of_three(entering: Floats) -> Floats:
-    return np.asarray(0.5 - _TINY - 0.5 * np.hypot(entering[:, 0], entering[:, 1]))
+    out = leaving[:, :2]
+    if rank == 3:
+        turn = -np.arctan2(entering[:, 1], entering[:, 0])
+        cos, sin = np.cos(turn), np.sin(turn)
+        x, y = leaving[:, 0], leaving[:, 1]
+        out = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return np.concatenate([incident_coordinates(rank, entering), square_of(out)], axis=1)
 
 
 def incident_coordinates(rank: Rank, entering: Floats) -> Floats:
     """The first rank - 2 coordinates (N, rank - 2)."""
-    return square_of(entering[:, :2]) if rank == 4 else _first_of_three(entering)[:, None]
+    if rank == 4:
+        return square_of(entering[:, :2])
+    return np.asarray(0.5 - _TINY - 0.5 * np.hypot(entering[:, 0], entering[:, 1]))[:, None]
+
+
+def _grid_points(size: int, dimensions: int) -> Indices:
+    """(size^dimensions, dimensions) integer points of a cube, with the last coordinate fastest."""
+    return np.indices((size,) * dimensions).reshape(dimensions, -1).T
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Leaves that a query meets, all flat: one entry per query and leaf.
+    """Leaves that queries meet, one entry per query and leaf.
 
     Attributes
     ----------
     query : (M,) number of the query
-    corner : (M, D) lower corner in the coordinates that were free
+    corner : (M, D) lower corner in the free coordinates
     side : (M,) length of the side
     value : (M,)
     """
@@ -104,12 +106,12 @@ class Cells:
         return np.asarray(self.corner + self.side[:, None] / 2)
 
     def chosen(self, index: NDArray[Any]) -> Cells:
-        """Those of an index or of flags."""
+        """The cells of an index or of flags."""
         return Cells(self.query[index], self.corner[index], self.side[index], self.value[index])
 
     @staticmethod
     def joined(parts: Sequence[Cells]) -> Cells:
-        """One after the other."""
+        """The parts, concatenated."""
         columns = zip(*((c.query, c.corner, c.side, c.value) for c in parts), strict=True)
         return Cells(*(np.concatenate(column) for column in columns))
 
@@ -122,14 +124,14 @@ class TensorTree:
     ----------
     rank : 3 or 4
     children : (B, 2^rank) int32
-        Per branch and half the code of what is below: k >= 0 is branch k, -1 - k is grid k.
+        Code of the node below each branch and half: k >= 0 is branch k, -1 - k is grid k.
     starts : (K,) int32
-        Per grid the place of its first value.
+        Index of each grid's first value.
     logs : (K,) int8
-        Per grid the base-2 logarithm of its leaves per side.
+        Base-2 logarithm of each grid's leaves per side.
     values : (V,)
     root : int
-        Code.
+        Code of the root.
     """
 
     rank: Rank
@@ -167,11 +169,11 @@ class TensorTree:
         Parameters
         ----------
         fixed : tuple of int
-            Numbers of the coordinates that are fixed.
+            Numbers of the fixed coordinates.
         place : (Q, len(fixed)) in [0, 1]
         """
         free = tuple(d for d in range(self.rank) if d not in fixed)
-        halves = np.array(np.meshgrid(*[(0, 1)] * len(free), indexing="ij")).reshape(len(free), -1).T
+        halves = _grid_points(2, len(free))
         query, at = np.arange(len(place)), place.clip(0, _BELOW_ONE)
         code, corner, side = np.full(len(place), self.root), np.zeros((len(place), len(free))), 1.0
         found = []
@@ -205,7 +207,7 @@ class TensorTree:
             index = self.starts[grid[here]].astype(np.int64)
             for column, d in enumerate(fixed):
                 index = index + ((at[here, column] * width).astype(np.int64) << log * (self.rank - 1 - d))
-            steps = np.array(np.meshgrid(*[np.arange(width)] * len(free), indexing="ij")).reshape(len(free), -1).T
+            steps = _grid_points(width, len(free))
             offset = (steps << log * (self.rank - 1 - np.array(free))).sum(axis=1)
             value = self.values[index[:, None] + offset].ravel()
             corners = (corner[here, None, :] + steps * (side / width)).reshape(-1, len(free))
@@ -215,12 +217,12 @@ class TensorTree:
 
 
 def parse_tree(text: bytes, rank: Rank) -> TensorTree:
-    """The tree of its text.
+    """The tree of a text.
 
     Raises
     ------
     Malformed
-        Where braces do not match, a count of branches or values is impossible, or a word is not a number.
+        Braces do not match, a count of branches or values is impossible, or a word is not a number.
     """
     nest = _Nest(rank)
     for opens, words in _braces(text):
@@ -240,13 +242,13 @@ def parse_tree(text: bytes, rank: Rank) -> TensorTree:
 
 
 class _Nest:
-    """Branches and grids of braces that come in order. It keeps its own stack, so depth costs nothing."""
+    """Collects branches and grids from braces in order, on a stack of its own, so that depth costs nothing."""
 
     def __init__(self, rank: Rank) -> None:
         self.children = array("i")
         self.logs = array("b")
         self.root: int | None = None
-        self._begun = False  # a brace was opened, and what it holds is not known yet
+        self._begun = False  # a brace was opened; its content is not known yet
         self._rank, self._branches = rank, 1 << rank
         self._log_of = {1 << rank * log: log for log in range(64 // rank)}
         self._path: list[list[int]] = []  # open branches: number, halves filled
@@ -295,12 +297,12 @@ class _Nest:
 
 
 def _braces(text: bytes) -> Iterator[tuple[bool, int]]:
-    """Per brace whether it opens, and how many words stand between it and the one before; in chunks, to save memory.
+    """Whether each brace opens, and how many words precede it since the last one; in chunks, to save memory.
 
     Raises
     ------
     Malformed
-        Where words stand after the last brace.
+        Words follow the last brace.
     """
     words = 0
     for start in range(0, len(text), _CHUNK):
@@ -318,8 +320,8 @@ def _braces(text: bytes) -> Iterator[tuple[bool, int]]:
         raise Malformed("text after the last brace")
 
 
-def _word_starts(letters: NDArray[np.uint8], before: int) -> NDArray[np.bool_]:
-    """Whether a word begins at each letter; `before` is the letter that precedes them."""
+def _word_starts(letters: NDArray[np.uint8], before: int) -> Flags:
+    """Whether a word begins at each letter; `before` is the letter before the first."""
     inside = _IN_WORD[letters]
     starts = inside.copy()
     starts[1:] &= ~inside[:-1]
@@ -328,17 +330,17 @@ def _word_starts(letters: NDArray[np.uint8], before: int) -> NDArray[np.bool_]:
 
 
 def count_words(text: bytes) -> int:
-    """How many words stand between blanks, commas and braces, without making them."""
+    """Number of words between blanks, commas and braces, without making them."""
     return int(_word_starts(np.frombuffer(text, np.uint8), _BLANKS[0]).sum()) if text else 0
 
 
 def numbers_of(text: bytes) -> Floats:
-    """The numbers (N,) of a text, between which stand blanks, commas or braces.
+    """The numbers (N,) of a text, separated by blanks, commas or braces.
 
     Raises
     ------
     Malformed
-        Where a word is not a number.
+        A word is not a number.
     """
     blank = text.translate(_BLANKED)
     if not blank.strip():

@@ -1,4 +1,4 @@
-"""Numbers in text files of any line end: what the text formats share, decimal commas and other encodings included."""
+"""Shared by the text formats: text of any line ending, its numbers, and checks for decimal commas and encodings."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 
 LIMIT_BYTES = 1 << 30
-_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 _DECIMAL_COMMA = re.compile(rb"(?:^|[\s;])[-+]?\d+,\d+(?:[eE][-+]?\d+)?(?=[\s;]|$)")
 _COMMENT = re.compile(rb"#[^\n]*")
@@ -21,32 +21,48 @@ HINT_DECIMAL_COMMA = "replace the decimal commas by points, and separate the col
 
 
 def plain_text(content: bytes) -> bytes:
-    """`content` without a byte order mark, lines ended by a line feed alone."""
+    """`content` without a byte order mark, with lines ended by a line feed alone."""
     return content.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def head_text(head: bytes) -> bytes | None:
-    """The same of the first bytes of a file, or None where they are no text."""
+    """`plain_text` of the first bytes of a file, or None for a binary file."""
     return None if _BINARY.search(head) else plain_text(head)
 
 
+def begins_with(pattern: re.Pattern[bytes], head: bytes) -> bool:
+    """Whether the first bytes of a file are text that, without comments, begins with the pattern."""
+    text = head_text(head)
+    return text is not None and pattern.match(without_comments(text)) is not None
+
+
 def read_text(path: Path, limit_bytes: int = LIMIT_BYTES) -> bytes:
-    """A file's text, lines ended by a line feed alone.
+    """A file's `plain_text`.
 
     Raises
     ------
     UserError
-        Where it cannot be read, is too large, or is in an encoding of two bytes per character.
+        The file cannot be read, is too large, or is UTF-16.
     """
     content = read_bytes(path, limit_bytes)
-    if content.startswith(_UTF16):
-        raise UserError("is UTF-16", file=path, expected="plain text or UTF-8", hint="save it again as UTF-8")
+    if content.startswith(UTF16):
+        raise is_utf16(path)
     return plain_text(content)
 
 
+def is_utf16(path: Path) -> UserError:
+    """The error for a file in UTF-16."""
+    return UserError("is UTF-16", file=path, expected="plain text or UTF-8", hint="save it again as UTF-8")
+
+
 def without_comments(text: bytes) -> bytes:
-    """`text` with blanks in place of what `#` begins, to the end of the line."""
+    """`text` without comments, which run from `#` to the end of the line."""
     return _COMMENT.sub(b"", text) if b"#" in text else text
+
+
+def shown(text: bytes) -> str:
+    """Bytes of a user's file as text for parsing and messages; what is not UTF-8 is replaced."""
+    return text.decode("utf-8", "replace")
 
 
 def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
@@ -55,19 +71,19 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
     Raises
     ------
     UserError
-        Where a word is not a number, with that word; decimal commas are named as such.
+        A word is not a number; the message names it, and decimal commas as such.
     """
     if not text.strip():
         return np.empty(0)
     try:
         return np.fromstring(text, dtype=np.float64, sep=" ")
     except ValueError:
-        pass  # the slow way below says which word it was
+        pass  # the slow search below finds the word
     for match in re.finditer(rb"\S+", text):
         try:
             float(match[0])
         except ValueError as error:
-            word = match[0].decode("utf-8", "replace")
+            word = shown(match[0])
             hint = HINT_DECIMAL_COMMA if has_decimal_commas(text) else None
             raise UserError("holds a word that is not a number", file=path, field=field, got=word, hint=hint) from error
     raise UserError("holds numbers that cannot be read", file=path, field=field)

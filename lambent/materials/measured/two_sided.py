@@ -1,53 +1,42 @@
-"""A table as the two-sided sheet that renderers put on meshes, and the same seen by photons."""
+"""A table as the two-sided sheet that renderers put on meshes, and with light and viewer exchanged."""
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
-
 import numpy as np
 
-from lambent.core.directions import Floats, direction
+from lambent.core.directions import FLIP_Z, Floats, direction
 from lambent.materials.measured.protocol import MeasuredTable
 
-DOWN = np.array([1.0, 1.0, -1.0])
 
+class TwoSided:
+    """A table for light from both sides; without a back of its own it treats light from below as the mirrored pair.
 
-@runtime_checkable
-class KnowsItsBack(Protocol):
-    """A table that need not be asked at random pairs, which may miss where it scatters."""
-
-    @property
-    def has_a_back(self) -> bool: ...
-
-
-class Sheet:
-    """A table that answers for both sides: where it has no back of its own, light from below is the mirrored pair.
-
-    A table has a back if it says so itself, or says something of light from below (wi.z < 0) that is not the mirrored
-    pair.
+    A table may state whether it has a back by an attribute `has_a_back`. Otherwise it has one if its f for light from
+    below (wi.z < 0) is not that of the mirrored pair, at random pairs.
     """
 
     def __init__(self, table: MeasuredTable) -> None:
         self.table, self.info = table, table.info
-        if isinstance(table, KnowsItsBack):
-            self.has_a_back = table.has_a_back
+        stated: bool | None = getattr(table, "has_a_back", None)
+        if stated is not None:
+            self.has_a_back = stated
             return
         z, phi = np.random.default_rng(0).uniform((0.1, 0), (1, 2 * np.pi), (2, 64, 2)).transpose(2, 0, 1)
         up, other = direction(np.arccos(z), phi)
-        front = [table.eval(up, other), table.eval(up, other * DOWN)]
-        back = [table.eval(up * DOWN, other * DOWN), table.eval(up * DOWN, other)]
+        front = [table.eval(up, other), table.eval(up, other * FLIP_Z)]
+        back = [table.eval(up * FLIP_Z, other * FLIP_Z), table.eval(up * FLIP_Z, other)]
         self.has_a_back = bool(np.any(back)) and not np.allclose(front, back, rtol=1e-3, atol=1e-6)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr, without the cosine."""
         if not self.has_a_back:
             below = np.asarray(wi)[..., 2:] < 0
-            wi, wo = np.where(below, wi * DOWN, wi), np.where(below, wo * DOWN, wo)
+            wi, wo = np.where(below, wi * FLIP_Z, wi), np.where(below, wo * FLIP_Z, wo)
         return np.asarray(self.table.eval(wi, wo))
 
 
-class Reversed(Sheet):
-    """The sheet with light and viewer exchanged: its grid samples wo for a given wi."""
+class Reversed(TwoSided):
+    """The sheet with light and viewer exchanged; its grid samples wo for a given wi."""
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         return super().eval(wo, wi)

@@ -6,8 +6,8 @@ Then, per channel (Monochrome, or TristimulusX, Y and Z), DataBegin, the blocks,
 (slow) and angle of incidence (fast): `TIS value`, then a line per azimuth with the BSDF (1/sr, no cosine) per radial
 angle.
 
-ScatterRadial is the angle from the direction of mirror reflection (BTDF: straight transmission), ScatterAzimuth turns
-about it, 0 towards the normal. The angles of incidence are those of this direction, which is the same number.
+ScatterRadial is the angle from the direction of mirror reflection (BTDF: straight transmission), ScatterAzimuth the
+angle about it, 0 towards the normal. The angles of incidence are those of this direction, which are the same.
 """
 
 from __future__ import annotations
@@ -18,13 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
+from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import direction
 from lambent.core.errors import UserError, did_you_mean
-from lambent.materials.measured.gonio import PHI_I_RANGE_DEG, GonioTable, Sheets, Symmetry
-from lambent.materials.measured.protocol import LARGEST_F, Flags
+from lambent.materials.measured.gonio import GonioTable, Sheets
+from lambent.materials.measured.gonio_rows import spanned_symmetry
+from lambent.materials.measured.protocol import LARGEST_F
 from lambent.materials.measured.sheets import Sheet, specular_frame
 from lambent.materials.measured.spectral import rgb_of_xyz
-from lambent.materials.measured.text_numbers import head_text, numbers, read_text, without_comments
+from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "Zemax BSDF text"
 LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
@@ -40,8 +42,7 @@ _MOST_CHECKED = 16  # angles of incidence whose TIS is compared
 
 def recognise(head: bytes, size: int) -> bool:
     """Whether the first words are the format's."""
-    text = head_text(head)
-    return text is not None and _FIRST.match(without_comments(text)) is not None
+    return begins_with(_FIRST, head)
 
 
 def read(path: Path) -> GonioTable:
@@ -50,8 +51,8 @@ def read(path: Path) -> GonioTable:
     Raises
     ------
     UserError
-        Where a keyword is missing or unknown, the counts do not fit, an angle is outside its range, or nothing was
-        measured for an incident direction.
+        A keyword is missing or unknown, the counts do not fit, an angle is outside its range, or nothing was measured
+        for an incident direction.
     """
     text = without_comments(read_text(path))
     head, _, body = text.partition(b"DataBegin")
@@ -83,7 +84,7 @@ def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]
         lists[name] = np.array(angles)
     for name, known in _WORDS.items():
         named = re.search(rb"\b" + name.encode() + rb"\s+(\w+)", head)
-        got = named[1].decode("utf-8", "replace") if named else None
+        got = shown(named[1]) if named else None
         word = next((word for word in known if got is not None and word.lower() == got.lower()), None)
         if word is None:
             hint = did_you_mean(got, known) if got else None
@@ -112,11 +113,11 @@ def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, F
         raise UserError("number of data blocks does not fit", file=path, got=len(blocks) - 1, expected=expected)
     read_blocks = []
     for number, block in enumerate(blocks[1:], 1):
-        # The next channel's name stands behind the last block, where its DataEnd is missing.
-        found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, f"block {number}")
+        # Without a DataEnd, the next channel's name follows the last block.
+        field = f"block {number}"
+        found = numbers(re.sub(rb"\n\s*(?:Tristimulus\w*|Monochrome)\s*$", b"", block), path, field)
         if len(found) != each + 1:
             expected = f"TIS and {shape[2]} azimuths x {shape[3]} radial angles"
-            field = f"block {number}"
             raise UserError("number of values does not fit", file=path, field=field, got=len(found), expected=expected)
         read_blocks.append(found)
     whole = np.stack(read_blocks)
@@ -135,24 +136,22 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
     elif azimuth[-1] - azimuth[0] >= 360:
         azimuth, values = azimuth[:-1], values[:, :, :-1]
     phi_i, order = np.unique(lists["SampleRotation"] % 360, return_index=True)
-    span = float(phi_i[-1] - phi_i[0])
-    symmetry: Symmetry = next(name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole)
+    symmetry = spanned_symmetry(phi_i)
     if len(phi_i) > 1:
         notes += (f"sample rotation is taken as phi_i, and the symmetry as {symmetry} from its range",)
     else:
         phi_i = np.zeros(1)
-    theta_i = lists["AngleOfIncidence"]
-    sheets = tuple(
-        tuple(
-            _sheet(
-                Sheet(lists["ScatterRadial"], azimuth, values[k, i].swapaxes(0, 1), specular_frame(theta, phi), images),
-                (theta, phi),
-                path,
-            )
-            for k, phi in zip(order, phi_i, strict=True)
-        )
-        for i, theta in enumerate(theta_i)
-    )
+    theta_i, radial = lists["AngleOfIncidence"], lists["ScatterRadial"]
+
+    def sheet(i: int, k: int, theta: float, phi: float) -> Sheet:
+        made = Sheet(radial, azimuth, values[k, i].swapaxes(0, 1), specular_frame(theta, phi), images)
+        if not np.isfinite(made.values).all(axis=1).any():
+            field = f"angle of incidence {theta:g}, rotation {phi:g}"
+            raise UserError("no value was measured for an incident direction", file=path, field=field)
+        return made
+
+    rotations = list(zip(order, phi_i, strict=True))
+    sheets = tuple(tuple(sheet(i, k, theta, phi) for k, phi in rotations) for i, theta in enumerate(theta_i))
     notes += _outside(sheets)
     far = words["ScatterType"] == "BTDF"
     table = GonioTable(
@@ -170,7 +169,7 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
 
 
 def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Values with NaN where a channel is 0, which is how the format's writers say that nothing was measured."""
+    """Values with NaN where a channel is 0, which writers of the format use for directions that were not measured."""
     with np.errstate(invalid="ignore"):
         empty = np.any(values == 0, axis=-1, keepdims=True)
         values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, values)
@@ -178,20 +177,12 @@ def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
 
 
 def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats, Flags]:
-    """The whole turn, in which azimuth a has what -a has, and which nodes (radials, azimuths) are such images."""
+    """Azimuths and values of the whole turn, mirrored from a to -a, and flags (radials, azimuths) of the images."""
     half = azimuth <= 180
     inner = (azimuth > 0) & (azimuth < 180)
     whole = np.concatenate([azimuth[half], 360 - azimuth[inner][::-1]])
     images = np.broadcast_to(whole > 180, (values.shape[3], len(whole)))
     return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2), images
-
-
-def _sheet(sheet: Sheet, incident_deg: tuple[float, float], path: Path) -> Sheet:
-    """The sheet, or a `UserError` where none of its nodes was measured."""
-    if not np.isfinite(sheet.values).all(axis=1).any():
-        field = "angle of incidence {:g}, rotation {:g}".format(*incident_deg)
-        raise UserError("no value was measured for an incident direction", file=path, field=field)
-    return sheet
 
 
 def _outside(sheets: Sheets) -> tuple[str, ...]:
@@ -201,7 +192,7 @@ def _outside(sheets: Sheets) -> tuple[str, ...]:
 
 
 def _with_tis(table: GonioTable, tis: Floats, far: bool, notes: tuple[str, ...]) -> GonioTable:
-    """The table with a note that compares the total integrated scatter of its file with its own integral."""
+    """The table with a note that compares the file's total integrated scatter with the table's integral."""
     with np.errstate(over="ignore", invalid="ignore"):
         stated = tis[:_MOST_CHECKED].mean(axis=-1)
     wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))

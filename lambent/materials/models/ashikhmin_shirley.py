@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.sequences import cosine_hemisphere
+from lambent.materials.fresnel import schlick
 from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import Pair, reflected, schlick, upper
+from lambent.materials.models.pairs import Pair, reflected, sample_cosine, upper
 
 DIFFUSE_SHARE = 0.5  # of the samples
 
@@ -29,9 +29,7 @@ class AshikhminShirley(Model):
         Parameter("ey", 1.0, 10_000.0, 100.0, "exponent across the brushing direction", scale="log"),
     )
     white: ClassVar = {"rd": 1.0, "rs": 1.0}
-    known_deficiencies: ClassVar = {
-        "lossless": "max(wi.n, wo.n) stands in for the shadowing; what it takes is not paid back"
-    }
+    known_deficiencies: ClassVar = {"lossless": "max(wi.n, wo.n) stands for the masking, whose loss is not returned"}
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         pair, rd, rs = upper(wi, wo), self.rgb("rd"), self.rgb("rs")
@@ -53,9 +51,7 @@ class AshikhminShirley(Model):
         z = (1 - u[..., 1]) ** (1 / (exponent + 1))
         r = np.sqrt((1 - z) * (1 + z) / length2)
         wi = reflected(wo, np.stack([r * x, r * y, z], axis=-1))
-        base = cosine_hemisphere(u[..., 1:])
-        base[..., 2] *= np.where(wo[..., 2] > 0, 1.0, -1.0)
-        return np.where(u[..., :1] < self._diffuse_share(), base, wi)
+        return np.where(u[..., :1] < self._diffuse_share(), sample_cosine(wo, u[..., 1:]), wi)
 
     def _of_h(self, pair: Pair) -> Floats:
         """Density of the half vector in 1/sr."""

@@ -1,7 +1,6 @@
 """Cook and Torrance's microfacets: Beckmann's distribution, V-shaped grooves, and Fresnel's equations of a metal.
 
-Of the original's D / pi (its integral over the projected normals is then 1/pi too little) the factor is corrected to
-the one of microfacet theory, 1/4: Walter et al. 2007, eq. 20.
+The factor is that of microfacet theory, 1/4 (Walter et al. 2007, eq. 20); the original's 1/pi loses light.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from lambent.materials.fresnel import conductor
 from lambent.materials.models.model import Floats, Model, Parameter
 from lambent.materials.models.pairs import Pair, beckmann, reflected, sample_beckmann, upper
 
@@ -51,20 +51,3 @@ class CookTorrance(Model):
 def _grooves(pair: Pair) -> Floats:
     """Shadowing and masking of V-shaped grooves (Torrance and Sparrow)."""
     return np.asarray(np.minimum(1.0, 2 * pair.cos_h * np.minimum(pair.cos_i, pair.cos_o) / pair.cos_d))
-
-
-def conductor(cos_d: Floats, n: Floats, k: Floats) -> Floats:
-    """Fresnel's reflectance of unpolarised light from air, in [0, 1], for the index n + i k (k = 0: a dielectric).
-
-    Born and Wolf, 14.2: a^2 + b^2 and a are the modulus and the real part of sqrt((n + i k)^2 - sin^2).
-    """
-    cos2 = cos_d * cos_d
-    sin2 = 1 - cos2
-    real = n * n - k * k - sin2
-    modulus = np.sqrt(real * real + 4 * n * n * k * k)
-    a = np.sqrt(np.maximum((modulus + real) / 2, 0.0))
-    perpendicular = (modulus + cos2 - 2 * a * cos_d) / (modulus + cos2 + 2 * a * cos_d)
-    ratio = (modulus * cos2 + sin2 * sin2 - 2 * a * cos_d * sin2) / (
-        modulus * cos2 + sin2 * sin2 + 2 * a * cos_d * sin2
-    )
-    return np.asarray(perpendicular * (1 + ratio) / 2)

@@ -1,6 +1,6 @@
-"""GGX as today's engines read it: height-correlated Smith masking, Schlick's Fresnel, visible-normal sampling.
+"""GGX as current engines read it: height-correlated Smith masking, Schlick's Fresnel, visible-normal sampling.
 
-Hazard: everything is built from the components of h, never from 1 - (n.h)^2, which cancels at low roughness.
+Hazard: 1 - (n.h)^2 cancels at low roughness; everything is built from the components of h instead.
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import normalize
+from lambent.core.directions import normalize, raised
+from lambent.materials.fresnel import schlick
 from lambent.materials.models.model import Floats, Model, Parameter
+from lambent.materials.models.pairs import reflected, upper
 
 
 class Ggx(Model):
@@ -34,26 +35,18 @@ class Ggx(Model):
     }
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
-        wi, wo, seen = _upper(wi, wo)
-        h = normalize(wi + wo)
-        cos_d = np.sum(wo * h, axis=-1)
-        masking = 1 / (1 + self._lambda(wi) + self._lambda(wo))
-        value = np.where(seen, self._distribution(h) * masking / (4 * wi[..., 2] * wo[..., 2]), 0.0)
-        f0 = self.rgb("f0")
-        fresnel = f0 + (1 - f0) * np.maximum(1 - cos_d, 0.0)[..., None] ** 5
-        return np.asarray(value[..., None] * fresnel)
+        pair = upper(wi, wo)
+        masking = 1 / (1 + self._lambda(pair.wi) + self._lambda(pair.wo))
+        value = np.where(pair.seen, self._distribution(pair.h) * masking / (4 * pair.cos_i * pair.cos_o), 0.0)
+        return np.asarray(value[..., None] * schlick(pair.cos_d, self.rgb("f0")))
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
-        wi, wo, seen = _upper(wi, wo)
-        h = normalize(wi + wo)
-        return np.asarray(np.where(seen, self._distribution(h) / ((1 + self._lambda(wo)) * 4 * wo[..., 2]), 0.0))
+        pair = upper(wi, wo)
+        value = self._distribution(pair.h) / ((1 + self._lambda(pair.wo)) * 4 * pair.cos_o)
+        return np.asarray(np.where(pair.seen, value, 0.0))
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
-        up = wo * np.where(wo[..., 2:] > 0, 1.0, [1.0, 1.0, -1.0])
-        h = self._visible_normal(up, u[..., 1], u[..., 2])
-        wi = 2 * np.sum(up * h, axis=-1, keepdims=True) * h - up
-        wi[..., 2] = np.where(wi[..., 2] > 0, wi[..., 2], 0.0) * np.where(wo[..., 2] > 0, 1.0, -1.0)
-        return np.asarray(wi)
+        return reflected(wo, self._visible_normal(raised(wo), u[..., 1], u[..., 2]))
 
     def _distribution(self, h: Floats) -> Floats:
         ax, ay = self.number("alpha_x"), self.number("alpha_y")
@@ -70,7 +63,7 @@ class Ggx(Model):
         stretch = np.array([self.number("alpha_x"), self.number("alpha_y"), 1.0])
         v = normalize(wo * stretch)
         length = np.hypot(v[..., 0], v[..., 1])
-        flat = length < 1e-12  # the viewer straight above: any tangent will do
+        flat = length < 1e-12  # the viewer is straight above: any tangent serves
         safe = np.where(flat, 1.0, length)
         t1 = np.stack([np.where(flat, 1.0, -v[..., 1] / safe), v[..., 0] / safe * ~flat, 0 * safe], axis=-1)
         t2 = np.cross(v, t1)
@@ -83,11 +76,3 @@ class Ggx(Model):
         h = h * stretch
         h[..., 2] = np.maximum(h[..., 2], 1e-12)
         return normalize(h)
-
-
-def _upper(wi: Floats, wo: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The pair turned to the upper side, at least a hair above the horizon, and whether both were on one side."""
-    seen = wi[..., 2] * wo[..., 2] > 0
-    lift = np.array([0.0, 0.0, 1.0])
-    up = [np.where(lift > 0, np.maximum(np.abs(w), 1e-9), w) for w in (wi, wo)]
-    return up[0], up[1], seen

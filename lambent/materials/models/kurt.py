@@ -1,14 +1,15 @@
-"""The Kurt lobe as models of their own: reflection (Beckmann or GGX) and transmission. The maths is in lobes.py."""
+"""The Kurt lobe as models: reflection (Beckmann or GGX) and transmission. The maths is in lobes.py."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
+from lambent.core.plain import triple
 from lambent.materials import lobes
 from lambent.materials.bsdf import components
-from lambent.materials.document import Lobe
+from lambent.materials.document import Distribution, Lobe, Side
 from lambent.materials.models.model import Floats, Model, Parameter
 
 
@@ -28,16 +29,16 @@ class Kurt(Model):
     white: ClassVar = {"k": 1.0, "r0": 1.0, "alpha": 0.5}
     known_deficiencies: ClassVar = {
         "passive": "alpha > 0 and k > 1 return more than arrives near grazing; materials.check reports it",
-        "lossless": "there is no masking term that pays back what falls below the horizon",
+        "lossless": "no masking term returns the part of the lobe below the horizon",
     }
-    side: ClassVar[Literal["reflection", "transmission"]] = "reflection"
-    distribution: ClassVar[Literal["beckmann", "ggx"]] = "beckmann"
+    side: ClassVar[Side] = "reflection"
+    distribution: ClassVar[Distribution] = "beckmann"
 
     @property
     def lobe(self) -> Lobe:
-        """The lobe of these values, as a material document holds it."""
+        """The lobe with these values, as a material document holds it."""
         shape = {name: self.number(name) for name in ("mx", "my", "alpha")}
-        k, r0 = (tuple(self.rgb(name).tolist()) for name in ("k", "r0"))
+        k, r0 = (triple(self.rgb(name)) for name in ("k", "r0"))
         return Lobe(side=self.side, distribution=self.distribution, k=k, r0=r0, **shape)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
@@ -51,7 +52,7 @@ class Kurt(Model):
 
 
 class KurtGgx(Kurt):
-    """The same lobe over the long-tailed GGX distribution."""
+    """The lobe with the long-tailed GGX distribution."""
 
     name = "kurt-ggx"
     title = "Kurt et al. with GGX tails"
@@ -60,7 +61,7 @@ class KurtGgx(Kurt):
 
 
 class KurtTransmission(Kurt):
-    """The lobe on the far side of a thin sheet, with 1 - F."""
+    """The lobe on the far side of a thin sheet, with the factor 1 - F."""
 
     name = "kurt-transmission"
     title = "Kurt et al., transmission"

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.sequences import cosine_hemisphere
 from lambent.materials.models.model import Floats, Model, Parameter
+from lambent.materials.models.pairs import cosine_pdf, sample_cosine
 
 
 class Lambert(Model):
@@ -24,9 +24,7 @@ class Lambert(Model):
         return np.asarray(np.where(same, self.rgb("kd") / np.pi, 0.0))
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
-        return np.asarray(np.where(wi[..., 2] * wo[..., 2] > 0, np.abs(wi[..., 2]) / np.pi, 0.0))
+        return cosine_pdf(wi, wo)
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
-        wi = cosine_hemisphere(u[..., 1:])
-        wi[..., 2] *= np.where(wo[..., 2] > 0, 1.0, -1.0)
-        return wi
+        return sample_cosine(wo, u[..., 1:])

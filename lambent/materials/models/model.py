@@ -1,9 +1,9 @@
-"""What an analytic model is: named parameters with their bounds, and eval, sample and pdf on arrays.
+"""Base of the analytic models: named parameters with their bounds, and eval, sample and pdf on arrays.
 
-Conventions as everywhere: directions (..., 3) in the local frame, wi to the light, wo to the viewer, f in 1/sr without
-the cosine, one row of RGB per direction. A model is two-sided unless it says otherwise.
+Conventions: directions (..., 3) in the local frame, wi to the light, wo to the viewer, f in 1/sr without the cosine,
+one row of RGB per direction. A model is two-sided unless it says otherwise.
 
-The metadata of a parameter is written once, here, and feeds fitting bounds, validation, sliders and documentation.
+A parameter's metadata stands once, in its model; validation, sliders and documentation read it from there.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats as Floats  # models import it from here
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.plain import Triple, triple
 
-Floats = NDArray[np.floating]
-Value = float | tuple[float, float, float]
+Value = float | Triple
 
 PROPERTIES: dict[str, str] = {
     "reciprocal": "f does not change when wi and wo are swapped",
     "sampled": "samples follow pdf, and the albedo by sampling is the albedo by quadrature",
-    "passive": "no direction returns more light than arrives, for any parameters within bounds",
-    "lossless": "with the parameters of `white` all light returns, from every direction",
+    "passive": "no direction returns more light than arrives, for any parameters within their bounds",
+    "lossless": "with the parameters of `white`, all light returns from every direction",
 }
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One user-controlled variable. `rgb` parameters take one value per channel; `log` is how sliders and fits move."""
+    """One user-controlled variable. `rgb` parameters take one value per channel; `scale` is for sliders and fits."""
 
     name: str
     low: float
@@ -45,32 +45,27 @@ class Parameter:
     rgb: bool = False
 
     def checked(self, value: object) -> Value:
-        """`value` as float, or as RGB for an rgb parameter; a `UserError` where it is no number within the bounds."""
+        """`value` as float, or as RGB for an rgb parameter; raises `UserError` unless it is within the bounds."""
         try:
             numbers = np.asarray(value, float)
         except (TypeError, ValueError):
             numbers = np.array(np.nan)
         shapes: list[tuple[int, ...]] = [(), (3,)] if self.rgb else [()]
         if numbers.shape not in shapes or not np.all((numbers >= self.low) & (numbers <= self.high)):
-            kind = "a number or RGB" if self.rgb else "a number"
-            raise UserError(
-                self.meaning, field=self.name, got=value, expected=f"{kind} from {self.low:g} to {self.high:g}"
-            )
-        if self.rgb:
-            red, green, blue = (float(v) for v in np.broadcast_to(numbers, 3))
-            return red, green, blue
-        return float(numbers)
+            expected = f"a number{' or RGB' if self.rgb else ''} from {self.low:g} to {self.high:g}"
+            raise UserError(self.meaning, field=self.name, got=value, expected=expected)
+        return triple(np.broadcast_to(numbers, 3)) if self.rgb else float(numbers)
 
 
 class Model(ABC):
-    """A reflection model with its parameter values; subclasses name themselves and fill in the class variables."""
+    """A scattering model with its parameter values; subclasses set the class variables."""
 
     name: ClassVar[str]
     title: ClassVar[str]
     source: ClassVar[str]  # author, year, title, equations
     parameters: ClassVar[tuple[Parameter, ...]]
     white: ClassVar[Mapping[str, Value]]  # parameters that should reflect everything
-    known_deficiencies: ClassVar[Mapping[str, str]] = {}  # name in PROPERTIES -> why the model does not have it
+    known_deficiencies: ClassVar[Mapping[str, str]] = {}  # name in PROPERTIES -> why the model lacks it
 
     def __init__(self, **values: object) -> None:
         known = {p.name: p for p in self.parameters}
@@ -81,13 +76,13 @@ class Model(ABC):
         self.values: dict[str, Value] = {n: p.checked(values.get(n, p.default)) for n, p in known.items()}
 
     def number(self, name: str) -> float:
-        """Value of a scalar parameter."""
+        """The value of a scalar parameter."""
         value = self.values[name]
         assert isinstance(value, float), f"{name} is an RGB parameter"
         return value
 
     def rgb(self, name: str) -> Floats:
-        """Value (3,) of an RGB parameter."""
+        """The value (3,) of an RGB parameter."""
         return np.asarray(self.values[name])
 
     @abstractmethod
@@ -96,7 +91,7 @@ class Model(ABC):
 
     @abstractmethod
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
-        """Density (...) in 1/sr of `sample` given wo; 0 where it never goes."""
+        """Density (...) in 1/sr of `sample` given wo; 0 for directions that are never drawn."""
 
     @abstractmethod
     def sample(self, wo: Floats, u: Floats) -> Floats:
@@ -104,6 +99,6 @@ class Model(ABC):
 
     @classmethod
     def shader(cls) -> str | None:
-        """WGSL of the model, from the file beside its own that ends in .wgsl; None where there is none."""
+        """WGSL of the model, from the .wgsl file beside its own; None where there is none."""
         file = Path(inspect.getfile(cls)).with_suffix(".wgsl")
         return file.read_text(encoding="utf-8") if file.is_file() else None

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.sequences import cosine_hemisphere
+from lambent.core.directions import elevation
 from lambent.materials.models.model import Floats, Model, Parameter
-from lambent.materials.models.pairs import upper
+from lambent.materials.models.pairs import cosine_pdf, sample_cosine, upper
 
 
 class OrenNayar(Model):
-    """V-shaped Lambertian grooves whose slopes have a Gaussian angle of standard deviation sigma."""
+    """V-shaped Lambertian grooves; their slope angles are normally distributed with standard deviation sigma."""
 
     name = "oren-nayar"
     title = "Oren-Nayar (full)"
@@ -29,7 +29,7 @@ class OrenNayar(Model):
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         pair, sigma2 = upper(wi, wo), np.radians(self.number("sigma")) ** 2
-        theta_i, theta_o = (np.arctan2(np.hypot(w[..., 0], w[..., 1]), w[..., 2]) for w in (pair.wi, pair.wo))
+        theta_i, theta_o = elevation(pair.wi), elevation(pair.wo)
         alpha, beta = np.maximum(theta_i, theta_o), np.minimum(theta_i, theta_o)
         across = pair.wi[..., 0] * pair.wo[..., 0] + pair.wi[..., 1] * pair.wo[..., 1]
         size = np.sin(theta_i) * np.sin(theta_o)
@@ -45,9 +45,7 @@ class OrenNayar(Model):
         return np.asarray(np.where(pair.seen[..., None], f, 0.0))
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
-        return np.asarray(np.where(wi[..., 2] * wo[..., 2] > 0, np.abs(wi[..., 2]) / np.pi, 0.0))
+        return cosine_pdf(wi, wo)
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
-        wi = cosine_hemisphere(u[..., 1:])
-        wi[..., 2] *= np.where(wo[..., 2] > 0, 1.0, -1.0)
-        return wi
+        return sample_cosine(wo, u[..., 1:])

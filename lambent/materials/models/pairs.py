@@ -1,16 +1,17 @@
-"""What the models of one-sided lobes share: pairs of directions turned to the upper side, and reflected samples."""
+"""Shared by the models: pairs of directions turned to the upper side, Beckmann's distribution, and samples."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import normalize
+from lambent.core.arrays import Flags
+from lambent.core.directions import half_vector, normalize, raised, reflect
+from lambent.core.sequences import cosine_hemisphere
 from lambent.materials.models.model import Floats
 
-LOWEST_COSINE = 1e-9  # keeps 1/cos finite; a pair this low is not worth more
+LOWEST_COSINE = 1e-9  # keeps 1/cos finite
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Pair:
     cos_i, cos_o, cos_h, cos_d : (...)
         wi.n, wo.n, h.n, and wo.h.
     seen : (...) bool
-        Whether both were on one side of the surface.
+        Whether both directions are on one side of the surface.
     """
 
     wi: Floats
@@ -34,29 +35,26 @@ class Pair:
     cos_o: Floats
     cos_h: Floats
     cos_d: Floats
-    seen: NDArray[np.bool_]
+    seen: Flags
 
 
 def upper(wi: Floats, wo: Floats) -> Pair:
-    """The pair (..., 3) as seen from above: a two-sided surface scatters alike from below."""
+    """The pair (..., 3) seen from above; a two-sided surface scatters alike from below."""
     seen = np.asarray(wi[..., 2] * wo[..., 2] > 0)
-    up_i, up_o = (np.stack([w[..., 0], w[..., 1], np.maximum(np.abs(w[..., 2]), LOWEST_COSINE)], -1) for w in (wi, wo))
-    up_i, up_o = np.broadcast_arrays(up_i, up_o)
-    h = normalize(up_i + up_o)
+    up_i, up_o = np.broadcast_arrays(raised(wi), raised(wo))
+    up_i, up_o = (np.maximum(w, (-np.inf, -np.inf, LOWEST_COSINE)) for w in (up_i, up_o))
+    h = half_vector(up_i, up_o)
     cos_d = np.maximum(np.sum(up_o * h, axis=-1), LOWEST_COSINE)
     return Pair(up_i, up_o, h, up_i[..., 2], up_o[..., 2], h[..., 2], cos_d, seen)
 
 
-def tangent2(h: Floats, mx: float, my: float) -> Floats:
-    """tan^2(theta_h) (cos^2(phi_h)/mx^2 + sin^2(phi_h)/my^2) of h (..., 3), from its components: nothing cancels."""
-    h_z2 = np.maximum(h[..., 2] ** 2, 1e-12)
-    return np.asarray(((h[..., 0] / mx) ** 2 + (h[..., 1] / my) ** 2) / h_z2)
-
-
 def beckmann(h: Floats, mx: float, my: float) -> Floats:
-    """Beckmann's distribution of the normals h (..., 3) with slopes mx, my, in 1/sr."""
-    h_z4 = np.maximum(h[..., 2] ** 4, 1e-24)
-    return np.asarray(np.exp(-tangent2(h, mx, my)) / (np.pi * mx * my * h_z4))
+    """Beckmann's distribution of the normals h (..., 3) with slopes mx, my, in 1/sr.
+
+    tan^2(theta_h) is built from the components of h, which do not cancel.
+    """
+    slope2 = ((h[..., 0] / mx) ** 2 + (h[..., 1] / my) ** 2) / np.maximum(h[..., 2] ** 2, 1e-12)
+    return np.asarray(np.exp(-slope2) / (np.pi * mx * my * np.maximum(h[..., 2] ** 4, 1e-24)))
 
 
 def sample_beckmann(u1: Floats, u2: Floats, mx: float, my: float) -> Floats:
@@ -67,12 +65,18 @@ def sample_beckmann(u1: Floats, u2: Floats, mx: float, my: float) -> Floats:
 
 def reflected(wo: Floats, h: Floats) -> Floats:
     """wi = wo mirrored about h (..., 3), which is on the upper side; wi.z = 0 where that ends below the surface."""
-    up = np.stack([wo[..., 0], wo[..., 1], np.abs(wo[..., 2])], axis=-1)
-    wi = 2 * np.sum(up * h, axis=-1, keepdims=True) * h - up
+    wi = reflect(raised(wo), h)
     wi[..., 2] = np.maximum(wi[..., 2], 0.0) * np.where(wo[..., 2] > 0, 1.0, -1.0)
-    return np.asarray(wi)
+    return wi
 
 
-def schlick(cos_d: Floats, r0: Floats) -> Floats:
-    """Schlick's Fresnel reflectance (..., 3) of cos_d (...) and r0 (3,)."""
-    return np.asarray(r0 + (1 - r0) * np.maximum(1 - cos_d, 0.0)[..., None] ** 5)
+def sample_cosine(wo: Floats, u: Floats) -> Floats:
+    """wi (..., 3) of a diffuse surface, on the side of wo, from u (..., 2) uniform in [0, 1)."""
+    wi = cosine_hemisphere(u)
+    wi[..., 2] *= np.where(wo[..., 2] > 0, 1.0, -1.0)
+    return wi
+
+
+def cosine_pdf(wi: Floats, wo: Floats) -> Floats:
+    """Density (...) of `sample_cosine` in 1/sr."""
+    return np.asarray(np.where(wi[..., 2] * wo[..., 2] > 0, np.abs(wi[..., 2]) / np.pi, 0.0))

@@ -6,10 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.directions import basis
+from lambent.core.directions import HALF_TURN, basis
 from lambent.materials.models.model import Floats, Model, Parameter
-
-MIRROR = np.array([-1.0, -1.0, 1.0])
 
 
 class Phong(Model):
@@ -35,7 +33,7 @@ class Phong(Model):
         return np.asarray((e + 1) / (2 * np.pi) * self._cosine(wi, wo) ** e)
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
-        axis = wo * MIRROR
+        axis = wo * HALF_TURN
         t, b = basis(axis)
         z, phi = u[..., 1:2] ** (1 / (self.number("exponent") + 1)), 2 * np.pi * u[..., 2:]
         r = np.sqrt(1 - z * z)
@@ -45,6 +43,6 @@ class Phong(Model):
 
     @staticmethod
     def _cosine(wi: Floats, wo: Floats) -> Floats:
-        """Cosine of the angle between wi and the mirrored wo; 0 where the lobe is not."""
+        """Cosine of the angle between wi and the mirrored wo; 0 outside the lobe."""
         same = wi[..., 2] * wo[..., 2] > 0
-        return np.asarray(np.where(same, np.maximum(np.sum(wi * wo * MIRROR, axis=-1), 0.0), 0.0))
+        return np.asarray(np.where(same, np.maximum(np.sum(wi * wo * HALF_TURN, axis=-1), 0.0), 0.0))

@@ -1,18 +1,18 @@
-"""Published fits of measured materials: a parser of .fit files and the three models that their parameters belong to.
+"""Published fits of measured materials: a parser of .fit files, and the three models their parameters belong to.
 
-A .fit file is text, one material a line:
+A .fit file is text, one material per line:
 
     chrome = Aggregate(Lambertian(albedo = [r, g, b]), NganWard(albedo = [r, g, b], roughness = m))
 
-What the names mean, with h the half vector, D0 = exp(-tan^2 theta_h / m^2) / (m^2 cos^4 theta_h), and Torrance and
-Sparrow's G = min(1, 2 h.z wi.z / wi.h, 2 h.z wo.z / wo.h):
+The models, with h the half vector, D0 = exp(-tan^2 theta_h / m^2) / (m^2 cos^4 theta_h), and Torrance and Sparrow's
+G = min(1, 2 h.z wi.z / wi.h, 2 h.z wo.z / wo.h):
 
 - `Lambertian`: albedo / pi.
 - `NganWard` (Ngan, Durand & Matusik 2005): albedo exp(-tan^2 theta_h / m^2) / (4 pi m^2 sqrt(wi.z wo.z)) (Ward 1992).
-- `NganCookTorrance` (the same): albedo F (D0 / pi) G / (pi wi.z wo.z); F is Schlick's with `eta` as the reflectance at
-  normal incidence, in spite of its name.
-- `LowCookTorrance` (Low, Kronander, Ynnerman & Unger 2012): albedo F D0 G / (pi wi.z wo.z), so pi times the above; F is
-  Cook and Torrance's of the real index of refraction `eta`.
+- `NganCookTorrance` (the same paper): albedo F (D0 / pi) G / (pi wi.z wo.z); F is Schlick's with `eta` as the
+  reflectance at normal incidence, in spite of its name.
+- `LowCookTorrance` (Low, Kronander, Ynnerman & Unger 2012): albedo F D0 G / (pi wi.z wo.z), pi times the above; F is
+  that of a dielectric with the real index of refraction `eta`.
 
 Ngan's coefficients were fitted to MERL's values without the scales of green and blue; see `MERL_CHANNELS`.
 """
@@ -26,12 +26,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.directions import Floats, half_vector
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.materials.models.model import Floats
+from lambent.core.plain import Triple, triple
+from lambent.materials.fresnel import dielectric, schlick_weight
 
 MERL_CHANNELS = np.array([1.0, 1.15, 1.66])
-"""What green and blue of Ngan's coefficients must be multiplied with to speak of f as MERL's readers give it."""
+"""Factors that convert Ngan's coefficients to f as MERL's readers give it."""
 LIMIT_BYTES = 16 << 20
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RGB = rf"\[\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\]"
@@ -50,17 +53,17 @@ class Published:
     name, model : str
         The material's name in the file, and the lobe's model.
     kd, ks : (3,) tuples
-        Albedo of the Lambertian term and coefficient of the lobe, as the file has them.
+        Albedo of the Lambertian term and coefficient of the lobe, as the file gives them.
     roughness : float
         Slope m.
     eta : float, optional
-        Of the two Cook-Torrance models; what it means is the model's business.
+        Parameter of the two Cook-Torrance models; its meaning differs, see above.
     """
 
     name: str
     model: str
-    kd: tuple[float, float, float]
-    ks: tuple[float, float, float]
+    kd: Triple
+    ks: Triple
     roughness: float
     eta: float | None = None
 
@@ -71,7 +74,7 @@ class Published:
     }
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., 3) in 1/sr without the cosine, to be compared with MERL's values; 0 below the surface."""
+        """f (..., 3) in 1/sr without the cosine, comparable with MERL's values; 0 below the surface."""
         wi, wo = np.broadcast_arrays(np.asarray(wi, float), np.asarray(wo, float))
         above = (wi[..., 2] > 1e-6) & (wo[..., 2] > 1e-6)
         safe_i, safe_o = (np.where(above[..., None], w, (0.0, 0.0, 1.0)) for w in (wi, wo))
@@ -81,8 +84,7 @@ class Published:
 
     def _lobe(self, wi: Floats, wo: Floats) -> Floats:
         """The lobe without its coefficient, (...)."""
-        h = wi + wo
-        h = h / np.linalg.norm(h, axis=-1, keepdims=True)
+        h = half_vector(wi, wo)
         cos_i, cos_o, m2 = wi[..., 2], wo[..., 2], self.roughness**2
         h_z2 = np.maximum(h[..., 2] ** 2, 1e-12)
         bell = np.exp(-(h[..., 0] ** 2 + h[..., 1] ** 2) / (h_z2 * m2)) / m2
@@ -96,11 +98,8 @@ class Published:
     def _fresnel(self, cos_d: Floats) -> Floats:
         assert self.eta is not None
         if self.model == "NganCookTorrance":
-            return np.asarray(self.eta + (1 - self.eta) * np.maximum(1 - cos_d, 0) ** 5)
-        g = np.sqrt(np.maximum(self.eta**2 + cos_d**2 - 1, 0.0))
-        a = (g - cos_d) / (g + cos_d)
-        b = (cos_d * (g + cos_d) - 1) / (cos_d * (g - cos_d) + 1)
-        return np.asarray(0.5 * a * a * (1 + b * b))
+            return np.asarray(self.eta + (1 - self.eta) * schlick_weight(cos_d))
+        return dielectric(cos_d, self.eta)
 
 
 def read_fits(path: Path) -> dict[str, Published]:
@@ -109,7 +108,7 @@ def read_fits(path: Path) -> dict[str, Published]:
     Raises
     ------
     UserError
-        Where a line is no such material, names an unknown model or field, or holds an impossible number.
+        A line is no material of this form, names an unknown model or field, or holds an impossible number.
     """
     try:
         text = read_bytes(path, LIMIT_BYTES).decode("utf-8-sig")
@@ -133,12 +132,9 @@ def _published(line: str, path: Path, number: int) -> Published:
     where = f"line {number}"
     if match is None:
         expected = "NAME = Aggregate(Lambertian(albedo = [r, g, b]), MODEL(albedo = [r, g, b], roughness = m, ...))"
-        raise UserError("is no published fit", file=path, field=where, got=line[:60], expected=expected)
+        raise UserError("not a published fit", file=path, field=where, got=line[:60], expected=expected)
     name, *kd, model, inner = match.groups()
-    if model not in Published.MODELS:
-        known = ", ".join(Published.MODELS)
-        hint = did_you_mean(model, Published.MODELS)
-        raise UserError("unknown model", file=path, field=where, got=model, expected=known, hint=hint)
+    known("model", model, Published.MODELS, file=path, field=where)
     fields, end = {}, 0
     while (part := _FIELD.match(inner, end)) is not None and end < len(inner):
         fields[part[1]] = part[2]
@@ -150,14 +146,9 @@ def _published(line: str, path: Path, number: int) -> Published:
     numbers = {key: float(value) for key, value in fields.items() if re.fullmatch(_NUMBER, value)}
     if ks is None or numbers.keys() != fields.keys():
         raise UserError("albedo is [r, g, b], the others are numbers", file=path, field=where, got=inner[:60])
-    one = Published(name, model, _rgb(kd), _rgb(ks.groups()), **numbers)
+    one = Published(name, model, triple(kd), triple(ks.groups()), **numbers)
     _require_possible(one, path, where)
     return one
-
-
-def _rgb(texts: list[str] | tuple[str, ...]) -> tuple[float, float, float]:
-    red, green, blue = map(float, texts)
-    return red, green, blue
 
 
 def _require_possible(one: Published, path: Path, where: str) -> None:

@@ -1,8 +1,8 @@
 """Schlick's inexpensive model: rational functions in place of exponentials.
 
-The glossy term B alone, with his self-obstruction G. His full model adds a Lambertian share for r > 1/2 and a mirror
-for r < 1/2, which a mixture can have beside it, and pays the obstructed light back as (1 - G G') / (4 pi v v'), which
-grows without bound towards grazing: it is left out.
+This is the glossy term B with its self-obstruction G. The full model adds a Lambertian share for r > 1/2 and a mirror
+for r < 1/2, which a mixture can add; its term (1 - G G') / (4 pi v v') for obstructed light grows without bound towards
+grazing and is left out.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.core.directions import normalize
+from lambent.materials.fresnel import schlick
 from lambent.materials.models.model import Floats, Model, Parameter
 from lambent.materials.models.pairs import Pair, reflected, upper
-from lambent.materials.models.pairs import schlick as fresnel
 
 
 class Schlick(Model):
@@ -32,7 +32,7 @@ class Schlick(Model):
     )
     white: ClassVar = {"c": 1.0}
     known_deficiencies: ClassVar = {
-        "lossless": "obstructed light is not paid back, and A(w) has a mean below 1 for p < 1",
+        "lossless": "obstructed light is not returned, and A(w) has a mean below 1 for p < 1",
         "passive": "G obstructs less than facets of that roughness would: 1.8 times the light returns at 89 degrees",
     }
 
@@ -40,7 +40,7 @@ class Schlick(Model):
         pair, r = upper(wi, wo), self.number("r")
         obstruction = 1 / ((r + (1 - r) * pair.cos_i) * (r + (1 - r) * pair.cos_o))  # G G' / (v v')
         value = self._zenith(pair) * self._azimuth(pair) * obstruction / (4 * np.pi)
-        return np.asarray(np.where(pair.seen, value, 0.0)[..., None] * fresnel(pair.cos_d, self.rgb("c")))
+        return np.asarray(np.where(pair.seen, value, 0.0)[..., None] * schlick(pair.cos_d, self.rgb("c")))
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
         pair, p = upper(wi, wo), self.number("p")

@@ -47,7 +47,7 @@ class Ward(Model):
 
 
 class WardOriginal(Ward):
-    """ks exp(...) / (4 pi mx my sqrt((wi.n)(wo.n))): what published parameters (Ngan et al. 2005) belong to."""
+    """ks exp(...) / (4 pi mx my sqrt((wi.n)(wo.n))), the model of published parameters (Ngan et al. 2005)."""
 
     name = "ward-original"
     title = "Ward (1992)"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.parameters import SHAPE, Side, parameter
+from lambent.materials.document import Lobe, Material, Side
+from lambent.materials.fitting.parameters import SHAPE, parameter
 
 Value = float | tuple[float, float, float]
 DIFFUSE = ("kd", "kt_d")

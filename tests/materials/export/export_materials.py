@@ -1,4 +1,4 @@
-"""Materials that each writer has to cope with."""
+"""Materials that every writer is tested with."""
 
 from __future__ import annotations
 

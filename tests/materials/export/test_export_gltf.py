@@ -1,4 +1,4 @@
-"""glTF files are valid, say what they claim, and brush the right way."""
+"""glTF files are valid, evaluate as claimed, and have the right brushing direction."""
 
 from __future__ import annotations
 
@@ -55,15 +55,15 @@ def test_trimesh_opens_them(files):
         assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.1**3, rel=0.01)
 
 
-def test_the_exact_material_travels_along(files, tmp_path):
+def test_the_extras_hold_the_exact_material(files, tmp_path):
     path = tmp_path / "x.gltf"
     write(PAPER, path)
     extras = json.loads(path.read_text())["materials"][0]["extras"]
     assert material_from(extras["lambent_material"], path) == PAPER
 
 
-def test_what_is_a_gltf_material_comes_back():
-    """Plastic of GGX facets without masking trouble: low roughness, theta in the middle; F0 and colours are found."""
+def test_a_gltf_material_comes_back_unchanged():
+    """Plastic of GGX facets of low roughness, where masking hardly counts: F0 and colours are recovered."""
     fitted, cost = likeness(Material(kd=(0.4, 0.2, 0.1)))
     assert fitted.metallic == 0
     np.testing.assert_allclose(fitted.base, (0.4, 0.2, 0.1), rtol=0.01)
@@ -107,7 +107,7 @@ def test_the_rough_axis_stays_where_it_is(mx, my, tmp_path):
     assert (bitangents[np.abs(normals[:, 1]) < 0.99, 1] > 0).all()  # t runs round the axis, n x t up
 
 
-def test_losses_are_said():
+def test_losses_are_reported():
     cost = likeness(ALL["4 % foil"])[1]
     assert any("share one roughness" in line for line in cost.lost)
     assert any("Beckmann" in line for line in cost.lost)

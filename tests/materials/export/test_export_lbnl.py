@@ -1,4 +1,4 @@
-"""BSDF XML that is written: energy, reciprocity, colour and both sides, by our reader and by Radiance."""
+"""Written BSDF XML: energy, reciprocity, colour and both sides, by our reader and by Radiance."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ BACK = np.array((-1, -1, 1))
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few directions, for what is exact with any number of them."""
+    """Few directions, for results that are exact with any number of them."""
     monkeypatch.setattr(patch_mean, "LOBES_LOG2", 5)
 
 
@@ -57,7 +57,7 @@ def foil(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
 
 @pytest.fixture(scope="module")
 def mirror(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
-    """Ten-degree patches cannot be a one-degree lobe, and the cost says so."""
+    """The cost reports that ten-degree patches cannot hold a one-degree lobe."""
     path = tmp_path_factory.mktemp("mirror") / "mirror.xml"
     cost = write(MIRROR, path)
     assert any("highlight" in lost for lost in cost.lost) and cost.share["l2_ngan"] > 0.5
@@ -65,7 +65,7 @@ def mirror(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LbnlTable]:
 
 
 def patch_albedo(material: Material, patch: int, n: int = 128) -> tuple[Floats, Floats]:
-    """r and t (3,) over a patch of incident light, by the material's own sampler: not the writer's way."""
+    """r and t (3,) over a patch of incident light, by the material's sampler instead of the writer's quadrature."""
     wi = KLEMS_FULL.points(np.full(n, patch), r2(n)) * BACK
     bsdf, u = MaterialBSDF(material), np.random.default_rng(patch).random((n, 256, 3))
     every = np.broadcast_to(wi[:, None], u.shape)
@@ -88,7 +88,7 @@ def test_energy_is_kept(foil, mirror, patch: int) -> None:
 
 
 def test_both_sides_and_the_directions_are_right(foil) -> None:
-    """Brushed, so that a turn by 90 degrees would show, and other in reflection and transmission."""
+    """Brushed, so that a turn by 90 degrees would show, and different in reflection and transmission."""
     _, table = foil
     i, o = (x.ravel() for x in np.meshgrid(np.arange(9, 25), np.arange(25, 45)))
     wi, wo = KLEMS_FULL.centres[i] * BACK, KLEMS_FULL.centres[o]
@@ -104,7 +104,7 @@ def test_both_sides_and_the_directions_are_right(foil) -> None:
 
 
 def test_radiance_reads_it(foil, tmp_path: Path) -> None:
-    """Luminance and integrals as our reader has them; colour to what Radiance keeps of it."""
+    """Luminance and integrals as from our reader; colour to the precision Radiance keeps."""
     path, table = foil
     asked = angles_away_from_borders(600)
     answers = ask_radiance(path, tmp_path, asked, asked[:100, :2])
@@ -133,8 +133,8 @@ def test_lambertian_is_exact_and_costs_nothing(tmp_path: Path, hasty: None) -> N
     assert max(cost.share.values()) < 1e-5 and set(cost.errors) == set(METRICS)
 
 
-def test_what_was_read_is_written_again(tmp_path: Path, hasty: None) -> None:
-    """A matrix is constant over patches, so its means are its values: both sides, with nothing mixed up."""
+def test_a_matrix_is_written_as_it_was_read(tmp_path: Path, hasty: None) -> None:
+    """A matrix is constant over patches, so its means are its values, on both sides."""
     random = np.random.default_rng(1)
     blocks = [
         ("Visible", d, words(random.random((145, 145)) * 0.2))
@@ -152,7 +152,7 @@ def test_what_was_read_is_written_again(tmp_path: Path, hasty: None) -> None:
 
 
 def test_a_measured_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Grey and glossy, known from one side alone; its cost is said under every metric, and so is its back."""
+    """Grey and glossy, known from one side alone; the cost has every metric and names the missing back."""
     glossy = Material(name="glossy", kd=GREY, lobes=(Lobe(k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=0.3),))
     theta_h, theta_d, phi_d = np.meshgrid(*((np.arange(n) + 0.5) / n * np.pi / 2 for n in (40, 40, 40)), indexing="ij")
     wi, wo = directions_of(theta_h**2 * 2 / np.pi, theta_d, 2 * phi_d)
@@ -176,7 +176,7 @@ def test_nothing_to_write(tmp_path: Path, hasty: None) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_interrupted_it_leaves_no_file(tmp_path: Path) -> None:
+def test_an_interrupted_write_leaves_no_file(tmp_path: Path) -> None:
     def stop(done: float, total: float, what: str) -> None:
         if done > 3:
             raise Cancelled
@@ -186,5 +186,5 @@ def test_interrupted_it_leaves_no_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_it_is_found_by_name() -> None:
+def test_the_writer_is_found_by_name() -> None:
     assert writer_for(Path("x"), "lbnl_xml").write is write

@@ -1,4 +1,4 @@
-"""The facets are those of the models known elsewhere, and the pairs weigh what they stand for."""
+"""The facets agree with the analytic models, and the weights of pairs are solid angles."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_facets_equal_the_ggx_model():
 
 
 def test_facets_have_our_distributions():
-    """With masking and cosines divided out, what is left is the lobe of exponent 0."""
+    """Without masking and cosines, the lobe of exponent 0 remains."""
     for distribution in ("ggx", "beckmann"):
         lobe = Lobe(distribution=distribution, mx=0.3, my=0.1, r0=1.0)
         pairs = pairs_of(Material(lobes=(lobe,)), 10, seed=3)

@@ -1,4 +1,4 @@
-"""Writers of tables: what is written is read back as the same, by our readers and by Mitsuba; losses are said."""
+"""Writers of tables: files read back as the same table, by our readers and by Mitsuba; losses are reported."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ COARSE = replace(ISOTROPIC, noise=0.0, floor=0.0, step_deg=10, fine_deg=5, secto
 
 @pytest.fixture(autouse=True)
 def small_rgl(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A quarter of the nodes: the same code."""
+    """A quarter of the nodes, for speed."""
     monkeypatch.setattr(rgl, "NODES", {"isotropic": 32, "other": 32})
     monkeypatch.setattr(rgl, "THETA_I_DEG", np.array([0, 7, 14, 22, 30, 38, 46, 53, 60, 66, 71, 76, 80, 83, 86.0]))
 
 
 @pytest.fixture
 def small_merl(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fewer bins: the same code, a fortieth of the time."""
+    """Fewer bins, for a fortieth of the time."""
     monkeypatch.setattr(merl, "SHAPE", (40, 20, 30))
     monkeypatch.setattr(merl, "TURNS", 8)
 
 
-def test_found() -> None:
+def test_table_writers_are_found() -> None:
     assert {"merl", "rgl", "gonio_text"} <= set(writers())
     assert all(writers()[name].TAKES == ("table", "material") for name in ("merl", "rgl", "gonio_text"))
 
@@ -64,8 +64,8 @@ def _against_black(material: Material):
     return samples, 0 * samples.f
 
 
-def test_merl_says_what_it_cannot_hold(tmp_path: Path, small_merl: None) -> None:
-    """An anisotropic material becomes the mean over its azimuths, a lopsided one the mean of both orders."""
+def test_merl_reports_its_losses(tmp_path: Path, small_merl: None) -> None:
+    """An anisotropic material becomes the mean over its azimuths, a non-reciprocal one the mean of both orders."""
     cost = merl.write(BRUSHED, tmp_path / "a.binary")
     assert any("anisotropy" in line for line in cost.lost) and cost.share["cuberoot"] > 0.05
     table, wi = load(tmp_path / "a.binary"), direction(0.4, 0.0)
@@ -117,7 +117,7 @@ def test_mitsuba_samples_what_it_evaluates(tmp_path: Path, mi: Any) -> None:
     assert ratio[pdf > 0].std() < 0.5 * ratio[pdf > 0].mean()  # the density follows the light
 
 
-def test_rgl_keeps_a_narrow_lobe_and_says_transmission_is_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rgl_keeps_a_narrow_lobe_and_reports_lost_transmission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(rgl.NODES, "isotropic", 64)
     mirrorlike = Material(name="mirror", lobes=(Lobe(mx=0.01, my=0.01, r0=(0.9,) * 3, k=(1.0,) * 3),))
     cost = rgl.write(mirrorlike, tmp_path / "a.bsdf")

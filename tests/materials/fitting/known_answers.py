@@ -1,4 +1,4 @@
-"""Materials whose tables are synthesised, so that the answer is known: the thesis's, and small ones; in grey."""
+"""Materials with synthesised tables, whose fit is therefore known: the thesis's, and small grey ones."""
 
 from __future__ import annotations
 

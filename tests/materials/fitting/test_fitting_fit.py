@@ -171,7 +171,7 @@ def test_degenerate_tables_give_a_finite_material(paint, metric, count, value):
     assert result.errors[metric] < 1e-3
 
 
-def test_light_that_a_model_loses_is_said(paint):
+def test_lost_light_is_reported(paint):
     lines = fit(paint, fix={"kd": 0.1, "ks": 0.7, "mx": 0.15, "r0": 0.06, "alpha": 0.3}).warnings
     assert any("reflects 0." in line and "times the light that was measured" in line for line in lines)
     assert not any("times the light" in line for line in fit(paint).warnings)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lambent.core.progress import silent
-from lambent.materials.fitting.grid import Best, Schedule, search
+from lambent.materials.fitting.grid import Schedule, search
 from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
@@ -18,7 +18,7 @@ def problem():
 
 def searched(problem, schedule, fix):
     box = box_of("reflection", 0, True, 1, fix, {"mx": (0.1, 0.2)})
-    return search(problem, Mixture(np.array([0.2])), box, silent, Best(), 0, schedule)
+    return search(problem, Mixture(np.array([0.2])), box, silent, [], 0, schedule)
 
 
 def test_one_level_tries_the_equidistant_values_and_no_others(problem):
@@ -44,8 +44,8 @@ def test_the_known_lobe_is_found(problem):
     assert found.shape[2] * found.k[0] == pytest.approx(0.042, rel=0.1)
 
 
-def test_best_survives_an_interruption(problem):
-    best = Best()
+def test_finished_levels_survive_an_interruption(problem):
+    finished = []
 
     def stop_at_level_3(done, total, what):
         if done >= 2:
@@ -53,6 +53,6 @@ def test_best_survives_an_interruption(problem):
 
     box = box_of("reflection", 0, True, 1, {}, {})
     with pytest.raises(KeyboardInterrupt):
-        search(problem, Mixture(np.array([0.2])), box, stop_at_level_3, best, 0, Schedule())
-    assert best.candidate is not None
-    assert np.abs(best.candidate.coordinates - to_search(np.array([0.15, 0.15, 0.06, 0.3])))[0] < 0.5
+        search(problem, Mixture(np.array([0.2])), box, stop_at_level_3, finished, 0, Schedule())
+    assert len(finished) == 2
+    assert np.abs(finished[-1].coordinates - to_search(np.array([0.15, 0.15, 0.06, 0.3])))[0] < 0.5

@@ -32,7 +32,7 @@ MOST = {
 
 @pytest.fixture(scope="module")
 def merl(shared_data, tmp_path_factory):
-    """Material -> its tuples, decoded when they are first asked for."""
+    """Material -> its tuples, decoded on first use."""
     pytest.importorskip("h5py", reason="neural MERL files are HDF5: needs h5py")
     folder, target = shared_data / "measured" / "merl-neural", tmp_path_factory.mktemp("merl")
 

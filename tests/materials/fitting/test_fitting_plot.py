@@ -19,7 +19,7 @@ def test_incidences_follow_the_grid():
     assert {entry.phi_deg for entry in gathered} == {0}
 
 
-def test_tables_without_incident_directions_are_gathered_in_bins():
+def test_tables_without_incident_directions_are_grouped_in_bins():
     samples = grey(PAINT, FEW)
     theta, turn = np.radians(np.linspace(1, 80, len(samples))), np.linspace(0, 6, len(samples))
     scattered = replace(samples, wi=direction(theta, turn))
@@ -27,7 +27,7 @@ def test_tables_without_incident_directions_are_gathered_in_bins():
     assert [entry.theta_deg for entry in gathered] == [2.5, 15, 30, 45, 60, 75]
 
 
-def test_many_azimuths_are_gathered_at_the_quarters():
+def test_many_azimuths_are_grouped_at_the_quarters():
     """As of a Klems basis: rings of 1, 8, 20 and 24 patches, phi from 0 to 360, the pole's anywhere."""
     rings = [(0.0, [180.0]), *((10.0 * n, np.arange(0, 360, 360 / n)) for n in (8, 20, 24) if n < 9)]
     rings += [(30.0, np.arange(0, 360, 18)), (40.0, np.arange(15, 361, 15))]

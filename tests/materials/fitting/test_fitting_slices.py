@@ -1,4 +1,4 @@
-"""Slices of the error around a fit: their pit is where the answer is known to be."""
+"""Slices of the error around a fit have their minimum at the known lobe."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BRUSHED = Material(name="brushed", kd=0.05, lobes=(Lobe(k=0.8, mx=0.1, my=0.3, r
 
 
 @pytest.mark.parametrize("metric", METRICS)
-def test_the_pit_is_at_the_answer(metric):
+def test_the_minimum_is_at_the_known_lobe(metric):
     samples = grey(BRUSHED, COARSE)
     for one in slices(samples, BRUSHED, 0, METRICS[metric], steps=17):
         lowest = np.unravel_index(one.error.argmin(), one.error.shape)
@@ -35,13 +35,13 @@ def test_isotropic_tables_move_both_roughnesses_at_once():
     assert (first.across, first.down, second.across, second.down) == ("m", "alpha", "r0", "alpha")
 
 
-def test_r0_of_a_transmission_lobe_is_not_drawn():
+def test_slices_of_a_transmission_lobe_omit_r0():
     first, second = slices(grey(FOIL, COARSE), FOIL, 1, METRICS["cuberoot"], steps=5)
     assert (first.across, first.down, second.across, second.down) == ("mx", "my", "mx", "alpha")
 
 
 def test_error_at_the_fit_is_the_fits_error():
-    """A slice through the optimum holds, at the optimum, what the metric says of the material (k is solved again)."""
+    """At the optimum, a slice has the metric's error of the material (k is solved again)."""
     samples = grey(FOIL, COARSE)
     metric = METRICS["l1"]
     whole = metric.error(samples, MaterialBSDF(FOIL).eval(samples.wi, samples.wo)[:, :1])

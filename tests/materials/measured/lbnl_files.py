@@ -27,7 +27,7 @@ np.savez(outputs, xyz=xyz, hemi=hemi)
 
 
 def ask_radiance(path: Path, folder: Path, angles_deg: np.ndarray, incident_deg: np.ndarray) -> dict[str, np.ndarray]:
-    """What pyradiance says of a file; skips where it is not installed.
+    """Radiance's values for a file, by pyradiance; skips where it is not installed.
 
     Parameters
     ----------

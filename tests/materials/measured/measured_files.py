@@ -23,7 +23,7 @@ def tensor_bytes(fields: dict[str, np.ndarray], types: dict[str, int] | None = N
 
 
 def rgl_fields(phi_i: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
-    """Tensors of a made-up material that varies with all it may; sigma of an isotropic one not with phi."""
+    """Tensors of a made-up material that varies in every parameter; sigma of an isotropic one is constant in phi."""
     random = np.random.default_rng(seed)
     theta_i = np.array([0.0, 0.5, 1.0, np.pi / 2], dtype=np.float32)
     incident = (len(phi_i), len(theta_i))

@@ -1,4 +1,4 @@
-"""Broken files made from sound ones, for every reader there is; runs by itself for as long as one likes:
+"""Broken files made from sound ones, for every reader; runs alone for any length of time:
 
     python -m tests.materials.measured.measured_fuzz --seconds 600 --reader "Zemax" --seed 7
 
@@ -90,7 +90,7 @@ def _gonio(setup: Setup) -> bytes:
 
 
 def mutate(content: bytes, others: list[bytes], random: Random) -> bytes:
-    """`content` broken in one to three ways."""
+    """`content` with one to three mutations."""
     for _ in range(int(random.integers(1, 4))):
         way = WAYS[int(random.integers(len(WAYS)))]
         content = way(content, others, random)[:200_000]
@@ -116,7 +116,7 @@ def _overwrite(content: bytes, others: list[bytes], random: Random) -> bytes:
 
 
 def _huge(content: bytes, others: list[bytes], random: Random) -> bytes:
-    """A binary number as large, or as odd, as its bytes allow."""
+    """A binary number replaced by an extreme or odd value."""
     values = (b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\0" * 8, b"\xff" * 7 + b"\x7f", b"\0\0\xc0\x7f" * 2,
               b"\0\0\x80\x7f" * 2, b"\0" * 6 + b"\xf0\x7f", b"\1")  # fmt: skip
     value = values[int(random.integers(len(values)))]
@@ -125,7 +125,7 @@ def _huge(content: bytes, others: list[bytes], random: Random) -> bytes:
 
 
 def _number(content: bytes, others: list[bytes], random: Random) -> bytes:
-    """A word of text replaced by a number no file should hold, or by none."""
+    """A word of text replaced by an impossible number, or removed."""
     value = ODD_WORDS[int(random.integers(len(ODD_WORDS)))]
     found = [m for m in range(len(content)) if content[m : m + 1].isdigit()]
     if not found:
@@ -169,14 +169,14 @@ def _lines(content: bytes, others: list[bytes], random: Random) -> bytes:
 
 
 def _swap(content: bytes, others: list[bytes], random: Random) -> bytes:
-    """The byte order of all that follows."""
+    """The byte order of the rest swapped."""
     size, at = int(random.choice([2, 4, 8])), int(random.choice([0, 12, _place(content, random)]))
     body = content[at : at + (len(content) - at) // size * size]
     return content[:at] + np.frombuffer(body, f"<u{size}").byteswap().tobytes() + content[at + len(body) :]
 
 
 def _nest(content: bytes, others: list[bytes], random: Random) -> bytes:
-    """Brackets and elements deeper than anyone counts."""
+    """Brackets and elements nested very deeply."""
     at, depth = _place(content, random), int(random.choice([10, 1000, 20000]))
     opening = (b"{", b"<a>", b"<Layer>", b"(", b"<!--", b"<![CDATA[", b"&amp;")[int(random.integers(7))]
     return content[:at] + opening * depth + content[at:]
@@ -208,7 +208,7 @@ def _place(content: bytes, random: Random) -> int:
 
 
 class Hang(Exception):
-    """A file that takes too long; not an error of the reader's own."""
+    """A file took too long to read."""
 
 
 @contextmanager
@@ -226,7 +226,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def attempt(path: Path, content: bytes) -> str:
-    """What is said of `content`: nothing where the table can be used, or the `UserError`; else it fails."""
+    """The text of the `UserError` for `content`, or "" for a usable table; fails otherwise."""
     path.write_bytes(content)
     said = ""
     tracemalloc.start()
@@ -262,7 +262,7 @@ def try_again(path: Path) -> None:
 
 
 def warm() -> None:
-    """Imports and caches, which are no file's fault."""
+    """Warm imports and caches, so that no file is charged for them."""
     import colour
     import scipy.interpolate
     import scipy.ndimage

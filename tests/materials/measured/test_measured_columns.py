@@ -49,7 +49,7 @@ def test_names_separators_and_units(tmp_path: Path, names: str, separator: str, 
 
 
 @pytest.mark.parametrize(("name", "power"), [("brdf_cos", 1), ("CCBRDF", 1), ("transfer", 1), ("btdf", 0)])
-def test_the_name_says_the_quantity(tmp_path: Path, name: str, power: int) -> None:
+def test_the_name_gives_the_quantity(tmp_path: Path, name: str, power: int) -> None:
     path = tmp_path / "a"
     path.write_text(
         table_text(f"theta_in phi_in theta_out phi_out {name}", np.column_stack([GRID, 0 * GRID[:, 0] + 1]))
@@ -70,7 +70,7 @@ def test_colour_and_spectra(tmp_path: Path) -> None:
 
 
 def test_a_scan_in_the_plane_needs_no_phi(tmp_path: Path) -> None:
-    """Positive theta_o lies ahead of the normal, where a mirror sends the light."""
+    """Positive theta_o lies ahead of the normal, in the mirror direction."""
     path = tmp_path / "a"
     theta = np.arange(-75, 76, 5)
     rows = np.column_stack([np.full(len(theta), 30), theta, np.exp(-(((theta - 30) / 20) ** 2))])
@@ -86,7 +86,7 @@ def astm_text(rows: np.ndarray, variables: str = "theta_i,phi_i,theta_s,phi_s,R,
 
 
 def test_astm_of_a_real_measurement(shared_data: Path, tmp_path: Path) -> None:
-    """The Cornell measurement written as tuples comes back whole: the raw tuples, in the same directions."""
+    """The Cornell measurement written as tuples comes back unchanged."""
     source = load(shared_data / "measured" / "cornell" / "garnet_red.brdf").samples()
     path = tmp_path / "a"
     path.write_text(astm_text(np.column_stack([*angles(source.wi), *angles(source.wo), source.f])))
@@ -152,7 +152,7 @@ ROWS = "0 0 0 0 1\n0 0 20 0 1\n0 0 20 90 1\n"
         ("VARS theta_i,phi_i,theta_s,phi_s\n0,0,0,0\n", "no known kind; found none"),
     ],
 )
-def test_refused(tmp_path: Path, text: str, expected: str) -> None:
+def test_refused_columns(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "a"
     path.write_text(text)
     with pytest.raises(UserError, match=expected):

@@ -59,7 +59,7 @@ def test_constant_material(tmp_path: Path, hemisphere) -> None:
 
 
 def test_between_samples_it_follows_a_lobe(hemisphere) -> None:
-    """1500 random tuples of a known lobe: half the error of the eight nearest, distance^-2, and no jumps."""
+    """1500 random tuples of a known lobe: half the error of eight neighbours weighted distance^-2, and no jumps."""
     wi, wo = hemisphere(1500, 1, 75), hemisphere(1500, 2, 75)
     truth = MaterialBSDF(GLOSSY)
     table = ScatteredTable(wi, wo, truth.eval(wi, wo), isotropic_brdf(Path("a"), "test", {}, ()))

@@ -1,4 +1,4 @@
-"""Faults of tables that were made with them are named, with the number; sound tables have none."""
+"""Faults of tables made with them are reported with their numbers; sound tables have none."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def oren_nayar(wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_what_is_no_retro_reflector(noise: float) -> None:
+def test_other_peaks_are_not_retro_reflective(noise: float) -> None:
     for evaluate in (oren_nayar, bump_towards_light(0.2, 10), lambda wi, wo: 0.1 + 0 * wi[:, :1]):
         assert not any("retro" in line for line in findings(evaluate, noise=noise))
     mirrorlike = Material(name="m", lobes=(Lobe(mx=0.15, my=0.15, r0=(0.9,) * 3, k=(1.0,) * 3),))
@@ -73,7 +73,7 @@ def test_real_files_are_no_retro_reflectors(shared_data: Path) -> None:
         assert inspect_table(load(shared_data / "measured" / name))["faults"]["retro_ratio"] == 1
 
 
-def test_more_light_than_arrives_is_said_with_its_angle() -> None:
+def test_more_light_than_arrives_is_reported_with_its_angle() -> None:
     found = findings(lambda wi, wo: (0.25 / wi[:, 2:]) * np.ones(1))
     line = next(line for line in found if "more than arrives" in line)
     assert "at theta_i = 75 degrees" in line and "over 1 at 45, 60, 75 degrees" in line
@@ -81,7 +81,7 @@ def test_more_light_than_arrives_is_said_with_its_angle() -> None:
     assert value == pytest.approx(0.25 / np.cos(np.radians(70)) * np.pi, rel=0.1)  # 75 takes the grid's edge, 70
 
 
-def test_a_lopsided_table_is_said_to_be() -> None:
+def test_an_asymmetric_table_is_reported() -> None:
     found = findings(lambda wi, wo: 0.1 + 0.05 * wo[:, 1:2])
     assert any("taken as isotropic, but mirrored directions differ by" in line for line in found)
     quadrant = findings(lambda wi, wo: 0.1 + 0.05 * wo[:, 1:2], symmetry="quadrant", phi_i_deg=(0.0, 45.0, 90.0))

@@ -45,7 +45,7 @@ def test_text_round_trip(tmp_path: Path) -> None:
             np.testing.assert_allclose(theirs.weight, ours.weight, rtol=1e-3)
 
 
-def test_columns_say_the_quantity(tmp_path: Path) -> None:
+def test_column_names_give_the_quantity(tmp_path: Path) -> None:
     """The same numbers under f and p differ by exactly the cosine."""
     path = tmp_path / "a"
     rows = "".join(f"0 0 {t} {p} 0.25\n" for t in (0, 60) for p in (0, 120, 240))

@@ -1,4 +1,4 @@
-"""The dense grid says what the table says, and its sampler draws what its density says."""
+"""The dense grid agrees with the table, and its sampler with its density."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import pytest
 from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import Lobe, Material
-from lambent.materials.measured import half_vector_grid
-from lambent.materials.measured.half_vector_grid import GridShape, grid_of
+from lambent.materials.measured import half_vector_resampling
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.half_vector_resampling import grid_of
 from lambent.materials.measured.protocol import TableInfo
 
 SMALL = GridShape(12, 8, 64, 32)
@@ -43,14 +44,14 @@ def drawn(grid, n=40_000, seed=0, lowest_cosine=0.1):
     """(wi, wo) with wo anywhere and wi as the grid samples it, off the horizon, and the density."""
     rng = np.random.default_rng(seed)
     wo = direction(np.arccos(rng.uniform(lowest_cosine, 1, n) * rng.choice([-1, 1], n)), rng.uniform(0, 2 * np.pi, n))
-    wi = np.stack(half_vector_grid.sample(components(wo), *rng.random((3, n)), grid), axis=-1)
+    wi = np.stack(grid.sample(components(wo), *rng.random((3, n))), axis=-1)
     kept = np.abs(wi[:, 2]) > lowest_cosine
     wi, wo = wi[kept], wo[kept]
-    return wi, wo, half_vector_grid.pdf(components(wi), components(wo), grid)
+    return wi, wo, grid.pdf(components(wi), components(wo))
 
 
 def looked_up(grid, wi, wo):
-    return np.stack(half_vector_grid.evaluate(components(wi), components(wo), grid), axis=-1)
+    return np.stack(grid.evaluate(components(wi), components(wo)), axis=-1)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,7 @@ def looked_up(grid, wi, wo):
         (SHEET, False, 0.3, 0.05),
     ],
 )
-def test_it_says_what_the_table_says(material, isotropic, turn_rad, share):
+def test_look_ups_agree_with_the_table(material, isotropic, turn_rad, share):
     """Mean deviation as a share of the scattered light; the coarse grid here, not the default one, costs the most."""
     table = Exact(material, isotropic, turn_rad)
     grid = grid_of(table, GridShape(32, 1, 128, 32) if isotropic else GridShape(24, 8, 64, 32))
@@ -75,9 +76,9 @@ def test_symmetric_viewers_share_their_values(monkeypatch):
     for turn_rad in (0.0, 0.3):
         table = Exact(SHEET, turn_rad=turn_rad)
         shared = grid_of(table, SMALL)
-        assert any(twin != k for k, (twin, _) in enumerate(half_vector_grid._twins(table, SMALL)))
+        assert any(twin != k for k, (twin, _) in enumerate(half_vector_resampling._twins(table, SMALL)))
         with monkeypatch.context() as patch:
-            patch.setattr(half_vector_grid, "_twins", lambda *_: [(k, slice(None)) for k in range(8)])
+            patch.setattr(half_vector_resampling, "_twins", lambda *_: [(k, slice(None)) for k in range(8)])
             alone = grid_of(table, SMALL)
         for name in ("values", "density", "across"):
             np.testing.assert_allclose(getattr(shared, name), getattr(alone, name), rtol=1e-5, atol=1e-7)
@@ -88,7 +89,7 @@ def test_grey_becomes_rgb_and_an_opaque_sheet_transmits_nothing():
     n = direction(0.0, 0.0)
     np.testing.assert_allclose(looked_up(grid, n, n), [0.5 / np.pi] * 3, rtol=1e-6)
     assert grid.kinds == 1 and not looked_up(grid, -n, n).any()
-    assert half_vector_grid.pdf(components(-n), components(n), grid) == 0
+    assert grid.pdf(components(-n), components(n)) == 0
 
 
 def test_a_back_that_differs_is_kept():
@@ -104,8 +105,8 @@ def test_the_albedo_by_sampling_is_the_models(theta_deg):
     table = Exact(SHEET)
     grid = grid_of(table, SMALL)
     wo = np.broadcast_to(direction(np.radians(theta_deg), 0.3), (200_000, 3))
-    wi = np.stack(half_vector_grid.sample(components(wo), *np.random.default_rng(1).random((3, len(wo))), grid), -1)
-    pdf = half_vector_grid.pdf(components(wi), components(wo), grid)
+    wi = np.stack(grid.sample(components(wo), *np.random.default_rng(1).random((3, len(wo)))), -1)
+    pdf = grid.pdf(components(wi), components(wo))
     gain = np.divide(np.abs(wi[:, 2]), pdf, out=np.zeros_like(pdf), where=pdf > 0)
     expected = table.bsdf.albedo(wo[0], samples=200_000)
     np.testing.assert_allclose((table.eval(wi, wo) * gain[:, None]).mean(axis=0), expected, rtol=0.01)

@@ -1,4 +1,4 @@
-"""The inspection names what a table holds and its faults."""
+"""The inspection names the content of a table and its faults."""
 
 from __future__ import annotations
 

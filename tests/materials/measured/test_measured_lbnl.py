@@ -1,4 +1,4 @@
-"""LBNL BSDF XML against Radiance: values and direct-hemispherical integrals, all sides, all ways to store them."""
+"""LBNL BSDF XML against Radiance: values and direct-hemispherical integrals, all sides, all storage orders."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_check_value_of_t3(shared_data: Path) -> None:
     [("Columns", KLEMS_FULL), ("Rows", KLEMS_FULL), ("Columns", KLEMS_HALF), ("Rows", KLEMS_QUARTER)],
 )
 def test_random_matrices_agree_with_radiance(tmp_path: Path, structure: str, basis) -> None:
-    """Both sides, no symmetry whatever: every convention of index, side and order shows."""
+    """Both sides without any symmetry, so that every convention of index, side and order shows."""
     random = np.random.default_rng(basis.count)
     directions = ("Transmission Front", "Transmission Back", "Reflection Front", "Reflection Back")
     blocks = [("Visible", d, words(random.random((basis.count, basis.count)) * 0.15)) for d in directions]
@@ -156,7 +156,7 @@ def test_missing_transmission_follows_by_reciprocity(tmp_path: Path, structure: 
         np.testing.assert_allclose(hemi[:4], integral[:, 0], rtol=5e-3)
     else:
         np.testing.assert_allclose(hemi, answers["hemi"][:, 1], rtol=JITTER)
-    assert any("backwards" in note for note in table.info.notes)
+    assert any("reversed from the other side" in note for note in table.info.notes)
 
 
 def by_quadrature(table: LbnlTable, wi: Floats, n: int = 300) -> Floats:
@@ -189,7 +189,7 @@ def test_colour_of_matrices_agrees_with_radiance(tmp_path: Path) -> None:
 
 
 def test_colour_of_trees_agrees_with_radiance(tmp_path: Path) -> None:
-    """Y, u' and v' cut each in its own way; luminance is Y everywhere, and the sums are those of the values."""
+    """Y, u' and v' with different cells; luminance is Y everywhere, and the sums are those of the values."""
     random = np.random.default_rng(3)
 
     def tree(low: float, high: float) -> str:

@@ -1,4 +1,4 @@
-"""What BSDF files are made of, by answers known by hand: bases, disk map, trees, tuples, what is missing."""
+"""Parts of BSDF files with answers known by hand: bases, disk map, trees, tuples, missing parts."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def lambertian(structure: str, albedo: float, direction_: str = "Reflection Back
 
 @pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
 def test_lambertian_sheet(tmp_path: Path, structure: str) -> None:
-    """A white wall, whose albedo is .8 from everywhere; its tuples integrate to that."""
+    """A white wall of albedo .8 from all directions; its tuples integrate to that."""
     path = tmp_path / "w.xml"
     path.write_text(lambertian(structure, 0.8))
     table = read(path)
@@ -145,7 +145,7 @@ def test_a_single_lit_patch(tmp_path: Path) -> None:
 
 
 def sums_by_direction(table: LbnlTable) -> tuple[Floats, Floats, Floats]:
-    """Incident directions of the tuples, and what their reflected and transmitted tuples sum to."""
+    """Incident directions of the tuples, and the sums of their reflected and transmitted tuples."""
     samples = table.samples()
     wi, number = np.unique(samples.wi.round(9), axis=0, return_inverse=True)
     power = samples.weight * samples.p[:, 0]
@@ -156,7 +156,7 @@ def sums_by_direction(table: LbnlTable) -> tuple[Floats, Floats, Floats]:
 @pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
 @pytest.mark.parametrize("transmission", ["Front", "Back"])
 def test_tuples_sum_to_the_albedos(tmp_path: Path, structure: str, transmission: str) -> None:
-    """Front alone is used backwards."""
+    """Front alone is reversed for the back."""
     random = np.random.default_rng(8)
     blocks = []
     for way in (f"Transmission {transmission}", "Reflection Back"):
@@ -178,7 +178,7 @@ def test_tuples_sum_to_the_albedos(tmp_path: Path, structure: str, transmission:
 
 @pytest.mark.parametrize("backwards", [False, True])
 def test_tuples_of_a_matrix_sum_to_its_hemispherical_values(backwards: bool) -> None:
-    """Exactly, the horizon included: nine pieces of a patch are the patch."""
+    """Exact, including the horizon: nine pieces of a patch make up the patch."""
     random = np.random.default_rng(9)
     part = PatchMatrix(BUILT_IN[2], BUILT_IN[1], random.random((77, 41, 1)) * 0.2)
     entering, leaving, f, weight = part.tuples_reversed() if backwards else part.tuples()
@@ -192,7 +192,7 @@ def test_tuples_of_a_matrix_sum_to_its_hemispherical_values(backwards: bool) -> 
     np.testing.assert_array_equal(again, f)
 
 
-def test_light_from_behind_alone_is_turned_over_for_a_fit(tmp_path: Path) -> None:
+def test_a_file_of_light_from_behind_is_turned_over_for_a_fit(tmp_path: Path) -> None:
     path = tmp_path / "b.xml"
     path.write_text(lambertian("Columns", 0.5, "Reflection Front"))
     table = read(path)
@@ -216,8 +216,8 @@ def test_negative_values_count_as_zero_and_are_no_tuples(tmp_path: Path) -> None
     assert table.eval(KLEMS_FULL.centres[4] * back, KLEMS_FULL.centres[3]) == 0
 
 
-def test_what_is_taken_is_said(tmp_path: Path) -> None:
-    """Solar stands in for a missing Visible; of blocks that stand there twice the later one counts."""
+def test_choices_are_noted(tmp_path: Path) -> None:
+    """Solar replaces a missing Visible; of repeated blocks the later one counts."""
     low, high = (words(np.full((145, 145), v)) for v in (0.1, 0.2))
     path = tmp_path / "n.xml"
     path.write_text(lbnl_xml("Columns", [("Solar", "Reflection Back", low), ("Solar", "Reflection Back", high)]))
@@ -227,7 +227,7 @@ def test_what_is_taken_is_said(tmp_path: Path) -> None:
     assert "no Visible" in notes and "twice" in notes and "side -z" in notes
 
 
-def test_a_usual_name_for_an_unusual_basis_is_the_file_s(tmp_path: Path) -> None:
+def test_a_basis_of_the_file_replaces_the_builtin_of_that_name(tmp_path: Path) -> None:
     """The Klems half basis of older tools had 73 patches."""
     rings = [
         (0, 6.5, 1),
@@ -246,7 +246,7 @@ def test_a_usual_name_for_an_unusual_basis_is_the_file_s(tmp_path: Path) -> None
     assert any("Klems Half" in note for note in table.info.notes)
 
 
-def test_a_pane_is_said_to_be_one(tmp_path: Path) -> None:
+def test_the_notes_of_a_pane_name_straight_transmission(tmp_path: Path) -> None:
     path = tmp_path / "pane.xml"
     values = np.diag(0.9 / KLEMS_FULL.projected_sr)
     path.write_text(lbnl_xml("Columns", [("Visible", "Transmission Back", words(values))]))

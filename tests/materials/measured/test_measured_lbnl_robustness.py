@@ -37,7 +37,7 @@ def sound(kind: str) -> bytes:
 
 
 def attempt(path: Path, content: bytes, tuples: int = 1000) -> str:
-    """What is said of `content`: a usable table ("") or a UserError of one line, in time and in proportion."""
+    """The one-line `UserError` for `content`, or "" for a usable table, in time and memory in proportion."""
     path.write_bytes(content)
     said = ""
     start = time.perf_counter()
@@ -160,7 +160,7 @@ def test_hostile_matrices(target: Path, change, expected: str) -> None:
         b"<WindowElement/>",
     ],
 )
-def test_not_utf8_or_hardly_there(target: Path, content: bytes) -> None:
+def test_not_utf8_or_nearly_empty(target: Path, content: bytes) -> None:
     assert attempt(target, content)
 
 
@@ -173,7 +173,7 @@ def test_hostile_trees(target: Path, tree: str) -> None:
 
 
 def test_dense_trees_stay_in_proportion(target: Path) -> None:
-    """The most that a letter can be made to cost: leaves of one digit, and branches of them."""
+    """The highest cost per letter: leaves of one digit, and branches of those."""
     leaf = "{1}"
     for _ in range(4):
         leaf = "{" + leaf * 16 + "}"
@@ -210,7 +210,7 @@ def test_prefixes_byte_order_mark_and_order_change_nothing(target: Path) -> None
         np.testing.assert_array_equal(load(target).eval(WI, WO * (1, 1, -1)), expected)
 
 
-def test_a_second_layer_is_left_alone_and_said(target: Path) -> None:
+def test_a_second_layer_is_ignored_with_a_note(target: Path) -> None:
     plain = sound("matrix").decode()
     start, end = plain.index("<Layer>"), plain.index("</Layer>") + 8
     layer = plain[start:end]

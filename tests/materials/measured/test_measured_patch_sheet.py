@@ -1,4 +1,4 @@
-"""Patch matrices are looked up and sampled as they are: exact but for rounding at the borders of patches."""
+"""Patch matrices are looked up and sampled exactly, up to rounding at the borders of patches."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ def anywhere(n, seed, lowest_cosine=0.001):
 
 
 def two_sided(table, wi, wo):
-    """f of the table; where it knows nothing of light from below, of the mirrored pair."""
+    """f of the table, or of the mirrored pair if it has no data of light from below."""
     below = (wi[:, 2:] < 0) & (not table.has_a_back)
     return table.eval(np.where(below, wi * DOWN, wi), np.where(below, wo * DOWN, wo))
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_it_says_what_the_table_says(table, reverse):
+def test_look_ups_agree_with_the_table(table, reverse):
     wi, wo = anywhere(40_000, 1), anywhere(40_000, 2)
     sheet = patch_sheet_of(table, reverse=reverse)
     given = (wo, wi) if reverse else (wi, wo)
@@ -74,8 +74,8 @@ def test_it_says_what_the_table_says(table, reverse):
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_sample_weighs_the_albedo(table, reverse):
-    """f cos / pdf is the same for every sample of a row: the exact sum over patches, of light as the table says."""
+def test_every_sample_has_the_albedo_as_its_weight(table, reverse):
+    """f cos / pdf is the same for every sample of a row: the table's exact sum over patches."""
     sheet = patch_sheet_of(table, reverse=reverse)
     wo, u = anywhere(40_000, 3), np.random.default_rng(4).random((3, 40_000))
     wi = np.stack(sheet.sample(components(wo), *u), axis=-1)
@@ -95,7 +95,7 @@ def test_a_sample_weighs_the_albedo(table, reverse):
 
 @pytest.mark.parametrize("theta_deg", [3.0, 50.0, 120.0])
 def test_the_sampler_draws_its_density_and_the_albedo_is_a_quadrature(table, theta_deg):
-    """The quadrature is of the table's own f over the light, given the viewer, and knows no sampler."""
+    """The quadrature of the table's own f over the light, given the viewer, is independent of the sampler."""
     one = check_sampler(TableBSDF(table), theta_deg, 200.0, samples=100_000)
     assert not one.p_value < 1e-3
     assert one.pdf_integral + one.rejected_share == pytest.approx(1, abs=1e-4)

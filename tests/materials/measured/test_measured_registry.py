@@ -1,4 +1,4 @@
-"""Formats are recognised by content; what no reader knows is a UserError that lists them."""
+"""Formats are recognised by content; unknown content is a UserError that lists them."""
 
 from __future__ import annotations
 

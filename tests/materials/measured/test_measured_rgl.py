@@ -1,4 +1,4 @@
-"""RGL: the numpy evaluation equals Mitsuba's `measured` plugin; samples stand where eval says."""
+"""RGL: the numpy evaluation equals Mitsuba's `measured` plugin; samples agree with eval."""
 
 from __future__ import annotations
 

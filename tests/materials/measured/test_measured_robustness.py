@@ -44,14 +44,14 @@ def test_every_reader_has_a_sound_file() -> None:
 @QUICK
 @given(seed=st.integers(0, 2**32 - 1))
 def test_broken_files_of_every_reader(target: Path, reader: str, seed: int) -> None:
-    """Cut, flipped, overwritten, spliced, repeated, renumbered, swapped, nested: see `measured_fuzz` for more of it."""
+    """Cut, flipped, overwritten, spliced, repeated, renumbered, swapped or nested, by `measured_fuzz`."""
     random = np.random.default_rng(seed)
     sound = SOUND[reader]
     attempt(target, mutate(sound[int(random.integers(len(sound)))], EVERYTHING, random))
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
-def test_every_way_of_breaking_breaks(way) -> None:
+def test_every_mutation_changes_a_file(way) -> None:
     random = np.random.default_rng(0)
     assert any(way(content, EVERYTHING, random) != content for content in EVERYTHING)
 
@@ -83,7 +83,7 @@ print(json.dumps(grown))
 
 
 def test_memory_of_the_whole_process(tmp_path: Path) -> None:
-    """What tracemalloc cannot see counts as well: headers that promise gigabytes, and a large sound file."""
+    """Memory outside tracemalloc counts too: headers that promise gigabytes, and a large sound file."""
     huge = {
         "merl": np.full(3, 2**31 - 1, "<i4").tobytes() + bytes(1000),
         "rgl": SOUND["RGL tensor file"][0][:60] + b"\xff" * 4000,
@@ -147,7 +147,7 @@ def test_line_ends_and_byte_order_marks_change_nothing(
     assert np.array_equal(load(target).eval(WI, WO), load(files[kind]).eval(WI, WO))
 
 
-def test_values_no_surface_has_are_left_out(target: Path) -> None:
+def test_impossibly_bright_values_are_left_out(target: Path) -> None:
     target.write_bytes(merl_bytes(np.full((6, 6, 12, 3), 1e30)))
     with pytest.raises(UserError, match=r"no measured value.*beyond 1e"):
         load(target)

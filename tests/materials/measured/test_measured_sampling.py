@@ -1,4 +1,4 @@
-"""Photons that meet a table go where the table sends them, by either sampler; a table is a BSDF that can be checked."""
+"""Photons scatter as the table does, by either sampler; a table is a BSDF that can be checked."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_energy_and_fates_are_the_tables(samplers, kind, below):
 
 
 def test_rejected_candidates_leave_the_tables_own_distribution(samplers):
-    """Chi-square against p itself, not against a density of ours. Even candidates make p-values near 1, never small."""
+    """Chi-square against p itself. Even candidates make p-values near 1, never small."""
     rejection = samplers[Rejection]
     survive = float(np.sum(rejection.albedo(WI[None])))
     whole = SHEET.bsdf.albedo(WI, samples=400_000).mean()
@@ -117,7 +117,7 @@ def test_light_from_below_is_the_mirrored_pair():
 
 
 class OneSideTooOften(TableBSDF):
-    """Its density says that 3 % more of the samples fall towards +x than do."""
+    """Its density is 3 % too high towards +x."""
 
     def pdf(self, wi, wo):
         return super().pdf(wi, wo) * np.where(wi[..., 0] > 0, 1.03, 0.97)

@@ -1,4 +1,4 @@
-"""Zemax and FRED text: known answers, one specimen in both formats, stated TIS, what is refused."""
+"""Zemax and FRED text: known answers, one specimen in both formats, stated TIS, refused files."""
 
 from __future__ import annotations
 

@@ -1,0 +1,134 @@
+"""Resample a measured table onto the dense grid of half_vector_grid.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lambent.core.directions import FLIP_Z, Floats, direction, normalize, reflect
+from lambent.core.progress import Progress, silent
+from lambent.materials.measured.half_vector_grid import (
+    ANISOTROPIC,
+    ISOTROPIC,
+    LAST_VIEWER_DEG,
+    GridShape,
+    HalfVectorGrid,
+)
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.two_sided import TwoSided
+
+_LOWEST_COSINE = 0.02  # cells whose wi is lower take f at this height, so that blending meets no edge at the horizon
+
+
+def grid_of(
+    table: MeasuredTable | TwoSided, shape: GridShape | None = None, progress: Progress = silent
+) -> HalfVectorGrid:
+    """A table on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table declares itself."""
+    shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
+    sheet = table if isinstance(table, TwoSided) else TwoSided(table)
+    faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits else 1
+    values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
+    weights, peak = np.zeros(values.shape[:-1]), np.zeros(values.shape[:-2], np.float32)
+    viewers, h = _viewer_nodes(shape), _cell_centres(shape)
+    twins = _twins(sheet, shape)
+    for a, ring in enumerate(viewers):
+        progress(a, len(viewers), f"resampling {table.info.file}")
+        for b, viewer in enumerate(ring):
+            twin, cells = twins[b]
+            if twin != b:
+                values[..., a, b, :, :] = values[..., a, twin, cells, :]
+                weights[..., a, b, :] = weights[..., a, twin, cells]
+                peak[..., a, b] = peak[..., a, twin]
+                continue
+            wo = np.broadcast_to(viewer, h.shape)
+            wi = reflect(wo, h)
+            cos_i = np.maximum(wi[:, 2], 0)
+            gain = 4 * np.maximum(np.sum(wo * h, axis=-1), 0)  # d_wi/d_h
+            wi[:, 2] = np.maximum(wi[:, 2], _LOWEST_COSINE)
+            wi = normalize(wi)
+            for face, kind in np.ndindex(faces, kinds):
+                wo_there, wi_there = (w * FLIP_Z if below else w for w, below in ((wo, face), (wi, face != kind)))
+                f = sheet.eval(wi_there, wo_there)
+                values[face, kind, a, b] = f
+                p = f.mean(axis=-1) * cos_i
+                weights[face, kind, a, b] = p * gain
+                peak[face, kind, a, b] = p.max()
+    progress(len(viewers), len(viewers), f"resampled {table.info.file}")
+    sizes = (faces, kinds, shape.viewers, shape.cells)
+    return _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes), peak)
+
+
+def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
+    """For each viewer azimuth the one whose values it shares, and in which order of cells; tables are often symmetric.
+
+    The symmetry, mirrored at x = 0 and y = 0 or turned by half a turn, is found by look-ups at random pairs.
+    """
+    n, columns = shape.viewer_phi, shape.phi_h
+    own = [(k, np.arange(shape.cells)) for k in range(n)]
+    if n % 4 or columns % 4:
+        return own
+    rng = np.random.default_rng(1)
+    wi, wo = direction(np.arccos(rng.uniform(0.1, 1, (2, 256))), rng.uniform(0, 2 * np.pi, (2, 256)))
+    wo = wo * np.where(rng.random((256, 1)) < (0.5 if table.info.transmits else 0), FLIP_Z, 1.0)
+    given = table.eval(wi, wo)
+
+    def same(flip: list[int]) -> bool:
+        return np.allclose(table.eval(wi * flip, wo * flip), given, rtol=1e-4, atol=1e-5 * given.max())
+
+    def ordered(column: Any) -> Any:
+        return (np.arange(shape.theta_h)[:, None] * columns + column % columns).ravel()
+
+    j = np.arange(columns)
+    if same([1, -1, 1]) and same([-1, 1, 1]):
+        for k in range(n):
+            if k > n // 2:
+                twin, order = own[n - k][0], columns - 1 - j
+                own[k] = (twin, ordered(order if twin == n - k else columns // 2 + j))
+            elif k > n // 4:
+                own[k] = (n // 2 - k, ordered(columns // 2 - 1 - j))
+    elif same([-1, -1, 1]):
+        for k in range(n // 2, n):
+            own[k] = (k - n // 2, ordered(j - columns // 2))
+    return own
+
+
+def _viewer_nodes(shape: GridShape) -> Floats:
+    """(viewer_theta, viewer_phi, 3) directions of the viewer nodes."""
+    left = np.linspace(1, 0, shape.viewer_theta)
+    theta = np.radians(LAST_VIEWER_DEG * (1 - left * np.sqrt(left)))  # closer towards grazing, where f bends most
+    phi = np.arange(shape.viewer_phi) * 2 * np.pi / shape.viewer_phi
+    return direction(theta[:, None], phi)
+
+
+def _cell_centres(shape: GridShape) -> Floats:
+    """(cells, 3) half vectors at the cells' centres, phi fastest."""
+    theta = ((np.arange(shape.theta_h) + 0.5) / shape.theta_h) ** 2 * np.pi / 2
+    phi = (np.arange(shape.phi_h) + 0.5) / shape.phi_h * 2 * np.pi
+    return direction(theta[:, None], phi).reshape(-1, 3)
+
+
+def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak: Floats) -> HalfVectorGrid:
+    """The grid with the CDFs of weights (faces, kinds, viewers, cells), which are densities up to a factor.
+
+    Cells and densities are derived from the stored CDFs, rounded to float32, so that both agree.
+    """
+    faces, kinds = weights.shape[:2]
+    edges = (np.arange(shape.theta_h + 1) / shape.theta_h) ** 2 * np.pi / 2
+    omega = np.diff(2 * np.sin(edges / 2) ** 2)[:, None] * (2 * np.pi / shape.phi_h)  # solid angle of a row's cells
+    mass = weights.reshape(faces, kinds, shape.viewers, shape.theta_h, shape.phi_h) * omega
+    total = mass.sum(axis=(-1, -2))
+    across = total[:, 1] / np.maximum(total.sum(axis=1), 1e-30) if kinds == 2 else np.zeros((faces, shape.viewers))
+    mass = np.where(total[..., None, None] > 0, mass, omega)  # a black viewer node: any distribution serves
+    rows = mass.sum(axis=-1)
+    mass = np.where(rows[..., None] > 0, mass, 1.0)
+    marginal, conditional = _cdf(rows), _cdf(mass)
+    share = np.diff(marginal.astype(float), axis=-1, prepend=0.0)[..., None]
+    density = share * np.diff(conditional.astype(float), axis=-1, prepend=0.0) / omega
+    flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total, peak))
+    return HalfVectorGrid(shape, faces, kinds, *flat)
+
+
+def _cdf(mass: Floats) -> Floats:
+    cdf = np.cumsum(mass, axis=-1)
+    return np.asarray((cdf / cdf[..., -1:]).astype(np.float32))
