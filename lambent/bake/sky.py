@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.vectors import array_of, vectors
 from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_direction
 from lambent.scenes.scene import SunSky
 
 Array = NDArray[np.floating]
@@ -75,4 +76,4 @@ def _directions(row: Array, column: Array) -> Array:
     """World directions of pixel positions: Mitsuba puts the first and the last row onto the poles."""
     theta = np.clip(row * (np.pi / (HEIGHT - 1)), 0, np.pi)
     phi = (column + 0.5) * (2 * np.pi / WIDTH)
-    return np.stack([-np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], axis=-1)
+    return lat_long_direction(theta, phi) * (-1.0, 1.0, -1.0)  # half a turn: phi counts from the left edge

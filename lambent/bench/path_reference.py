@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lambent.core.camera import Camera
 from lambent.core.cubemap import sample
 from lambent.core.images import write_image
+from lambent.core.latlong import lat_long_directions
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 
@@ -20,10 +21,7 @@ Floats = NDArray[np.floating]
 
 def to_lat_long(cube: Floats, height: int = 512) -> Floats:
     """Lat-long picture (height, 2 height, 3) of an environment (6, N, N, 3): top +y, middle column -z."""
-    theta = (np.arange(height)[:, None] + 0.5) / height * np.pi
-    phi = (np.arange(2 * height)[None, :] + 0.5) / height * np.pi - np.pi
-    parts = (np.sin(theta) * np.sin(phi), np.cos(theta) + 0 * phi, -np.sin(theta) * np.cos(phi))
-    return sample(cube, np.stack(parts, axis=-1))
+    return sample(cube, lat_long_directions(height, 2 * height))
 
 
 def path_traced(

@@ -6,6 +6,8 @@ surface; `wi` to the light, `wo` to the viewer; theta from n, phi from t. World 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -66,3 +68,11 @@ def basis(n: Floats) -> tuple[Floats, Floats]:
     t = np.stack([1 + sign * n[..., 0] ** 2 * a, sign * c, -sign * n[..., 0]], axis=-1)
     b = np.stack([c, sign + n[..., 1] ** 2 * a, -n[..., 1]], axis=-1)
     return t, b
+
+
+def rotation_about(axis: Floats, angle_rad: float) -> Floats:
+    """(3, 3) right-handed rotation about a unit axis (3,) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turned: Floats = np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * cross @ cross
+    return turned

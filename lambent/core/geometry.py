@@ -30,3 +30,8 @@ def points_on_triangles(corners: Floats, face: NDArray[np.integer], rng: np.rand
     """A point (K, 3), uniform by area, on each of the triangles `face` (K,) of all triangles (F, 3, 3)."""
     weights = rng.dirichlet((1, 1, 1), size=len(face))
     return np.asarray(np.einsum("kcx,kc->kx", corners[face], weights))
+
+
+def cross_2d(u: Floats, v: Floats) -> Floats:
+    """Cross product (...) of plane vectors (..., 2): positive where v lies counter-clockwise of u."""
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])

@@ -37,7 +37,7 @@ def read_image(path: Path) -> Image:
     path = Path(path)
     data = read_bytes(path, LIMIT_BYTES)
     if data.startswith(exr.MAGIC):
-        image = exr.decode(data, path, MAX_PIXELS)
+        image = exr.decode(path, MAX_PIXELS)
     elif data.startswith(rgbe.MAGICS):
         image = rgbe.decode(data, path, MAX_PIXELS)
     elif data.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):

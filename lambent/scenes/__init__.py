@@ -1,4 +1,4 @@
-"""What is there: scenes, their loaders, the built-in ones, and the ways of cameras through them."""
+"""Scenes, their loaders, the built-in ones, and camera paths through them."""
 
 from lambent.scenes.camera_paths import sample_path
 from lambent.scenes.loaders.load import load_scene

@@ -1,4 +1,4 @@
-"""Where a camera path leads at a time: smooth curves through key cameras, at constant speed or by recorded times."""
+"""Cameras along a path: smooth curves through key cameras, at constant speed or by recorded times."""
 
 from __future__ import annotations
 
@@ -28,9 +28,7 @@ def sample_path(path: CameraPath, t: float) -> Camera:
     target, up and field of view follow the same parameter. Values of t beyond the ends give the ends.
     """
     keys = path.keys
-    positions, targets, ups = (
-        np.array([getattr(k, what) for k in keys], float) for what in ("position", "target", "up")
-    )  # fmt: skip
+    positions, targets, ups = (np.array([getattr(k, f) for k in keys], float) for f in ("position", "target", "up"))
     fov = np.array([[k.fov_y_deg] for k in keys], float)
     knots = centripetal_knots(positions)
     u = np.array([_parameter(positions, knots, float(np.clip(t, 0, 1)))])
@@ -53,7 +51,7 @@ def _lengths(points: Floats, knots: Floats) -> tuple[Floats, Floats]:
 
 
 def _parameter(points: Floats, knots: Floats, share: float) -> float:
-    """Curve parameter at a share of the length; of a path that stands still, that share of the parameters."""
+    """Curve parameter at a share of the length; if the path stands still, at that share of the parameters."""
     u, lengths = _lengths(points, knots)
     if lengths[-1] == 0:
         return float(share * knots[-1])

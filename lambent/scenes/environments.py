@@ -1,10 +1,12 @@
-"""Light from afar as cube maps (6, n, n, 3), made in code or read from lat-long pictures; linear radiance.
+"""Environments as cube maps (6, n, n, 3) of linear radiance, computed or read from lat-long images.
 
-Scenes without a bake are drawn in them: the benches' shapes, and the preview of the material editor. The daylight is
-Preetham, Shirley & Smits 1999, "A practical analytic model for daylight"; what is baked has Mitsuba's instead.
+They light scenes without a bake: the benches' shapes and the preview of the material editor. The daylight is Preetham,
+Shirley & Smits 1999, "A practical analytic model for daylight"; bakes use Mitsuba's sky instead.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_uv
 
 Floats = NDArray[np.floating]
 
@@ -58,7 +61,7 @@ def dusk(n: int = 256) -> Floats:
 
 
 # Perez coefficients A..E and the zenith's chromaticity (Preetham et al. 1999, appendix A.2), in turbidity T.
-_PEREZ = {
+_PEREZ: dict[str, tuple[tuple[float, float], ...]] = {
     "Y": ((0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703)),
     "x": ((-0.0193, -0.2592), (-0.0665, 0.0008), (-0.0004, 0.2125), (-0.0641, -0.8989), (-0.0033, 0.0452)),
     "y": ((-0.0167, -0.2608), (-0.0950, 0.0092), (-0.0079, 0.2102), (-0.0441, -1.6537), (-0.0109, 0.0529)),
@@ -93,13 +96,10 @@ def daylight(
     for name, rows in _ZENITH.items():
         zenith[name] = float(np.array([turbidity**2, turbidity, 1]) @ (np.array(rows) @ powers))
     sky = {}
-    for name, rows in _PEREZ.items():
-        a, b, c, d, e = (slope * turbidity + start for slope, start in rows)
-
-        def perez(cos_t: Floats, cos_g: Floats, a=a, b=b, c=c, d=d, e=e) -> Floats:  # type: ignore[no-untyped-def, misc]
-            return np.asarray((1 + a * np.exp(b / cos_t)) * (1 + c * np.exp(d * np.arccos(cos_g)) + e * cos_g**2))
-
-        sky[name] = zenith[name] * perez(cos_theta, cos_gamma) / perez(np.array(1.0), np.array(np.cos(theta_s)))
+    for name, lines in _PEREZ.items():
+        shape = [slope * turbidity + start for slope, start in lines]
+        at_zenith = _perez(shape, np.array(1.0), np.array(np.cos(theta_s)))
+        sky[name] = zenith[name] * _perez(shape, cos_theta, cos_gamma) / at_zenith
     y = np.maximum(sky["Y"], 0)
     xyz = np.stack([sky["x"] * y / sky["y"], y, (1 - sky["x"] - sky["y"]) * y / sky["y"]], axis=-1)
     light = np.maximum(xyz_to_rgb(xyz), 0)
@@ -112,15 +112,22 @@ def daylight(
     return np.asarray(np.where(up, light, ground) / 4, np.float32)
 
 
+def _perez(shape: Sequence[float], cos_theta: Floats, cos_gamma: Floats) -> Floats:
+    """Perez's distribution (eq. 3): theta from the zenith, gamma from the sun."""
+    a, b, c, d, e = shape
+    near_sun = 1 + c * np.exp(d * np.arccos(cos_gamma)) + e * cos_gamma**2
+    return np.asarray((1 + a * np.exp(b / cos_theta)) * near_sun)
+
+
 def from_lat_long(image: Floats, n: int = 256) -> Floats:
-    """Environment (6, n, n, 3) of a lat-long picture (H, W, 3): top +y, middle column -z; means over 3x3 samples."""
+    """Environment (6, n, n, 3) of a lat-long image (H, W, 3), oriented as `core.latlong`; means over 3x3 samples."""
     height, width = image.shape[:2]
     total = np.zeros((6, n, n, 3))
     fine = face_directions(3 * n).reshape(6, n, 3, n, 3, 3)
     for i in range(3):
         for j in range(3):
             w = normalize(fine[:, :, i, :, j])
-            column = (np.arctan2(w[..., 0], -w[..., 2]) / (2 * np.pi) + 0.5) * width
-            row = np.arccos(np.clip(w[..., 1], -1, 1)) / np.pi * height
-            total += image[np.clip(row.astype(int), 0, height - 1), column.astype(int) % width]
+            column, row = lat_long_uv(w)
+            at_row = np.clip((row * height).astype(int), 0, height - 1)
+            total += image[at_row, (column * width).astype(int) % width]
     return (total / 9).astype(np.float32)

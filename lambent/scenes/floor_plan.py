@@ -1,11 +1,11 @@
 """Floor plans of planar reflectors: which points of the plane lie past a wall that stands on the reflector's edge.
 
-Seen from below its floor, a room ends at the foot of its walls; past it the mirrored eye looks outside, where nothing
-that the floor mirrors lies. Past the edge of a table it sees what the table's points see, too. So edges are told apart,
-along the true outline, bays and all: a plan is a grid of signed distances, positive on the reflector and past its open
-edges, negative past a wall. Where a point beyond the reflector belongs is told by the nearest point of its edge:
-something stands there, or nothing does. Floors reach under skirtings and into walls: what of a reflector is cut off by
-the foot of what stands on it, a strip along the edge, is no part of it.
+A mirrored eye below a floor sees the room only up to the foot of its walls; past them it looks outside, where nothing
+lies that the floor mirrors. Past the edge of a table it sees what the table mirrors. A plan tells both kinds of edge
+apart along the true outline, bays included: a grid of signed distances, positive on the reflector and past its open
+edges, negative past a wall. A point beyond the reflector counts as past a wall if something stands at the nearest point
+of the edge. Floors reach under skirtings and into walls: a strip along the edge that the foot of an object cuts off is
+no part of the reflector.
 """
 
 from __future__ import annotations
@@ -17,19 +17,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt, label, maximum_filter, uniform_filter
 
 from lambent.core.directions import basis
+from lambent.core.geometry import cross_2d
 
 Floats = NDArray[np.floating]
 Mask = NDArray[np.bool_]
 CELLS = 600  # per size of the reflector, the root of its area
 MOST_CELLS = 2048  # along one side
-HEIGHTS = (0.01, 0.03)  # over the reflector, of its size, at which a wall is looked for
-FOOT = 0.0005  # over the reflector, of its size, where the foot of things is looked for
-SHARE = 0.6  # of a stretch of edge and of the heights, on which something stands
+HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, over the reflector, in shares of its size
+FOOT = 0.0005  # of the cut that looks for the feet of objects
+SHARE = 0.6  # of a stretch of edge and of the heights: the least at which a wall stands
 BORDER = 4  # cells around the reflector; beyond, the plan goes on as it ends
-NEAR = 0.02  # of the size, from an edge to what stands on it
-WINDOW = 0.05  # of the size: along so much of an edge must things stand
+NEAR = 0.02  # of the size: largest distance from an edge to a wall on it
+WINDOW = 0.05  # of the size: the stretch of edge over which SHARE counts
 STEPS = 16  # per cell, of distances in a plan
-FINE = 4  # by as many a cell is divided along each axis, for what share of it the reflector covers
+FINE = 4  # subcells along each axis of a cell, to find which share of it the reflector covers
 MARGIN = 0.25  # cells before a wall that count as past it: light from outside may be a thousand times as bright
 
 
@@ -50,14 +51,13 @@ class FloorPlan:
 def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | None:
     """Plan of a reflector of the triangles `faces` (K, 3, 3), all in a plane of unit normal (3,); None without walls.
 
-    `corners` (F, 3, 3) are the triangles of the scene. Something stands on an edge where it crosses, within NEAR of the
-    edge, planes at both HEIGHTS over the reflector.
+    `corners` (F, 3, 3) are the triangles of the scene. A wall stands on an edge where triangles cross the planes at
+    both HEIGHTS over the reflector, within NEAR of the edge.
     """
-    across, along = (axis.reshape(3) for axis in basis(normal[None]))
+    across, along = basis(normal)
     axes = np.stack([across, along], axis=1)
     flat = faces @ axes
-    (ux, uy), (vx, vy) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
-    size = float(np.sqrt(np.abs(ux * vy - uy * vx).sum() / 2))
+    size = float(np.sqrt(np.abs(cross_2d(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])).sum() / 2))
     low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
     cell = max(size / CELLS, float((high - low).max()) / MOST_CELLS)
     corner = low - BORDER * cell
@@ -91,7 +91,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | No
 
 
 def _without_strips(covered: Mask, standing: Mask, width: float) -> Mask:
-    """`covered` without what `standing` cuts off along its edge, in strips up to `width` cells wide on the mean."""
+    """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
     pieces, count = label(covered & ~standing)
     inner = binary_erosion(pieces > 0)
     cells = np.bincount(pieces.ravel(), minlength=count + 1)
@@ -103,13 +103,13 @@ def _without_strips(covered: Mask, standing: Mask, width: float) -> Mask:
 
 
 def _edge_from(share: Floats, covered: Mask) -> Floats:
-    """Cells from the middle of a covered cell to the edge, by what is covered of it and of those beside."""
+    """Cells from the centre of a covered cell to the edge, by the covered shares of it and of its neighbours."""
     around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
     return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
 
 
 def _filled(triangles: Floats, shape: tuple[int, int]) -> Mask:
-    """Cells whose middle, at whole coordinates (column, row), lies in a triangle (K, 3, 2): by rows, summed up."""
+    """Cells whose centre, at whole coordinates (column, row), lies in a triangle (K, 3, 2): by rows, summed up."""
     change = np.zeros((shape[0], shape[1] + 1), np.int32)
     for triangle in triangles:
         first, last = int(np.ceil(triangle[:, 1].min())), int(np.floor(triangle[:, 1].max()))
@@ -132,7 +132,7 @@ def _cut(height: Floats, corners: Floats) -> Floats:
     above = height > 0
     crossing = above.any(axis=1) & ~above.all(axis=1)
     height, corners, above = height[crossing], corners[crossing], above[crossing]
-    odd = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))  # the corner that is alone
+    odd = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))  # alone on its side
     rows = np.arange(len(odd))
     ends = []
     for other in ((odd + 1) % 3, (odd + 2) % 3):

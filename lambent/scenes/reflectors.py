@@ -1,42 +1,45 @@
-"""Planar reflectors of a scene: where a mirror rendering shows more than a probe can (thesis M, section 4.5).
+"""Planar reflectors of a scene, which get a planar reflection buffer besides their probes (thesis M, section 4.5).
 
-Found are the large, flat, glossy parts of objects. Parts that share a plane are one reflector, whatever objects and
-materials they belong to: one mirror rendering serves them all (the tiles of a floor, two tables of one height). Parts
-need not be whole objects: the top of a table is found, its edge and its legs are not. `scene.toml` has the last word:
+The search finds large, flat, glossy parts of objects. Coplanar parts form one reflector, whatever their objects and
+materials, because one mirrored view serves them all (the tiles of a floor, two tables of one height). A part need not
+be a whole object: the top of a table is found, its edge and its legs are not. `scene.toml` can override the search:
 
     [[reflectors]]
     objects = "door*"     # a pattern of object names
-    use = true            # flat parts of these count whatever their size and gloss; false: they never count
-    plane = [0, 1, 0, 0]  # optional, with use = true: (n, d), n.x + d = 0, in place of what would be found
+    use = true            # take their flat parts whatever their size and gloss; false: leave these objects out
+    plane = [0, 1, 0, 0]  # optional, with use = true: the plane (n, d), n.x + d = 0
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from lambent.core.directions import basis
-from lambent.materials.document import Lobe, Material
+from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.materials.document import Material
 from lambent.scenes.floor_plan import FloorPlan, floor_plan
-from lambent.scenes.geometry import areas
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 
 Floats = NDArray[np.floating]
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
-ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: the mirror view holds what such a lobe sees, and hardly more
-LEAST_PART_M2 = 0.02  # of one object in a plane: less is an edge that happens to lie there
-FLAT_M = 1e-3  # from the plane, for positions
-FLAT_DEG = 2.0  # from the plane's normal, for faces and for the shading normals at their corners
-SEED_SHARE = 1 / 16  # of LEAST_AREA_M2 in one bin of the histogram: a plane may straddle bins in all four directions
+ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: a mirrored view covers hardly more than such a lobe
+LEAST_PART_M2 = 0.02  # of one object in a plane: less is an edge that lies there by chance
+FLAT_M = 1e-3  # largest distance of positions from the plane
+FLAT_DEG = 2.0  # largest angle of faces, and of shading normals at their corners, from the plane's normal
+SEED_SHARE = 1 / 16  # of LEAST_AREA_M2 in one bin of the histogram: a plane may straddle bins in all four dimensions
 
 
 @dataclass(frozen=True)
 class ReflectorPart:
-    """What one object has of a reflector: the numbers (K,) of its faces, and their area."""
+    """The faces of one object in a reflector: their numbers (K,) and area."""
 
     object: str
     faces: NDArray[np.integer]
@@ -48,8 +51,7 @@ class Reflector:
     """A plane (n, d), n.x + d = 0, n outwards; `outline` (P, 3) is the convex hull of its parts, in the plane.
 
     `deviation_m` is the largest distance of a vertex of its parts from the plane; `two_sided` is whether it is a sheet
-    that may be seen from behind, too. `plan` says where walls stand on the edges of its parts; None where
-    none does.
+    that can be seen from behind. `plan` is the floor plan of the walls on its edges, None without walls.
     """
 
     plane: tuple[float, float, float, float]
@@ -98,26 +100,22 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
 
 
 def _with_walls(found: Reflector, meshes: Mapping[str, Mesh], corners: Floats) -> Reflector:
-    """The reflector with what stands on its edges; `corners` (F, 3, 3) are the triangles of the scene."""
+    """The reflector with its floor plan; `corners` (F, 3, 3) are the triangles of the scene."""
     n = np.array(found.plane[:3])
-    parts = ((meshes[part.object], part.faces) for part in found.parts)
-    faces = np.concatenate([mesh.positions[mesh.faces[numbers]] for mesh, numbers in parts]).astype(float)
+    faces = np.concatenate([meshes[part.object].corners[part.faces] for part in found.parts])
     return replace(found, plan=floor_plan(faces, n, corners))
 
 
 def is_glossy(material: Material) -> bool:
-    """Whether a lobe of the material reflects within an angle that a mirror rendering can stand for."""
-    return any(_roughness(lobe) <= ROUGHEST for lobe in material.lobes if lobe.side == "reflection" and max(lobe.k) > 0)
-
-
-def _roughness(lobe: Lobe) -> float:
-    return float(np.sqrt(lobe.mx * lobe.my))
+    """Whether a lobe of the material reflects within the angle that a mirrored view covers."""
+    lobes = (lobe for lobe in material.lobes if lobe.side == "reflection" and max(lobe.k) > 0)
+    return any(math.sqrt(lobe.mx * lobe.my) <= ROUGHEST for lobe in lobes)
 
 
 def _ruling(rules: Iterable[ReflectorRule], name: str) -> bool | None:
-    """What the last rule that fits an object says; None where none does."""
-    said = [rule.use for rule in rules if fnmatchcase(name, rule.objects)]
-    return said[-1] if said else None
+    """`use` of the last rule that fits an object; None if none does."""
+    uses = [rule.use for rule in rules if fnmatchcase(name, rule.objects)]
+    return uses[-1] if uses else None
 
 
 def _is_candidate(scene: Scene, o: SceneObject) -> bool:
@@ -133,7 +131,7 @@ def _given_planes(rules: Iterable[ReflectorRule]) -> list[Floats]:
 
 @dataclass(frozen=True)
 class _Faces:
-    """All faces of the candidates: corners (F, 3, 3), normals (F, 3), area (F,), the object's and their own number.
+    """All faces of the candidates: corners (F, 3, 3), normals (F, 3), area (F,), number of the object, and in it.
 
     `tilt` (F,) is the least cosine between the shading normals at the corners and the face's.
     """
@@ -158,21 +156,21 @@ class _Faces:
         return np.array([*n, -n @ self.corners[face].mean(axis=0)])
 
     def in_plane(self, plane: Floats) -> NDArray[np.bool_]:
-        """(F,) whether a face lies in the plane and faces its side."""
+        """(F,) whether a face lies in the plane and faces the side of its normal."""
         flat = np.cos(np.radians(FLAT_DEG))
         inside = (self.normal @ plane[:3] > flat) & (self.tilt > flat)
         inside[inside] = np.abs(self.corners[inside] @ plane[:3] + plane[3]).max(axis=1) <= FLAT_M
-        return inside
+        return np.asarray(inside)
 
     def fitted(self, mine: NDArray[np.bool_]) -> Floats:
-        """Plane of the mean normal through the mean place, by area."""
+        """Plane of the mean normal through the mean position, weighted by area."""
         weight = self.area[mine]
         n = weight @ self.normal[mine]
         n /= np.linalg.norm(n)
         return np.array([*n, -n @ (weight @ self.corners[mine].mean(axis=1)) / weight.sum()])
 
     def seeds(self, forced: NDArray[np.bool_]) -> list[int]:
-        """The largest face of every bin of (normal, offset) that holds enough area, the fullest bin first."""
+        """The largest face of every bin of (normal, offset) with enough area, the fullest bin first."""
         offset = (self.normal * self.corners.mean(axis=1)).sum(axis=1)
         step = np.radians(FLAT_DEG)
         key = np.concatenate([np.round(self.normal / step), np.round(offset / (8 * FLAT_M))[:, None]], axis=1)
@@ -201,33 +199,18 @@ class _Faces:
 
 
 def _face_arrays(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats]:
-    corners = mesh.positions[mesh.faces].astype(float)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1, keepdims=True)
-    normal = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
+    corners = mesh.corners
+    normal = triangle_normals(corners)
     tilt = (mesh.normals[mesh.faces] * normal[:, None]).sum(axis=2).min(axis=1)
-    return corners, normal, areas(mesh.positions, mesh.faces), tilt
+    return corners, normal, triangle_areas(corners), tilt
 
 
 def _outline(points: Floats, normal: Floats) -> Floats:
-    """Convex hull (P, 3) of points in a plane, counter-clockwise seen from its normal's side (Andrew 1979)."""
-    t, b = (axis.reshape(3) for axis in basis(normal[None]))
-    flat = points @ np.stack([t, b], axis=1)
-    _, first = np.unique(flat.round(4), axis=0, return_index=True)  # sorted by t, then b
-    if len(first) < 3:
-        return points[first]
-
-    def chain(order: NDArray[np.integer]) -> list[int]:
-        hull: list[int] = []
-        for i in order:
-            while len(hull) > 1 and _turn(flat[hull[-2]], flat[hull[-1]], flat[i]) <= 0:
-                hull.pop()
-            hull.append(int(i))
-        return hull[:-1]
-
-    return points[[*chain(first), *chain(first[::-1])]]
-
-
-def _turn(a: Floats, b: Floats, c: Floats) -> float:
-    (ux, uy), (vx, vy) = b - a, c - a
-    return float(ux * vy - uy * vx)
+    """Convex hull (P, 3) of points in a plane, counter-clockwise seen from its normal's side."""
+    flat = points @ np.stack(basis(normal), axis=1)
+    _, kept = np.unique(flat.round(4), axis=0, return_index=True)
+    if len(kept) > 2:
+        with suppress(QhullError):  # of points on one line
+            hull = ConvexHull(flat[kept]).vertices
+            kept = kept[np.roll(hull, -int(np.argmin(hull)))]
+    return np.asarray(points[kept])

@@ -1,4 +1,4 @@
-"""What is there: the scene as every loader produces it and every bake consumes it.
+"""The scene as every loader produces it and every bake consumes it.
 
 Conventions: world space is right-handed, y up, metres. Meshes are stored in world space (loaders apply transforms).
 Faces are counter-clockwise seen from the outside; normals unit; uv with v up. Radiance in W/(sr m^2), linear Rec.709.
@@ -7,7 +7,7 @@ All dataclasses are frozen; arrays are not to be written to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,7 +19,9 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
-EYE_HEIGHT_M = 1.6  # of a person who stands
+UvTransform = tuple[Triple, Triple]
+IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+EYE_HEIGHT_M = 1.6  # of a standing person
 
 
 @dataclass(frozen=True)
@@ -39,29 +41,34 @@ class Mesh:
     def bounds(self) -> tuple[Array, Array]:
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
+    @property
+    def corners(self) -> Array:
+        """(T, 3, 3) float64 positions of the triangles' corners."""
+        return np.asarray(self.positions[self.faces], float)
+
 
 @dataclass(frozen=True)
 class Texture:
-    """A picture on a surface, linear values. texels (H, W, C) float16, row 0 at the top, repeated in u and v.
+    """Linear values on a surface: texels (H, W, C) float16, row 0 at the top, repeated in u and v.
 
-    A point's texel is where M (u, v, 1) lies, M = `uv_transform` (2, 3); both the point's and the picture's v are up.
+    A point shows the texel at M (u, v, 1), M = `uv_transform` (2, 3); v is up for the point and for the texture.
     """
 
     texels: Array
-    uv_transform: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    uv_transform: UvTransform = IDENTITY
 
 
 @dataclass(frozen=True)
 class MaterialTextures:
-    """What varies over a surface: each picture multiplies numbers of the material's document, but for the last three.
+    """The textures of a material: the first three multiply numbers of its document, the others stand for themselves.
 
-    The document holds the mean of what varies, so that it is right without its textures; a texture that multiplies is
-    texel / mean, at most the largest half float. Of a masked surface the mean is that of what is to be seen.
+    The document holds the mean of a quantity, so that it is right without its textures; a texture that multiplies is
+    texel / mean, at most the largest half float. The mean of a masked surface is over its visible texels.
 
     diffuse (3 channels): kd and kt_d. specular (3): k of every lobe. roughness (1): mx and my of every lobe.
     normal (3): the shading normal in the frame (t, b, n), components from -1 to 1.
     direction (2): cosine and sine of the angle by which t is turned about n.
-    opacity (1): where it is below `cutoff` there is no surface.
+    opacity (1): below `cutoff` there is no surface.
     """
 
     diffuse: Texture | None = None
@@ -75,9 +82,9 @@ class MaterialTextures:
 
 @dataclass(frozen=True)
 class SceneObject:
-    """A named thing: a mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
+    """A named mesh, the name of its material, and the radiance it emits (one-sided, along the normal).
 
-    `light_map_scale` multiplies the texels per metre it gets of the light map: small for what is never seen.
+    `light_map_scale` multiplies its light map texels per metre: small for surfaces that are never seen.
     """
 
     name: str
@@ -100,7 +107,7 @@ class SunSky:
 
 @dataclass(frozen=True)
 class ImageEnvironment:
-    """A lat-long HDR picture; its top is +y, its middle column looks along -z."""
+    """A lat-long HDR image, oriented as `core.latlong`."""
 
     file: Path
     scale: float = 1.0
@@ -127,7 +134,7 @@ class PointLight:
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Irradiance W/m^2 on a surface that faces it; `direction` is the way the light travels."""
+    """Irradiance W/m^2 on a surface that faces it; `direction` is that in which the light travels."""
 
     direction: Triple
     irradiance: Triple
@@ -139,9 +146,9 @@ Environment = SunSky | ImageEnvironment | ConstantEnvironment
 
 @dataclass(frozen=True)
 class ReflectorRule:
-    """What the scene says of planar reflectors (scenes.reflectors): objects whose name fits `objects` are or are not.
+    """Whether objects whose name fits `objects` count as planar reflectors (`scenes.reflectors`).
 
-    `plane` (n, d), n.x + d = 0, stands in for what would be found.
+    `plane` (n, d), n.x + d = 0, replaces the plane that would be found.
     """
 
     objects: str
@@ -164,21 +171,26 @@ class Scene:
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
-    probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object name -> (P, 4) user-given planes
-    probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # where not the centre of the object's bounds
+    probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object -> (P, 4) planes, set by the user
+    probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # object -> centre of its probe, set by the user
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        lows, highs = zip(*(o.mesh.bounds for o in self.objects), strict=True)
-        return np.min(lows, axis=0), np.max(highs, axis=0)
+        return bounds_of(self.objects)
 
     @property
     def corners(self) -> Array:
         """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
-        return np.concatenate([o.mesh.positions[o.mesh.faces] for o in self.objects]).astype(float)
+        return np.concatenate([o.mesh.corners for o in self.objects])
 
     def object(self, name: str) -> SceneObject:
         return next(o for o in self.objects if o.name == name)
+
+
+def bounds_of(objects: Iterable[SceneObject]) -> tuple[Array, Array]:
+    """Corners (3,), (3,) of the box around objects."""
+    lows, highs = zip(*(o.mesh.bounds for o in objects), strict=True)
+    return np.min(lows, axis=0), np.max(highs, axis=0)

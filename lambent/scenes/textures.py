@@ -1,7 +1,7 @@
-"""Pictures on surfaces as arrays: what is mixed when texels are averaged, and how a large picture becomes a small one.
+"""Textures as arrays: the quantities that are averaged between texels, reduction, and filling beyond masks.
 
-Texels are averaged as quantities that averages of which mean something: normals as slopes, directions, which have no
-sign, as the double of their angle. The path tracer interpolates the same quantities as the renderer.
+Texels are averaged in quantities whose means are meaningful: normals as slopes, directions (which have no sign) as
+doubled angles. Path tracer and renderer interpolate the same quantities.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,12 @@ Floats = NDArray[np.floating]
 CHANNELS: Mapping[str, int] = {
     "diffuse": 3, "specular": 3, "roughness": 1, "normal": 3, "direction": 2, "opacity": 1,
 }  # fmt: skip
-SIDE_MAX = 2048  # texels; larger pictures are halved until they fit
-STEEPEST = 8.0  # slope: normals that lean further, or below the surface, lean so far
+SIDE_MAX = 2048  # texels; larger textures are halved until they fit
+STEEPEST = 8.0  # slope; steeper normals, and those below the surface, get this one
 
 
 def parts(textures: MaterialTextures) -> dict[str, Texture]:
-    """The textures that are there, by the name of their field."""
+    """The textures that a material has, by the name of their field."""
     found = {name: getattr(textures, name) for name in CHANNELS}
     return {name: texture for name, texture in found.items() if texture is not None}
 
@@ -38,14 +39,14 @@ def slopes(normals: Floats) -> NDArray[np.float32]:
 
 
 def doubled_angle(directions: Floats) -> NDArray[np.float32]:
-    """(..., 2) cosine and sine of twice the angle of (cosine, sine) (..., 2): t and -t brush alike."""
+    """(..., 2) cosine and sine of twice the angle of (cosine, sine) (..., 2); t and -t give the same."""
     c, s = np.moveaxis(np.asarray(directions, np.float32), -1, 0)
     square = np.maximum(c * c + s * s, 1e-12)
     return np.stack([(c * c - s * s) / square, 2 * c * s / square], axis=-1)
 
 
 def halved(texels: Floats) -> Floats:
-    """The next smaller picture (max(1, H//2), max(1, W//2), C): means of equal areas, also where a side is odd."""
+    """The next smaller level (max(1, H//2), max(1, W//2), C): means of equal areas, also if a side is odd."""
     return _halved_along(_halved_along(texels, 0), 1)
 
 
@@ -65,7 +66,7 @@ def _halved_along(texels: Floats, axis: int) -> Floats:
 def filled(texels: Floats, known: NDArray[np.bool_]) -> Floats:
     """Texels (H, W, C) with means of the nearest known ones (H, W) in place of the others.
 
-    A picture of leaves on white has white in every average over an edge, which would show where the mask does not cut.
+    Without it, the white behind the leaves of a texture would enter every mean over an edge and show inside the mask.
     """
     weight = known[..., None].astype(np.float32)
     levels = [(texels.astype(np.float32) * weight, weight)]
@@ -80,7 +81,7 @@ def filled(texels: Floats, known: NDArray[np.bool_]) -> Floats:
 
 
 def prepared(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
-    """Textures as they are baked: checked, of at most SIDE_MAX texels per side, colours beyond a mask's edge filled."""
+    """Textures ready for a bake: checked, at most SIDE_MAX texels per side, colours filled beyond a mask's edge."""
     return {name: _filled(of_material) for name, of_material in _bounded(textures).items()}
 
 
@@ -91,7 +92,7 @@ def _filled(textures: MaterialTextures) -> MaterialTextures:
     known = mask.texels[..., 0] >= textures.cutoff
     if not known.any():
         return textures
-    colours = {
+    colours: dict[str, Any] = {
         part: replace(texture, texels=filled(texture.texels, known))
         for part, texture in parts(textures).items()
         if part in ("diffuse", "specular")
@@ -101,10 +102,10 @@ def _filled(textures: MaterialTextures) -> MaterialTextures:
 
 
 def _bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialTextures]:
-    smaller: dict[int, Texture] = {}  # one picture on many materials stays one
+    smaller: dict[int, Texture] = {}  # a texture that several materials share stays one
     found = {}
     for material, of_material in textures.items():
-        changed = {}
+        changed: dict[str, Any] = {}
         for part, texture in parts(of_material).items():
             _check(material, part, texture)
             if max(texture.texels.shape[:2]) > SIDE_MAX:
@@ -132,7 +133,7 @@ def _check(material: str, part: str, texture: Texture) -> None:
 
 
 def digest(texture: Texture) -> str:
-    """Hash of what a texture shows and how it lies."""
+    """Hash of a texture's texels and uv transform."""
     h = hashlib.sha256(f"{texture.texels.shape} {texture.texels.dtype} {texture.uv_transform}".encode())
     h.update(np.ascontiguousarray(texture.texels).tobytes())
     return h.hexdigest()

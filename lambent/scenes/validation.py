@@ -1,4 +1,4 @@
-"""What is odd about a scene, in words: nothing here stops a bake."""
+"""Warnings about a scene; none of them stops a bake."""
 
 from __future__ import annotations
 
@@ -6,33 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.directions import Floats
-from lambent.scenes.geometry import areas
+from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
 from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
 
 
 def validate(scene: Scene) -> list[str]:
-    """Warnings about a scene: unit, faults of its meshes, what nothing lights or sees."""
-    said = size_warnings(scene)
+    """Warnings about a scene: its unit, faults of its meshes, missing light or cameras."""
+    notes = size_warnings(scene)
     for o in scene.objects:
-        said += [f"{o.name}: {what}" for what in mesh_faults(o.mesh)]
+        notes += [f"{o.name}: {what}" for what in mesh_faults(o.mesh)]
         if o.material not in scene.materials:
-            said.append(f"{o.name}: its material {o.material} is not described")
+            notes.append(f"{o.name}: its material {o.material} is not described")
         textures = scene.textures.get(o.material)
         if textures is not None and (textures.normal is not None or textures.direction is not None):
             mirrored = mirrored_share(o.mesh)
             if mirrored > 0.01:
-                said.append(f"{o.name}: uv are mirrored on {mirrored:.0%} of its area: its normal map is turned there")
+                notes.append(f"{o.name}: uv are mirrored on {mirrored:.0%} of its area: its normal map is turned there")
     if scene.environment is None and not scene.lights and not any(any(o.emission) for o in scene.objects):
-        said.append("nothing gives light")
+        notes.append("nothing gives light")
     if not scene.cameras:
-        said.append("no camera")
-    return said
+        notes.append("no camera")
+    return notes
 
 
 def size_warnings(scene: Scene) -> list[str]:
-    """A warning where the scene's extent suggests another unit than the metre."""
+    """A warning if the scene's extent suggests another unit than the metre."""
     low, high = scene.bounds
     extent = float((high - low).max())
     if SMALL <= extent <= LARGE:
@@ -45,44 +45,40 @@ def mesh_faults(mesh: Mesh) -> list[str]:
     arrays = (mesh.positions, mesh.normals, mesh.tangents, mesh.uv)
     if not all(np.isfinite(a).all() for a in arrays):
         return ["holds values that are not finite"]
-    said = []
-    area = areas(mesh.positions, mesh.faces)
+    notes = []
+    area = triangle_areas(mesh.corners)
     if not (area > 0).all():
-        said.append(f"{int((area <= 0).sum())} triangles have no area")
+        notes.append(f"{int((area <= 0).sum())} triangles have no area")
     n, t = mesh.normals.astype(float), mesh.tangents.astype(float)
     if np.abs(np.linalg.norm(n, axis=-1) - 1).max() > 1e-3:
-        said.append("normals are not unit")
+        notes.append("normals are not unit")
     if np.abs(np.linalg.norm(t, axis=-1) - 1).max() > 1e-3 or np.abs(np.sum(n * t, axis=-1)).max() > 1e-3:
-        said.append("tangents are not unit or not at right angles to the normals")
+        notes.append("tangents are not unit or not at right angles to the normals")
     flipped = float(area[_facing(mesh) < 0].sum() / max(area.sum(), 1e-30))
     if flipped > 0.01:
-        said.append(f"{flipped:.0%} of its area is turned against its normals")
+        notes.append(f"{flipped:.0%} of its area is turned against its normals")
     shared = int((_edge_uses(mesh) > 2).sum())
     if shared:
-        said.append(f"non-manifold: {shared} edges belong to more than two triangles")
+        notes.append(f"non-manifold: {shared} edges belong to more than two triangles")
     if np.ptp(mesh.uv, axis=0).max() == 0:
-        said.append("has no uv")
-    return said
+        notes.append("has no uv")
+    return notes
 
 
 def mirrored_share(mesh: Mesh) -> float:
-    """Share of the area on which v runs against n x t, as on halves that share one picture."""
+    """Share of the area on which v runs against n x t, as on halves that share one texture."""
     a, b, c = (mesh.uv[mesh.faces[:, i]].astype(float) for i in range(3))
-    e1, e2 = b - a, c - a
-    turn = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-    area = areas(mesh.positions, mesh.faces)
+    turn, area = cross_2d(b - a, c - a), triangle_areas(mesh.corners)
     return float(area[turn < 0].sum() / max(area.sum(), 1e-30))
 
 
 def _facing(mesh: Mesh) -> Floats:
     """Per triangle, positive where its winding agrees with its normals."""
-    a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))
-    facing: Floats = np.sum(np.cross(b - a, c - a) * mesh.normals[mesh.faces].sum(axis=1), axis=-1)
-    return facing
+    return np.asarray(np.sum(area_vectors(mesh.corners) * mesh.normals[mesh.faces].sum(axis=1), axis=-1))
 
 
 def _edge_uses(mesh: Mesh) -> NDArray[np.integer]:
-    """Triangles at each edge, vertices of one place taken as one."""
+    """Triangles at each edge; vertices at the same position count as one."""
     _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
     corners = place.reshape(-1)[mesh.faces]
     edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=-1)

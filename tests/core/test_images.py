@@ -6,8 +6,10 @@ import struct
 import tracemalloc
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import OpenEXR
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -153,10 +155,30 @@ def test_unknown_suffix_writes_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_header_of_an_exr_names_its_size(tmp_path: Path) -> None:
-    write_image(tmp_path / "a.exr", PICTURE)
-    header = exr._header((tmp_path / "a.exr").read_bytes())
-    assert (header.size, header.channels) == ((20, 37), 3)
+def _exr_of(path: Path, kind: int, **channels: Any) -> Path:
+    OpenEXR.File({"compression": kind, "type": OpenEXR.scanlineimage}, channels).write(str(path))
+    return path
+
+
+def test_exr_of_every_compression_and_of_luminance_alone(tmp_path: Path) -> None:
+    grey = np.repeat(PICTURE[..., :1], 3, axis=-1)
+    np.testing.assert_array_equal(
+        read_image(_exr_of(tmp_path / "y.exr", OpenEXR.RLE_COMPRESSION, Y=PICTURE[..., 0].copy())), grey
+    )
+    for kind in (OpenEXR.NO_COMPRESSION, OpenEXR.PIZ_COMPRESSION, OpenEXR.HTJ2K32_COMPRESSION):
+        half = PICTURE.astype(np.float16)
+        np.testing.assert_array_equal(read_image(_exr_of(tmp_path / f"{int(kind)}.exr", kind, RGB=half)), half)
+
+
+def test_exr_files_that_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Several parts, no colour, a limit: told from the header, and the library prints nothing of its own."""
+    parts = [OpenEXR.Part({"type": OpenEXR.scanlineimage}, {"RGB": PICTURE.copy()}, name=n) for n in "ab"]
+    OpenEXR.File(parts).write(str(tmp_path / "parts.exr"))
+    assert "multi-part" in _refused(tmp_path / "parts.exr")
+    assert "found Z" in _refused(_exr_of(tmp_path / "z.exr", OpenEXR.ZIP_COMPRESSION, Z=PICTURE[..., 0].copy()))
+    with pytest.raises(UserError, match="found 37x20, 1 channels; expected at most 739 pixels"):
+        exr.decode(tmp_path / "z.exr", 20 * 37 - 1)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_real_environments(shared_data: Path) -> None:

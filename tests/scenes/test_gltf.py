@@ -22,7 +22,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.scenes import load_scene, validate
 from lambent.scenes.geometry import signed_volume
-from lambent.scenes.loaders.surface import masking
+from lambent.scenes.loaders.surfaces.surface import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
 
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], np.float32)
@@ -413,7 +413,7 @@ def test_broken_files_are_one_line(tmp_path: Path, name: str) -> None:
 
 
 def test_a_scene_that_multiplies_itself_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lambent.scenes.loaders.gltf.TRIANGLES_MAX", 100)
+    monkeypatch.setattr("lambent.scenes.loaders.meshes.repair.TRIANGLES_MAX", 100)
     nodes = [{"mesh": 0} for _ in range(101)]
     with pytest.raises(UserError, match="scene is too large"):
         loaded(tmp_path, document(nodes=nodes, scenes=[{"nodes": list(range(101))}]))

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
 from lambent.scenes import load_scene
+from lambent.scenes.loaders.mitsuba import load as read_mitsuba
 from lambent.scenes.loaders.mitsuba import serialized
-from lambent.scenes.loaders.mitsuba.scene import read_mitsuba
 from lambent.scenes.loaders.ply import read as read_ply
 
 BALL = '<shape type="sphere"/>'

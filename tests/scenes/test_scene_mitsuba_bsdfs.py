@@ -15,7 +15,7 @@ from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured.spectral import rgb_of_spectra
 from lambent.scenes import load_scene
-from lambent.scenes.loaders.mitsuba.interfaces import fresnel
+from lambent.scenes.loaders.mitsuba.fresnel import fresnel
 from lambent.scenes.loaders.mitsuba.metals import METALS
 from tests.tools.bsdf_distance import ByFormula, InMitsuba, distance, peak, towards
 

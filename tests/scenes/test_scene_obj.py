@@ -12,17 +12,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
+from lambent.core.geometry import triangle_areas
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene
-from lambent.scenes.geometry import areas, signed_volume
-from lambent.scenes.loaders import obj_text
-from lambent.scenes.loaders.obj import read_obj
-from lambent.scenes.loaders.parts import Parts
+from lambent.scenes.geometry import signed_volume
+from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.obj import load as read_obj
+from lambent.scenes.loaders.obj import text as obj_text
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n"
 
 
-def parts_of(folder: Path, text: str, library: str = "") -> Parts:
+def parts_of(folder: Path, text: str, library: str = "") -> Contents:
     (folder / "thing.mtl").write_text(library)
     path = folder / "thing.obj"
     path.write_text(text)
@@ -51,7 +52,7 @@ def test_as_another_reader_has_it(tmp_path: Path) -> None:
     ball.export(tmp_path / "torus.obj")
     (o,) = read_obj(tmp_path / "torus.obj").objects
     assert signed_volume(o.mesh) == pytest.approx(float(ball.volume), rel=1e-5)
-    assert float(areas(o.mesh.positions, o.mesh.faces).sum()) == pytest.approx(float(ball.area), rel=1e-5)
+    assert float(triangle_areas(o.mesh.corners).sum()) == pytest.approx(float(ball.area), rel=1e-5)
 
 
 def test_hollow_polygons(tmp_path: Path) -> None:
@@ -137,7 +138,7 @@ map_Kd gone.png
 """
     faces = "".join(f"usemtl {n}\nf 1/1 2/2 3/3\n" for n in ("plastic", "mirror", "pbr", "pane", "lamp"))
     parts = parts_of(tmp_path, QUAD + "mtllib thing.mtl\n" + faces, library)
-    m, said = parts.materials, " ".join(parts.warnings)
+    m, notes = parts.materials, " ".join(parts.warnings)
     plastic, textures = m["plastic"], parts.textures["plastic"]
     assert plastic.kd == pytest.approx((0.8 * 0.96 * 0.5,) * 3) and plastic.kd_coupled
     assert plastic.lobes[0].mx == pytest.approx(0.1) and plastic.lobes[0].r0 == pytest.approx((0.04,) * 3)
@@ -149,10 +150,10 @@ map_Kd gone.png
     gold = m["pbr"].lobes[0]
     assert gold.r0 == pytest.approx((1, 0.8, 0.3)) and m["pbr"].kd == (0, 0, 0)
     assert gold.mx * gold.my == pytest.approx(0.25**2) and gold.mx > gold.my
-    assert "material pbr: its bump map is not read" in said
-    assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "seen through" in said
+    assert "material pbr: its bump map is not read" in notes
+    assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "seen through" in notes
     lamp = next(o for o in parts.objects if o.material == "lamp")
-    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png is not there" in said
+    assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png is not there" in notes
     assert {p.name for p in parts.sources} == {
         "thing.obj", "thing.mtl", "wood grain.png", "holes.png", "flat.png", "bumps.png"
     }  # fmt: skip
@@ -196,8 +197,8 @@ def test_odd_but_sound(tmp_path: Path) -> None:
     assert len(parts.objects[0].mesh.faces) == 1 and "lines are not read" in parts.warnings
     head = "v 0 0 0\nv 1 0 0\nv nan 1 0\nv 0 1 0\n"
     parts = parts_of(tmp_path, head + "f 1 2 3\nf 1 2 4\nf 1 1 2\n")
-    said = " ".join(parts.warnings)
-    assert "a corner is not finite" in said and "no area" in said and len(parts.objects[0].mesh.faces) == 1
+    notes = " ".join(parts.warnings)
+    assert "a corner is not finite" in notes and "no area" in notes and len(parts.objects[0].mesh.faces) == 1
 
 
 WRONG = {
@@ -287,7 +288,7 @@ Frobnicate 3
     names = ("small", "gone", "brown", "glass", "veil", "coated")
     faces = "".join(f"usemtl {n}\nf 1/1 2/2 3/3\n" for n in names)
     parts = parts_of(tmp_path, QUAD + "mtllib thing.mtl\n" + faces, library)
-    m, said = parts.materials, " ".join(parts.warnings)
+    m, notes = parts.materials, " ".join(parts.warnings)
     assert m["small"].kd == pytest.approx((0.5029,) * 3, abs=1e-3)
     assert m["gone"].kd == (0.5,) * 3 and m["brown"].kd == pytest.approx((0.4, 0.3, 0.2))
     back, through = m["glass"].lobes
@@ -298,4 +299,4 @@ Frobnicate 3
         wo = np.array([np.sin(np.radians(theta_deg)), 0, np.cos(np.radians(theta_deg))])
         for name in names:
             assert MaterialBSDF(m[name]).albedo(wo).max() < 1.01, (name, theta_deg)
-    assert "Frobnicate is not read" in said and said.count("nowhere.png is not there") == 2
+    assert "Frobnicate is not read" in notes and notes.count("nowhere.png is not there") == 2

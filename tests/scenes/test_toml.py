@@ -11,7 +11,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
-from lambent.scenes.loaders.schema import SceneDocument, known_keys
+from lambent.scenes.loaders.scene_toml.schema import SceneDocument, known_keys
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 
-from lambent.scenes.builtin.parts import block, thing
+from lambent.scenes.builtin.placing import block, thing
 from lambent.scenes.geometry import box as box_mesh
 from lambent.scenes.geometry import patch, placed, sphere, turn
 from lambent.scenes.scene import SceneObject
 
 
 @cache
-def box() -> tuple[SceneObject, ...]:
-    """Half a metre each way about (0, 0.5, 0); red left, green right, all else white."""
+def objects() -> tuple[SceneObject, ...]:
+    """The objects of a box from (-0.5, 0, -0.5) to (0.5, 1, 0.5); red left, green right, everything else white."""
     return (
         thing("floor", "white", patch((-0.5, 0, 0.5), (1, 0, 0), (0, 0, -1))),
         thing("ceiling", "white", patch((-0.5, 1, -0.5), (1, 0, 0), (0, 0, 1))),

@@ -1,10 +1,10 @@
-"""Furniture of the built-in room. Each builder makes its thing standing on the origin; `room` places it."""
+"""Furniture of the built-in room. Each builder puts its piece on the origin; `room` places it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.scenes.builtin.parts import POLISHED_SCALE, block, thing
+from lambent.scenes.builtin.placing import POLISHED_SCALE, block, thing
 from lambent.scenes.geometry import box, cushion, cylinder, lathe, patch, placed, sphere, tube, turn
 from lambent.scenes.scene import Mesh, SceneObject
 
@@ -54,10 +54,10 @@ def sofa() -> list[SceneObject]:
     piping = []
     for s in (-1, 1):
         body.append(placed(cushion((0.845, 0.19, 0.74), 6.0, 7), (s * 0.42, 0.378, 0.09)))
-        lean = turn("x", -13)
-        body.append(placed(cushion((0.83, 0.46, 0.19), 5.0, 7), (s * 0.42, 0.665, -0.2), lean))
+        tilt = turn("x", -13)
+        body.append(placed(cushion((0.83, 0.46, 0.19), 5.0, 7), (s * 0.42, 0.665, -0.2), tilt))
         piping.append(placed(_piping(0.845, 0.74, 6.0), (s * 0.42, 0.378, 0.09)))
-        piping.append(placed(_piping(0.83, 0.46, 5.0), (s * 0.42, 0.665, -0.2), lean @ turn("x", 90)))
+        piping.append(placed(_piping(0.83, 0.46, 5.0), (s * 0.42, 0.665, -0.2), tilt @ turn("x", 90)))
     feet = [placed(cylinder(0.022, 0.13, 20, 0.003), (x, 0, z)) for x in (-0.96, 0.96) for z in (-0.37, 0.35)]
     pillows = [
         placed(cushion((0.46, 0.46, 0.17), 3.4, 7), (-0.62, 0.665, -0.02), turn("y", 14) @ turn("x", -20)),

@@ -1,17 +1,17 @@
-"""What the window looks at: a terrace that throws daylight up to the ceiling, a lawn, a hedge, three trees."""
+"""The view from the window: a terrace that reflects daylight up to the ceiling, a lawn, a hedge, three trees."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.scenes.builtin.parts import thing
+from lambent.scenes.builtin.placing import thing
 from lambent.scenes.builtin.shell import THICK, X
 from lambent.scenes.geometry import cushion, cylinder, grid, placed
 from lambent.scenes.scene import Mesh, SceneObject
 
 GROUND = -0.15
 TERRACE, LAWN, HEDGE_HIGH = 5.0, 15.0, 2.3  # radii and height, metres
-COARSE = 0.05  # light map density of what is only seen from afar
+COARSE = 0.05  # light map density of distant surfaces
 
 
 def garden() -> list[SceneObject]:

@@ -1,10 +1,10 @@
-"""Small things of the built-in room: what stands on the furniture and hangs on the walls."""
+"""Small objects of the built-in room, on its furniture and walls."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.scenes.builtin.parts import POLISHED_SCALE, block, thing
+from lambent.scenes.builtin.placing import POLISHED_SCALE, block, thing
 from lambent.scenes.geometry import (
     box,
     cylinder,

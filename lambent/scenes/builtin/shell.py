@@ -1,14 +1,14 @@
 """The empty room: 5.2 x 6.4 m, 2.8 m high, one wide window to the east (+x), a door to the south (+z).
 
-The inner surfaces and the shell outside them share the window's outer rim: together they are walls with a thickness,
-closed but for the window, so nothing behind a surface is ever lit.
+The inner surfaces and the shell outside share the window's outer rim. Together they are walls of some thickness, closed
+except for the window, so that no light leaks in.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.scenes.builtin.parts import block, thing
+from lambent.scenes.builtin.placing import block, thing
 from lambent.scenes.geometry import build, extrusion, grid, merge, patch, placed, tube, turn
 from lambent.scenes.scene import Mesh, SceneObject
 
@@ -26,7 +26,7 @@ def shell() -> list[SceneObject]:
 
 
 def _with_hole(us: tuple[float, ...], vs: tuple[float, ...], x: float, facing: float) -> Mesh:
-    """Wall in the plane x, lines at z = us and y = vs (four each), without its middle field, facing +x or -x."""
+    """Wall in the plane x with grid lines at z = us and y = vs (four each), its middle field open, facing +x or -x."""
     z, y = np.meshgrid(us, vs, indexing="ij")
     points = np.stack([np.full(16, x), y.ravel(), z.ravel()], axis=-1)
     index = np.arange(16).reshape(4, 4)
@@ -114,8 +114,8 @@ def _floor() -> list[SceneObject]:
     for i, x in enumerate(columns):
         for j, z in enumerate(rows):
             tiles[(i + j) % 2].append(_tile(x, z))
-            # Every strip lies a hair lower or higher than its neighbours, so that an atlas takes it as one small
-            # chart and not all of them as one chart of the size of the floor.
+            # Strips lie at slightly different heights, so that the atlas makes each a small chart, not all together one
+            # chart of the size of the floor.
             y = -JOINT_DEPTH - 0.0001 * ((i + j) % 2)
             if j + 1 < len(rows):
                 joints.append(patch((x[0], y, z[1]), (0, 0, JOINT), (x[1] - x[0], 0, 0)))

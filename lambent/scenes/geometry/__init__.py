@@ -2,7 +2,6 @@
 
 from lambent.scenes.geometry.curves import catmull_rom, smooth_curve
 from lambent.scenes.geometry.grid import (
-    areas,
     build,
     grid,
     merge,
@@ -26,7 +25,7 @@ from lambent.scenes.geometry.shapes import (
 from lambent.scenes.geometry.teapot import teapot
 
 __all__ = [
-    "areas", "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
+    "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
     "patch", "placed", "signed_volume", "smooth_curve", "sphere", "tangents_along", "teapot", "transformed", "tube",
     "turn",
 ]  # fmt: skip

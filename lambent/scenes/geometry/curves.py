@@ -1,4 +1,4 @@
-"""Smooth curves through points: for profiles, tubes and the ways of cameras."""
+"""Smooth curves through points: for profiles, tubes and camera paths."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from lambent.core.directions import Floats
 def catmull_rom(points: Floats, t: Floats, closed: bool = False, knots: Floats | None = None) -> tuple[Floats, Floats]:
     """Position and derivative (N, D) at parameters t (N,) of the Catmull-Rom curve through `points` (K, D).
 
-    Point k is passed at t = knots[k], k where no knots are given (Catmull & Rom 1974). An open curve ends straight; a
-    closed one comes back to its first point one step of 1 after the last.
+    The curve passes point k at t = knots[k], by default k (Catmull & Rom 1974). An open curve ends straight; a closed
+    one returns to its first point a step of 1 after the last.
     """
     if knots is None:
         knots = np.arange(len(points), dtype=float)
@@ -38,8 +38,8 @@ def catmull_rom(points: Floats, t: Floats, closed: bool = False, knots: Floats |
 def centripetal_knots(points: Floats) -> Floats:
     """Knots (K,) that keep a curve through unevenly spaced points free of loops (Yuksel et al. 2011).
 
-    Steps grow with the square root of the distance; a quarter of their mean is the least, so that points in one place
-    are passed in a finite time.
+    Steps grow with the square root of the distance, and are at least a quarter of their mean, so that coincident points
+    take a finite time.
     """
     root = np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=-1))
     mean = float(root.mean()) or 1.0

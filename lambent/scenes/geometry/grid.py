@@ -1,4 +1,4 @@
-"""Every shape here is a sheet of points in rows and columns, or several of them: one place makes the triangles."""
+"""Meshes from sheets of points in rows and columns, and operations on meshes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lambent.core.directions import Floats, basis, normalize
+from lambent.core.geometry import area_vectors, triangle_areas
 from lambent.scenes.scene import Mesh
 
-FLAT = 1e-10  # a triangle below this share of its sheet's extent squared has no area worth the name
+FLAT = 1e-10  # triangles below this share of their sheet's extent squared count as degenerate
 
 
 def tangents_along(normals: Floats, direction: ArrayLike) -> Floats:
-    """Unit tangents (V, 3): `direction`, (3,) or (V, 3), laid into the surface; any tangent where it stands upright."""
+    """Unit tangents (V, 3) along `direction`, (3,) or (V, 3), projected into the surface; any where it is normal."""
     along = np.broadcast_to(np.asarray(direction, float), normals.shape)
     flat = along - normals * np.sum(normals * along, axis=-1, keepdims=True)
     usable = np.linalg.norm(flat, axis=-1, keepdims=True) > 1e-4
@@ -22,25 +23,16 @@ def tangents_along(normals: Floats, direction: ArrayLike) -> Floats:
     return normalize(tangents - normals * np.sum(normals * tangents, axis=-1, keepdims=True))
 
 
-def areas(positions: Floats, faces: NDArray[np.integer]) -> Floats:
-    """Area (T,) of each triangle, m^2."""
-    a, b, c = (positions[faces[:, i]].astype(float) for i in range(3))
-    area: Floats = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
-    return area
-
-
 def build(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats, faces: NDArray[np.integer]) -> Mesh:
-    """Mesh of (V, ...) arrays and triangles in any winding.
+    """Mesh of (V, ...) arrays and triangles in any winding; `direction` as in `tangents_along`.
 
-    Triangles without area are dropped, the others turned to the side of their normals; vertices nobody uses go.
-    `direction` is what `tangents_along` takes.
+    Triangles without area and unused vertices are dropped, the winding follows the normals.
     """
     positions = np.asarray(positions, np.float32)
     normals = normalize(np.asarray(normals, float))
     extent = float(np.ptp(positions, axis=0).max())
-    faces = faces[areas(positions, faces) > FLAT * extent**2]
-    a, b, c = (positions[faces[:, i]].astype(float) for i in range(3))
-    outward = np.sum(np.cross(b - a, c - a) * normals[faces].sum(axis=1), axis=-1)
+    faces = faces[triangle_areas(positions[faces].astype(float)) > FLAT * extent**2]
+    outward = np.sum(area_vectors(positions[faces].astype(float)) * normals[faces].sum(axis=1), axis=-1)
     faces = np.where((outward < 0)[:, None], faces[:, ::-1], faces)
     used, index = np.unique(faces, return_inverse=True)
     tangents = tangents_along(normals, direction)
@@ -65,7 +57,7 @@ def grid(positions: Floats, normals: Floats, direction: ArrayLike, uv: Floats) -
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
-    """All of them as one."""
+    """One mesh of several."""
     parts = list(meshes)
     starts = np.cumsum([0] + [len(m.positions) for m in parts[:-1]]).astype(np.uint32)
     return Mesh(
@@ -78,7 +70,7 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
-    """`mesh` under an affine 4x4 matrix; a mirroring one turns the winding, so outside stays outside."""
+    """`mesh` under an affine 4x4 matrix; a mirroring one reverses the winding, so that outside stays outside."""
     m = np.asarray(matrix, float)
     linear = m[:3, :3]
     normals = normalize(mesh.normals.astype(float) @ np.linalg.inv(linear))
@@ -93,7 +85,7 @@ def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
 
 
 def turn(axis: str, angle_deg: float) -> Floats:
-    """3x3 rotation about "x", "y" or "z", right-handed."""
+    """3x3 right-handed rotation about "x", "y" or "z", exact in the components along the axis."""
     c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     matrix = np.eye(3)
@@ -111,5 +103,5 @@ def placed(mesh: Mesh, at: ArrayLike = (0.0, 0.0, 0.0), rotation: Floats | None 
 
 def signed_volume(mesh: Mesh) -> float:
     """Volume in m^3 of a closed mesh, negative where it is inside out."""
-    a, b, c = (mesh.positions[mesh.faces[:, i]].astype(float) for i in range(3))
+    a, b, c = np.moveaxis(mesh.corners, 1, 0)
     return float(np.sum(a * np.cross(b, c)) / 6)

@@ -1,4 +1,4 @@
-"""Building blocks with analytic normals: y up, metres, resting on or centred at the origin as each one says."""
+"""Shapes with analytic normals: y up, metres, standing on or centred at the origin."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def _cube(side: CubeSide, steps: Sequence[Floats], brushed: ArrayLike, size: Arr
 def box(size: ArrayLike, bevel: float = 0.0, brushed: ArrayLike = (1, 0, 0), segments: int = 1) -> Mesh:
     """Box of `size` (3,) centred at the origin, edges rounded with radius `bevel`; uv in metres.
 
-    The rounding is a true fillet with smooth normals, `segments` quads to each side of an edge; the six sides keep
-    flat normals. Without a bevel the edges are hard.
+    The rounding is a fillet with smooth normals, `segments` quads on each side of an edge; the six sides have flat
+    normals. Without a bevel the edges are hard.
     """
     if bevel == 0:
         flat = [np.array([-1.0, 1.0])] * 3
         return _cube(lambda p, half: (p * half, p * _face_axis(p)), flat, brushed, size)
-    # Grid lines: |p| = 2 marks the fillet; its fraction is the angle from the flat part, 1 at 45 degrees.
+    # Grid lines beyond |p| = 1 are the fillet's: |p| - 1 is the tangent of the angle from the flat side.
     angles = np.tan(np.linspace(0, np.pi / 4, segments + 1))
     lines = np.concatenate([-1 - angles[::-1], 1 + angles])
 
@@ -61,7 +61,7 @@ def _face_axis(p: Floats) -> Floats:
 
 
 def cushion(size: ArrayLike, exponent: float = 4.0, steps: int = 12, brushed: ArrayLike = (1, 0, 0)) -> Mesh:
-    """Superellipsoid |x/a|^e + |y/b|^e + |z/c|^e = 1 of `size` (3,), centred: a box puffed up, without poles."""
+    """Superellipsoid |x/a|^e + |y/b|^e + |z/c|^e = 1 of `size` (3,), centred: an inflated box, without poles."""
     lines = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 2 * steps + 1))
 
     def puff(p: Floats, half: Floats) -> tuple[Floats, Floats]:
@@ -74,9 +74,9 @@ def cushion(size: ArrayLike, exponent: float = 4.0, steps: int = 12, brushed: Ar
 def lathe(profiles: Sequence[ArrayLike], around: int = 48, rows: int = 6) -> Mesh:
     """Surface of revolution about y: brushed round the axis, uv (turn, height share), edges hard between profiles.
 
-    Each profile is a chain of points (K, 2) of radius and height, drawn smooth; one of two points is straight. The
-    outside is to the right of its way in the (radius, height) plane: bottom to top outside, top to bottom inside.
-    `rows` quads lie between two points.
+    Each profile is a smooth curve through points (K, 2) of radius and height; one of two points is straight. The
+    outside is to its right in the (radius, height) plane: outer walls run from bottom to top, inner ones from top to
+    bottom. `rows` quads lie between two points.
     """
     turns = np.linspace(0, 2 * np.pi, around + 1)
     circle = np.stack([np.cos(turns), np.zeros_like(turns), -np.sin(turns)], axis=-1)
@@ -109,7 +109,7 @@ def sphere(radius: float, around: int = 64, rows: int = 32) -> Mesh:
 
 
 def cylinder(radius: float, height: float, around: int = 32, bevel: float = 0.0) -> Mesh:
-    """Upright cylinder that stands on the origin, its rims rounded with radius `bevel`."""
+    """Upright cylinder standing on the origin, its rims rounded with radius `bevel`."""
     if bevel == 0:
         return lathe([[(0, 0), (radius, 0)], [(radius, 0), (radius, height)], [(radius, height), (0, height)]], around)
     arc = np.linspace(0, np.pi / 2, 4)
@@ -123,19 +123,19 @@ def tube(
     points: Sequence[ArrayLike] | Floats, radius: float, around: int = 12, rows: int = 6, closed: bool = False
 ) -> Mesh:
     """Round tube along a smooth curve through `points` (K, 3), brushed lengthwise, its ends flat unless `closed`."""
-    centres, ways = smooth_curve(np.asarray(points, float), rows if closed or len(points) > 2 else 1, closed)
-    ways = normalize(ways)
-    side = normalize(np.cross(ways[0], np.eye(3)[np.argmin(np.abs(ways[0]))]))
+    centres, along = smooth_curve(np.asarray(points, float), rows if closed or len(points) > 2 else 1, closed)
+    along = normalize(along)
+    side = normalize(np.cross(along[0], np.eye(3)[np.argmin(np.abs(along[0]))]))
     sides = [side]
-    for way in ways[1:]:  # parallel transport: no twist but the curve's own
-        side = normalize(side - way * (side @ way))
+    for tangent in along[1:]:  # parallel transport: no twist but the curve's own
+        side = normalize(side - tangent * (side @ tangent))
         sides.append(side)
-    twist = np.zeros(len(ways))
-    if closed:  # spread what is left of a turn after one round
-        over = np.cross(ways[0], sides[0])
-        twist = np.linspace(0, -np.arctan2(sides[-1] @ over, sides[-1] @ sides[0]), len(ways))
+    twist = np.zeros(len(along))
+    if closed:  # spread the twist of one round over the tube
+        over = np.cross(along[0], sides[0])
+        twist = np.linspace(0, -np.arctan2(sides[-1] @ over, sides[-1] @ sides[0]), len(along))
     a = np.stack(sides)
-    b = np.cross(ways, a)
+    b = np.cross(along, a)
     phi = np.linspace(0, 2 * np.pi, around + 1)[None, :] + twist[:, None]
     normals = np.cos(phi)[..., None] * a[:, None] + np.sin(phi)[..., None] * b[:, None]
     normals[:, -1] = normals[:, 0]
@@ -144,12 +144,12 @@ def tube(
         positions[-1], normals[-1] = positions[0], normals[0]
     steps = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=-1))])
     uv = np.stack(np.broadcast_arrays(radius * phi, steps[:, None]), axis=-1)
-    body = grid(positions, normals, np.broadcast_to(ways[:, None], positions.shape), uv)
-    return body if closed else merge([body, fan(positions[0, :-1], -ways[0]), fan(positions[-1, :-1], ways[-1])])
+    body = grid(positions, normals, np.broadcast_to(along[:, None], positions.shape), uv)
+    return body if closed else merge([body, fan(positions[0, :-1], -along[0]), fan(positions[-1, :-1], along[-1])])
 
 
 def fan(rim: Floats, normal: ArrayLike, brushed: ArrayLike = (1, 0, 0)) -> Mesh:
-    """Flat patch within a rim (K, 3) that its middle sees whole; uv in metres."""
+    """Flat patch within a star-shaped rim (K, 3) about its mean; uv in metres."""
     n = np.asarray(normal, float)
     points = np.concatenate([rim.mean(axis=0, keepdims=True), rim])
     count = len(rim)
@@ -161,7 +161,7 @@ def fan(rim: Floats, normal: ArrayLike, brushed: ArrayLike = (1, 0, 0)) -> Mesh:
 def extrusion(profile: ArrayLike, length: float, brushed: ArrayLike = (0, 0, 1)) -> Mesh:
     """Prism along z from 0 to `length` of a polygon (K, 2) in x, y, counter-clockwise, edges hard, ends closed.
 
-    The polygon's middle must see all of it.
+    The polygon is star-shaped about its mean.
     """
     points = np.asarray(profile, float)
 

@@ -1,8 +1,8 @@
-"""Martin Newell's teapot (1975): 32 bicubic Bezier patches, from the few numbers that its symmetry leaves.
+"""Martin Newell's teapot (1975): 32 bicubic Bezier patches, from the few numbers that define them by symmetry.
 
-Body, rim, lid and bottom are turned: four quarters, each control circle of radius r drawn with the handle length
-KAPPA r. Handle and spout are mirrored at the plane of the teapot: a row of four control points is an inner and an
-outer point of that plane, each with a copy pulled out by a half width. Units and axes of the table: Newell's, z up.
+Body, rim, lid and bottom are surfaces of revolution in four quarters, the control points of a circle of radius r at
+handle length KAPPA r. Handle and spout are mirror images: a row of four control points is an inner and an outer point
+of the mirror plane, each with a copy at a half width from it. The tables have Newell's units and axes, z up.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from lambent.scenes.geometry.grid import grid, merge, transformed
 from lambent.scenes.scene import Mesh
 
 KAPPA = 0.56  # Newell's handle length of a quarter circle, by radius
-KNOB_PULL = 0.45  # the one control circle drawn otherwise: the lid's knob, radius .8
+KNOB_PULL = 0.45  # the handle length of one circle that differs: the lid's knob, radius .8
 LENGTH = 6.525  # handle to spout, in the table's units
 
 # (radius, height) of the control circles, four to a patch, neighbours sharing one; from the rim down and outwards.

@@ -1,30 +1,31 @@
-"""`load_scene`: one door for every scene."""
+"""`load_scene`: built-in scenes, scene.toml, and every format that has a module among the loaders.
+
+A format is a module or folder in `scenes/loaders` with NAME, ENDINGS and load(path, root) -> Contents; files that the
+file names lie below the folder `root`, by default its own. A format that shares its ending with other files also has
+recognise(head), which tells a scene by its first bytes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
+from types import ModuleType
 
-from lambent.core.errors import UserError, did_you_mean
-from lambent.scenes.builtin.box import box
-from lambent.scenes.builtin.room import room
+from lambent.core.discovery import known, modules_in
+from lambent.core.errors import UserError
+from lambent.scenes import builtin, loaders
+from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.defaults import with_defaults
-from lambent.scenes.loaders.gltf import read_gltf
-from lambent.scenes.loaders.mitsuba.scene import read_mitsuba
-from lambent.scenes.loaders.obj import read_obj
-from lambent.scenes.loaders.parts import Parts
-from lambent.scenes.loaders.ply import read_ply
-from lambent.scenes.loaders.toml import inside_scene, load_toml
+from lambent.scenes.loaders.scene_files import SceneFiles
+from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
-BUILTIN: dict[str, Callable[[], tuple[SceneObject, ...]]] = {"room": room, "box": box}
-READERS: dict[str, Callable[[Path, Path | None], Parts]] = {
-    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".xml": read_mitsuba, ".ply": read_ply,
-}  # fmt: skip
+TOML = ".toml"
 
 
 def load_scene(path_or_builtin: str | Path) -> Scene:
@@ -48,33 +49,45 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
 def _load(path_or_builtin: str | Path) -> Scene:
     text = str(path_or_builtin)
     if text.startswith(BUILTIN_PREFIX):
-        name = text.removeprefix(BUILTIN_PREFIX)
-        _builtin(name)  # raises the error of an unknown name
-        return load_toml(Path(str(files("lambent.scenes.builtin") / f"{name}.toml")), read_geometry)
+        name = _builtin_name(text)
+        return load_toml(Path(str(files(builtin) / f"{name}{TOML}")), read_geometry)
     path = Path(path_or_builtin)
-    if path.suffix.lower() == ".toml":
+    if path.suffix.lower() == TOML:
         return load_toml(path, read_geometry)
-    return with_defaults(path.stem, _reader(path)(path, None))
+    return with_defaults(path.stem, _format_of(path).load(path, None))
 
 
-def read_geometry(name: str, scene_file: Path) -> Parts:
+def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Contents:
     """Objects, and what comes with them, of a built-in scene or of a file that `scene_file` names."""
     if name.startswith(BUILTIN_PREFIX):
-        return Parts(_builtin(name.removeprefix(BUILTIN_PREFIX))())
-    path = inside_scene(scene_file, "geometry", name)
-    return _reader(path)(path, scene_file.resolve().parent)
+        module = import_module(f"{builtin.__name__}.{_builtin_name(name)}")
+        make: Callable[[], tuple[SceneObject, ...]] = module.objects
+        return Contents(make())
+    path = scene_files.path(name, scene_file, "geometry")
+    contents: Contents = _format_of(path).load(path, scene_files.root)
+    return contents
 
 
-def _reader(path: Path) -> Callable[[Path, Path | None], Parts]:
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        expected = ", ".join([*READERS, ".toml"])
+def is_scene(path: Path, head: bytes) -> bool:
+    """Whether a file that begins with `head` is a scene, by its ending and its first bytes."""
+    modules = [m for m in formats() if path.suffix.lower() in m.ENDINGS]
+    return path.suffix.lower() == TOML or any(not hasattr(m, "recognise") or m.recognise(head) for m in modules)
+
+
+def formats() -> list[ModuleType]:
+    """The formats that are found, by the names of their modules."""
+    return list(modules_in(loaders, having="ENDINGS").values())
+
+
+def _format_of(path: Path) -> ModuleType:
+    module = next((m for m in formats() if path.suffix.lower() in m.ENDINGS), None)
+    if module is None:
+        expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML])
         raise UserError("unknown kind of scene", file=path, got=path.suffix or "no extension", expected=expected)
-    return reader
+    return module
 
 
-def _builtin(name: str) -> Callable[[], tuple[SceneObject, ...]]:
-    if name not in BUILTIN:
-        known = ", ".join(BUILTIN_PREFIX + n for n in BUILTIN)
-        raise UserError("unknown built-in scene", got=name, expected=known, hint=did_you_mean(name, BUILTIN))
-    return BUILTIN[name]
+def _builtin_name(text: str) -> str:
+    """The name behind "builtin:"; a built-in scene is a .toml and a module with `objects()` in `scenes/builtin`."""
+    names = sorted(Path(f.name).stem for f in files(builtin).iterdir() if f.name.endswith(TOML))
+    return known("built-in scene", text.removeprefix(BUILTIN_PREFIX), names)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,19 +13,21 @@ from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.materials.document import Material
-from lambent.scenes.loaders.parts import Parts
-from lambent.scenes.loaders.polygons import Arrays, Ints, smooth_normals, triangulate
-from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.meshes.polygons import Ints, ranges, triangulate
+from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
 from lambent.scenes.scene import SceneObject
 
+NAME, ENDINGS = "PLY", (".ply",)
 LIMIT_BYTES = 4 << 30
 HEADER_MAX = 1 << 16
-TRIANGLES_MAX = 20_000_000
+CORNERS_MAX = 1 << 20  # of one face
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
     "double": "f8", "float64": "f8",
 }  # fmt: skip
+ORDERS = {"ascii": "ascii", "binary_little_endian": "<", "binary_big_endian": ">"}
 UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 
 
@@ -31,10 +35,27 @@ UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "t
 class _Element:
     name: str
     count: int
-    properties: list[tuple[str, str, str | None]]  # name, type, type of the count where it is a list
+    properties: list[tuple[str, str, str | None]]  # name, type, type of the count if it is a list
+
+    def row(self, corners: int) -> np.dtype[Any]:
+        """The type of a row whose list, if it has one, has so many corners."""
+        fields: list[tuple[Any, ...]] = []
+        for i, (_, kind, count) in enumerate(self.properties):
+            fields += [(f"{i}", kind)] if count is None else [("size", count), ("list", kind, (corners,))]
+        return np.dtype(fields)
 
 
-def read(path: Path) -> Arrays:
+def load(path: Path, root: Path | None = None) -> Contents:
+    """A file as one grey object; v points up, missing normals are smooth."""
+    mesh, notes = mesh_of(read(path).smooth(), name=path.stem, file=path)
+    if mesh is None:
+        raise UserError("holds no triangles", file=path, hint="; ".join(notes) or None)
+    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
+    thing = SceneObject(path.stem, mesh, grey.name)
+    return Contents((thing,), {grey.name: grey}, sources=(path,), warnings=tuple(notes))
+
+
+def read(path: Path) -> MeshArrays:
     """Arrays of a file.
 
     Raises
@@ -44,19 +65,22 @@ def read(path: Path) -> Arrays:
     """
     data = read_bytes(path, LIMIT_BYTES)
     order, elements, start = _header(data, path)
-    body = _Text(data, start, path) if order == "ascii" else _Binary(data, start, order, path)
+    rows = _Rows(_doubles(data[start:], path) if order == "ascii" else memoryview(data)[start:], path)
     vertex: dict[str, Floats] = {}
     corners, sizes = np.zeros(0, np.int64), np.zeros(0, np.int64)
     for element in elements:
         lists = [p for p in element.properties if p[2] is not None]
+        element.properties = [(name, _typed(order, kind), count and _typed(order, count))
+                              for name, kind, count in element.properties]  # fmt: skip
         if element.name == "vertex" and not lists:
-            vertex = body.table(element)
+            table = rows.take(element.row(0), element.count)
+            vertex = {p[0]: table[f"{i}"].astype(float) for i, p in enumerate(element.properties)}
         elif element.name == "face" and len(lists) == 1:
-            corners, sizes = body.faces(element)
+            corners, sizes = rows.faces(element)
         elif element.name in ("vertex", "face"):
             raise UserError("holds lists that are not read", file=path, field=f"element {element.name}")
         else:
-            break  # what comes after the faces is nothing to see
+            break  # what follows the faces cannot be seen
     if not all(c in vertex for c in "xyz"):
         raise UserError("has no vertices", file=path, expected="properties x, y, z")
     count = len(vertex["x"])
@@ -65,31 +89,13 @@ def read(path: Path) -> Arrays:
         raise UserError("face index out of range", file=path, got=bad, expected=f"below {count}")
     positions = np.stack([vertex[c] for c in "xyz"], axis=-1)
     places, _ = triangulate(positions, corners, sizes)
-    if len(places) > TRIANGLES_MAX:
-        raise UserError("mesh is too large", file=path, got=f"{len(places)} triangles", expected=TRIANGLES_MAX)
-    normals = np.stack([vertex[f"n{c}"] for c in "xyz"], axis=-1) if all(f"n{c}" in vertex for c in "xyz") else None
-    named = next((pair for pair in UV_NAMES if all(n in vertex for n in pair)), None)
-    uv = np.stack([vertex[n] for n in named], axis=-1) if named else None
-    return Arrays(positions, normals, uv, corners[places])
-
-
-def read_ply(path: Path, root: Path | None = None) -> Parts:
-    """A file as one grey object; v points up, missing normals are smooth."""
-    arrays = read(path)
-    normals = arrays.normals
-    if normals is None and len(arrays.triangles):
-        normals = np.zeros_like(arrays.positions)
-        made = smooth_normals(arrays.positions, arrays.triangles, arrays.triangles)
-        normals[: len(made)] = made
-    mesh, said = mesh_of(arrays.positions, arrays.triangles, normals, arrays.uv, None, name=path.stem, file=path)
-    if mesh is None:
-        raise UserError("holds no triangles", file=path, hint="; ".join(said) or None)
-    grey = Material(name="default", kd=(0.5, 0.5, 0.5))
-    return Parts((SceneObject(path.stem, mesh, grey.name),), {grey.name: grey}, sources=(path,), warnings=tuple(said))
+    check_triangles(len(places), path)
+    normals, uv = (_columns(vertex, names) for names in ((("nx", "ny", "nz"),), UV_NAMES))
+    return MeshArrays(positions, corners[places], normals, uv)
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
-    """Byte order ("ascii", "<" or ">"), elements, and where the data begin."""
+    """Byte order (a value of `ORDERS`), elements, and where the data begin."""
     end = data.find(b"end_header", 0, HEADER_MAX)
     if not data.startswith(b"ply") or end < 0:
         raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="it to begin with ply")
@@ -98,7 +104,7 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
         words = line.split()
         try:
             if words[:1] == ["format"]:
-                order = {"ascii": "ascii", "binary_little_endian": "<", "binary_big_endian": ">"}[words[1]]
+                order = ORDERS[words[1]]
             elif words[:1] == ["element"]:
                 elements.append(_Element(words[1], int(words[2]), []))
                 if elements[-1].count < 0:
@@ -115,120 +121,79 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
     return order, elements, line_end + 1
 
 
-class _Text:
-    """Numbers of an ASCII file, taken one element after the other."""
+class _Rows:
+    """Elements taken one after the other, each checked against what is left of the file."""
 
-    def __init__(self, data: bytes, start: int, path: Path) -> None:
-        self._path = path
-        try:
-            self._values = np.fromstring(data[start:], sep=" ")  # type: ignore[call-overload]
-        except ValueError as error:
-            raise UserError("holds something that is no number", file=path) from error
-        self._at = 0
+    def __init__(self, data: memoryview, path: Path) -> None:
+        self._data, self._at, self._path = data, 0, path
 
-    def table(self, element: _Element) -> dict[str, Floats]:
-        width = len(element.properties)
-        values = self._take(element.count * width).reshape(-1, max(width, 1))
-        return {name: values[:, i] for i, (name, _, _) in enumerate(element.properties)}
-
-    def faces(self, element: _Element) -> tuple[Ints, Ints]:
-        before, after = _around_list(element)
-        rest = self._values[self._at :]
-        if element.count == 0:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        if before >= len(rest):
-            raise _cut_off(self._path)
-        size = rest[before]
-        step = before + 1 + (int(size) if 0 <= size < 1 << 20 else 0) + after
-        if step * element.count <= len(rest):
-            rows = rest[: step * element.count].reshape(-1, step)
-            if (rows[:, before] == size).all():
-                self._at += rows.size
-                return _integers(rows[:, before + 1 : step - after]).reshape(-1), np.full(len(rows), int(size))
-        corners, sizes = [], []
-        for _ in range(element.count):
-            row = self._take(before + 1)
-            size = row[before]
-            if not 0 <= size < 1 << 20:
-                raise UserError("face that cannot be read", file=self._path, got=size)
-            corners.append(_integers(self._take(int(size))))
-            sizes.append(int(size))
-            self._take(after)
-        return np.concatenate(corners), np.array(sizes)
-
-    def _take(self, count: int) -> Floats:
-        if self._at + count > len(self._values):
-            raise _cut_off(self._path)
-        self._at += count
-        taken: Floats = self._values[self._at - count : self._at]
-        return taken
-
-
-class _Binary:
-    """Elements of a binary file, taken one after the other."""
-
-    def __init__(self, data: bytes, start: int, order: str, path: Path) -> None:
-        self._data, self._at, self._order, self._path = data, start, order, path
-
-    def table(self, element: _Element) -> dict[str, Floats]:
-        names = [f"{i}" for i in range(len(element.properties))]
-        kind = np.dtype([(n, self._order + p[1]) for n, p in zip(names, element.properties, strict=True)])
-        rows = self._array(kind, element.count)
-        return {p[0]: rows[n].astype(float) for n, p in zip(names, element.properties, strict=True)}
-
-    def faces(self, element: _Element) -> tuple[Ints, Ints]:
-        """Lists of one length are one array; others are walked through."""
-        if element.count == 0:
-            return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        head = self._row(element, 0)
-        if self._at + head.itemsize > len(self._data):
-            raise _cut_off(self._path)
-        size = int(np.frombuffer(self._data, head, 1, self._at)["size"][0])
-        if 0 <= size < 1 << 20:
-            kind = self._row(element, size)
-            if self._at + kind.itemsize * element.count <= len(self._data):
-                rows = np.frombuffer(self._data, kind, element.count, self._at)
-                if (rows["size"] == size).all():
-                    self._at += rows.nbytes
-                    return _integers(rows["list"].reshape(-1)), np.full(len(rows), size)
-        corners, sizes = [], []
-        for _ in range(element.count):
-            if self._at + head.itemsize > len(self._data):
-                raise _cut_off(self._path)
-            size = int(np.frombuffer(self._data, head, 1, self._at)["size"][0])
-            if not 0 <= size < 1 << 20:
-                raise UserError("face that cannot be read", file=self._path, got=size)
-            row = self._array(self._row(element, size), 1)
-            corners.append(_integers(row["list"].reshape(-1)))
-            sizes.append(size)
-        return np.concatenate(corners), np.array(sizes)
-
-    def _row(self, element: _Element, size: int) -> np.dtype:  # type: ignore[type-arg]
-        fields: list[tuple] = []  # type: ignore[type-arg]
-        for i, (_, kind, count) in enumerate(element.properties):
-            if count is None:
-                fields.append((f"{i}", self._order + kind))
-            else:
-                fields += [("size", self._order + count), ("list", self._order + kind, (size,))]
-        return np.dtype(fields)
-
-    def _array(self, kind: np.dtype, count: int) -> np.ndarray:  # type: ignore[type-arg]
-        if self._at + kind.itemsize * count > len(self._data):
-            raise _cut_off(self._path)
+    def take(self, kind: np.dtype[Any], count: int) -> np.ndarray[Any, Any]:
+        """The next `count` rows."""
+        self._check(self._at + kind.itemsize * count)
         array = np.frombuffer(self._data, kind, count, self._at)
         self._at += array.nbytes
         return array
 
+    def faces(self, element: _Element) -> tuple[Ints, Ints]:
+        """Corners of all faces, one face after the other, and the number (F,) of each."""
+        if element.count == 0:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        head, item = element.row(0), np.dtype(next(p[1] for p in element.properties if p[2]))
+        count, size_at = head.fields["size"]  # type: ignore[index, misc]
+        size_of = struct.Struct(("<" if count.str[0] == "|" else count.str[0]) + count.char)
+        size = self._size(size_of, self._at, size_at, head.itemsize)
+        kind = element.row(size)
+        if self._at + kind.itemsize * element.count <= len(self._data):  # mostly all have as many as the first
+            rows = np.frombuffer(self._data, kind, element.count, self._at)
+            if (rows["size"] == size).all():
+                self._at += rows.nbytes
+                return _integers(rows["list"].reshape(-1)), np.full(len(rows), size)
+        sizes: list[int] = []
+        at = self._at
+        for _ in range(element.count):
+            sizes.append(self._size(size_of, at, size_at, head.itemsize))
+            at += head.itemsize + sizes[-1] * item.itemsize
+        self._check(at)
+        counts = np.array(sizes)
+        before = np.arange(len(counts)) * head.itemsize + (np.cumsum(counts) - counts) * item.itemsize
+        lists = self._at + before + size_at + count.itemsize
+        first = np.repeat(lists, counts) + ranges(counts) * item.itemsize
+        self._at = at
+        corners = np.frombuffer(self._data, np.uint8)[first[:, None] + np.arange(item.itemsize)].view(item)
+        return _integers(corners.reshape(-1)), counts
 
-def _around_list(element: _Element) -> tuple[int, int]:
-    """Plain properties before and after the list."""
-    at = next(i for i, p in enumerate(element.properties) if p[2] is not None)
-    return at, len(element.properties) - at - 1
+    def _size(self, size_of: struct.Struct, at: int, size_at: int, least: int) -> int:
+        """Corners of the face that begins at a place."""
+        self._check(at + least)
+        (size,) = size_of.unpack_from(self._data, at + size_at)
+        if not 0 <= size < CORNERS_MAX:
+            raise UserError("face that cannot be read", file=self._path, got=size)
+        return int(size)
+
+    def _check(self, end: int) -> None:
+        if end > len(self._data):
+            raise UserError("file is truncated", file=self._path, hint="copy or download it again")
 
 
-def _integers(values: Floats) -> Ints:
+def _doubles(text: bytes, path: Path) -> memoryview:
+    """The numbers of a text as bytes of doubles."""
+    try:
+        values = np.fromstring(text, sep=" ")
+    except ValueError as error:
+        raise UserError("holds something that is no number", file=path) from error
+    return values.view(np.uint8).data
+
+
+def _typed(order: str, kind: str) -> str:
+    """A type as it stands in the data."""
+    return "f8" if order == "ascii" else order + kind
+
+
+def _columns(vertex: dict[str, Floats], choices: tuple[tuple[str, ...], ...]) -> Floats | None:
+    """The first of several groups of properties that is there, (V, n)."""
+    names = next((group for group in choices if all(n in vertex for n in group)), None)
+    return None if names is None else np.stack([vertex[n] for n in names], axis=-1)
+
+
+def _integers(values: np.ndarray[Any, Any]) -> Ints:
     return np.nan_to_num(values, nan=-1).astype(np.int64) if values.dtype.kind == "f" else values.astype(np.int64)
-
-
-def _cut_off(path: Path) -> UserError:
-    return UserError("file is truncated", file=path, hint="copy or download it again")

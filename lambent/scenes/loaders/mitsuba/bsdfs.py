@@ -1,23 +1,25 @@
-"""Mitsuba's BSDFs as surfaces of lobes. Ours are thin and two-sided: what that loses is said.
+"""Mitsuba's BSDFs as surfaces of lobes. Lambent's are thin and two-sided; every loss is noted.
 
-A dielectric coat over a diffuse base (`plastic`, `roughplastic`) becomes a lobe and a coupled diffuse term with the
-albedo that Mitsuba's has at normal incidence: T(1) T rho / (eta^2 (1 - rho' R)), T(1) and T what the coat lets through
-from above and of diffuse light, R what it reflects of diffuse light inside, rho' = rho where `nonlinear`, else 1.
+A dielectric coat over a diffuse base (`plastic`, `roughplastic`) becomes a lobe and a coupled diffuse term with
+Mitsuba's albedo at normal incidence, T(1) T rho / (eta^2 (1 - rho' R)): T(1) and T are the coat's transmittance of
+light from above and of diffuse light, R its reflectance of diffuse light inside, rho' = rho if `nonlinear`, else 1.
 
-Fresnel's terms become the nearest of Schlick's form. A facet of slope s turns what passes a face of a solid by about
-(eta - 1) s, where our sheets turn it by 2 s: their roughness is that of the solid times (eta - 1)/2.
+Fresnel reflectances become the nearest of Schlick's form. A facet of slope s deflects light that enters a solid by
+about (eta - 1) s, and light that passes a sheet by 2 s: a sheet gets the solid's roughness times (eta - 1)/2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from lambent.core.directions import Floats
 from lambent.core.errors import did_you_mean
-from lambent.scenes.loaders.mitsuba.interfaces import (
+from lambent.core.plain import is_number
+from lambent.scenes.loaders.mitsuba.fresnel import (
     COS,
     fresnel,
     mean_reflectance,
@@ -27,27 +29,27 @@ from lambent.scenes.loaders.mitsuba.interfaces import (
     transmittance,
 )
 from lambent.scenes.loaders.mitsuba.metals import IOR, METALS
-from lambent.scenes.loaders.mitsuba.principled import principled, principled_thin
-from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_picture
+from lambent.scenes.loaders.mitsuba.principled import principled
+from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_values
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surface import (
+from lambent.scenes.loaders.surfaces.surface import (
     BLACK,
     ROUGHNESS_MIN,
     Distribution,
-    Gloss,
+    SpecularLobe,
     Surface,
     blended,
     coated,
     seen_through,
 )
-from lambent.scenes.loaders.varying import Varying, absolute, combined, constant, scaled
+from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 
 GREY = 0.5
-GLOSSES_MAX = 16
+LOBES_MAX = 16
 OREN_NAYAR_MEAN = 0.21396  # mean over both hemispheres of max(0, cos phi) sin alpha tan beta
 WHITE = np.ones(3)
-# What tests/scenes/test_scene_mitsuba_bsdfs.py measured: the largest error of the albedo, and the L1 of f cos as a
-# share of it, both seen from 0 to 75 degrees.
+# Measured by tests/scenes/test_scene_mitsuba_bsdfs.py, from 0 to 75 degrees: the largest error of the albedo, and the
+# L1 norm of the error of f cos as a share of the albedo.
 PLASTIC = "albedo within .03 of Mitsuba's (at 75 degrees .05), 4 to 13 % of its light elsewhere"
 PRINCIPLED = (
     "albedo within .02 of Mitsuba's (at 75 degrees .05), 1 to 9 % of its light elsewhere; no sheen, no flatness"
@@ -64,20 +66,19 @@ MEASURED = {
     "phong": "light within 2 % head-on; at 60 degrees 34 % elsewhere, as half vectors make highlights longer",
     "ward": "light within 3 %",
 }  # fmt: skip
-NOTHING = ("null",)  # surfaces that are not there
 
 
 def surface_of(plugin: Plugin) -> Surface:
-    """The surface a BSDF describes; one of an unknown kind is grey, or what is nested in it."""
+    """The surface a BSDF describes; one of an unknown kind is grey, or the BSDF nested in it."""
     known = plugin.reading.surfaces
     key = id(plugin.element)
     if key not in known:
         surface = KINDS.get(plugin.type, _unknown)(plugin)
-        if len(surface.glosses) > GLOSSES_MAX:
-            raise plugin.element.error("too many lobes", got=len(surface.glosses), expected=f"at most {GLOSSES_MAX}")
-        plugin.say_unread()
+        if len(surface.lobes) > LOBES_MAX:
+            raise plugin.element.error("too many lobes", got=len(surface.lobes), expected=f"at most {LOBES_MAX}")
+        plugin.note_unread()
         if plugin.type in MEASURED:
-            plugin.reading.say(f"{plugin.type}: {MEASURED[plugin.type]}")
+            plugin.reading.note(f"{plugin.type}: {MEASURED[plugin.type]}")
         known[key] = surface
     return known[key]
 
@@ -85,9 +86,9 @@ def surface_of(plugin: Plugin) -> Surface:
 def _unknown(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if plugin.type == "measured":
-        plugin.say("measured files in it are not read, it is grey: fit it and assign the fit")
+        plugin.note("measured files in it are not read, it is grey: fit it and assign the fit")
     else:
-        plugin.say(f"unknown, {'what is nested in it stands' if inner else 'it is grey'}")
+        plugin.note(f"unknown, {'what is nested in it stands' if inner else 'it is grey'}")
     return surface_of(inner[0]) if inner else grey()
 
 
@@ -96,8 +97,8 @@ def grey() -> Surface:
 
 
 def is_nothing(plugin: Plugin) -> bool:
-    """Whether a surface of this BSDF is not there at all."""
-    return plugin.type in NOTHING
+    """Whether a shape of this BSDF has no surface."""
+    return plugin.type == "null"
 
 
 def _diffuse(plugin: Plugin) -> Surface:
@@ -108,10 +109,10 @@ def _diffuse(plugin: Plugin) -> Surface:
 
 
 def _rough_diffuse(plugin: Plugin) -> Surface:
-    """Lambertian with the mean albedo of Oren and Nayar's (1994, eq. 30, without interreflections)."""
+    """Lambertian with the mean albedo of Oren and Nayar 1994 (eq. 30, without interreflections)."""
     variance = max(plugin.number("alpha", 0.2), 0.0) ** 2 / 2  # of the facets' angles
     if variance > 0:
-        plugin.say("is Lambertian here, of the mean albedo of Oren and Nayar's roughness")
+        plugin.note("is Lambertian here, of the mean albedo of Oren and Nayar's roughness")
     plugin.ignore("use_fast_approx")
     share = 1 - 0.5 * variance / (variance + 0.33) + 0.45 * variance / (variance + 0.09) * OREN_NAYAR_MEAN
     return Surface(kd=scaled(_diffuse(plugin).kd, share))
@@ -135,38 +136,23 @@ def _plastic(plugin: Plugin, rough: bool = True) -> Surface:
         albedo: Floats = through * rho / (1 - (rho if nonlinear else 1.0) * inside)
         return albedo
 
-    kd = combined(below, colour(plugin, "diffuse_reflectance", GREY), said=[])
+    kd = combined(below, colour(plugin, "diffuse_reflectance", GREY), notes=[])
     r0, rise = nearest_fresnel(fresnel(COS, eta))
     k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return Surface(kd=kd, coupled=True, glosses=(Gloss(m, k, np.full(3, r0), aspect, distribution=distribution),))
-
-
-def _smooth_plastic(plugin: Plugin) -> Surface:
-    return _plastic(plugin, rough=False)
+    return Surface(kd=kd, coupled=True, lobes=(SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution),))
 
 
 def _conductor(plugin: Plugin, rough: bool = False) -> Surface:
     distribution, m, aspect = _facets(plugin, rough)
     r0, rise = _metal(plugin)
     k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return Surface(glosses=(Gloss(m, k, r0, aspect, distribution=distribution),))
-
-
-def _rough_conductor(plugin: Plugin) -> Surface:
-    return _conductor(plugin, rough=True)
+    return Surface(lobes=(SpecularLobe(m, k, r0, aspect, distribution=distribution),))
 
 
 def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
     eta = _eta(plugin, "bk7")
-    if rough:
-        plugin.say("is a thin sheet here: light is spread, not bent")
-    else:
-        plugin.say("is a thin sheet here: light is not bent")
+    plugin.note(f"is a thin sheet here: light is {'spread, ' if rough else ''}not bent")
     return _sheet(plugin, fresnel(COS, eta), (eta - 1) / 2, rough)
-
-
-def _rough_dielectric(plugin: Plugin) -> Surface:
-    return _dielectric(plugin, rough=True)
 
 
 def _thin_dielectric(plugin: Plugin) -> Surface:
@@ -175,83 +161,83 @@ def _thin_dielectric(plugin: Plugin) -> Surface:
 
 
 def _sheet(plugin: Plugin, reflected: Floats, bend: float, rough: bool) -> Surface:
-    """A sheet of a reflectance (at `COS`); what passes is spread by `bend` times the facets' slopes."""
+    """A sheet of a reflectance (at `COS`); transmitted light is spread by `bend` times the facets' slopes."""
     distribution, m, aspect = _facets(plugin, rough)
     r0, rise = nearest_fresnel(reflected)
     drawn = rise * (r0 + (1 - r0) * (1 - COS) ** 5)
     share, falloff = nearest_passage(1 - np.maximum(reflected, drawn))  # both together never return more than arrives
     k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    back = Gloss(m, k, np.full(3, r0), aspect, distribution=distribution)
+    back = SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution)
     k = scaled(colour(plugin, "specular_transmittance", 1.0), share)
     spread = scaled(m, bend) if rough else m
     through = replace(back, m=spread, k=k, r0=BLACK, side="transmission", falloff=falloff)
-    return Surface(glosses=(back, through))
+    return Surface(lobes=(back, through))
 
 
 def _phong(plugin: Plugin) -> Surface:
-    """(n + 2)/(2 pi) cos^n about the mirror direction: as wide as Beckmann's of m^2 = 1/(2n), and as high."""
+    """(n + 2)/(2 pi) cos^n about the mirror direction: as wide and as high as Beckmann's lobe of m^2 = 1/(2n)."""
     exponent = number(plugin, "exponent", 30.0)
-    m = combined(lambda n: np.sqrt(0.5 / np.maximum(n, 0.5)), exponent, said=[])
+    m = combined(lambda n: np.sqrt(0.5 / np.maximum(n, 0.5)), exponent, notes=[])
     kd, ks = colour(plugin, "diffuse_reflectance", GREY), colour(plugin, "specular_reflectance", 0.2)
-    return Surface(kd=kd, glosses=(Gloss(m, ks, WHITE, distribution="beckmann", masked=False, falloff=1.0),))
+    return Surface(kd=kd, lobes=(SpecularLobe(m, ks, WHITE, distribution="beckmann", masked=False, falloff=1.0),))
 
 
 def _ward(plugin: Plugin) -> Surface:
-    """Ward's own form darkens as the cosine at grazing incidence, Duer's and the balanced one do not."""
+    """Ward's form falls off with the cosine at grazing incidence; Duer's and the balanced one do not."""
     variant = plugin.text("variant", "balanced").lower()
     kd, ks = colour(plugin, "diffuse_reflectance", GREY), colour(plugin, "specular_reflectance", 0.2)
     _, m, aspect = _roughness(plugin)
     falloff = 1.0 if variant == "ward" else 0.0
-    gloss = Gloss(m, ks, WHITE, aspect, distribution="beckmann", masked=False, falloff=falloff)
-    return Surface(kd=kd, glosses=(gloss,))
+    gloss = SpecularLobe(m, ks, WHITE, aspect, distribution="beckmann", masked=False, falloff=falloff)
+    return Surface(kd=kd, lobes=(gloss,))
 
 
 def _nested(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if len(inner) > 1:
-        plugin.say("only the first of its sides is read")
+        plugin.note("only the first of its sides is read")
     if not inner:
-        plugin.say("holds no BSDF, it is grey")
+        plugin.note("holds no BSDF, it is grey")
         return grey()
     return surface_of(inner[0])
 
 
 def _coating(plugin: Plugin) -> Surface:
-    """A clear coat; what it absorbs is not read."""
+    """A clear coat; its absorption is not read."""
     below = _nested(plugin)
     eta = _eta(plugin, "bk7")
     r0, rise = nearest_fresnel(fresnel(COS, eta))
     rough = plugin.type == "roughcoating"
     distribution, m, aspect = _facets(plugin, rough)
     k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return coated(below, Gloss(m, k, np.full(3, r0), aspect, distribution=distribution))
+    return coated(below, SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution))
 
 
 def _mask(plugin: Plugin) -> Surface:
     surface = _nested(plugin)
     held = opacity(plugin, "opacity")
-    if held.is_picture:
+    if held.is_texture:
         return replace(surface, opacity=absolute(held))
     share = float(np.clip(held.mean[0], 0, 1))
     if share < 1:
-        plugin.say("what shines through it loses .13 of itself at 75 degrees")
+        plugin.note("what shines through it loses .13 of itself at 75 degrees")
     return surface if share == 1 else seen_through(surface, np.full(3, share))
 
 
 def _normal_map(plugin: Plugin) -> Surface:
     surface = _nested(plugin)
     texture = plugin.texture("normalmap") or next(iter(plugin.objects("texture")), None)
-    read = raw_picture(texture) if texture is not None else None
+    read = raw_values(texture) if texture is not None else None
     if read is None:
-        plugin.say("its normal map cannot be read")
+        plugin.note("its normal map cannot be read")
         return surface
-    normals = Varying(read.values * 2 - 1, read.uv_transform)
+    normals = Textured(read.values * 2 - 1, read.uv_transform)
     # Mitsuba's v points down the picture; normal maps are drawn for a v that points up, in both.
     return replace(surface, normal=absolute(normals))
 
 
 def _bump_map(plugin: Plugin) -> Surface:
-    plugin.say("its bump map is not read")
+    plugin.note("its bump map is not read")
     plugin.ignore("scale", "")
     plugin.objects("texture")
     return _nested(plugin)
@@ -260,36 +246,30 @@ def _bump_map(plugin: Plugin) -> Surface:
 def _blend(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if len(inner) < 2:
-        plugin.say("holds fewer than two BSDFs")
+        plugin.note("holds fewer than two BSDFs")
         return _nested(plugin)
     weight = number(plugin, "weight", 0.5)
-    if weight.is_picture:
-        plugin.say("its weight is averaged over its picture")
+    if weight.is_texture:
+        plugin.note("its weight is averaged over its picture")
     share = float(np.clip(weight.mean[0], 0, 1))
-    said: list[str] = []
-    surface = blended([(surface_of(inner[0]), 1 - share), (surface_of(inner[1]), share)], said)
-    for text in dict.fromkeys(said):
-        plugin.say(text)
-    return surface
+    return _blended(plugin, [(surface_of(inner[0]), 1 - share), (surface_of(inner[1]), share)])
 
 
 def _mixture(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
-    weights = [float(w) for w in plugin.text("weights").replace(",", " ").split() if _is_share(w)]
+    words = plugin.text("weights").replace(",", " ").split()
+    weights = [float(word) for word in words if is_number(word) and 0 <= float(word) <= 1]
     if not inner or len(weights) != len(inner):
         raise plugin.element.error("weights do not fit its BSDFs", got=len(weights), expected=len(inner))
-    said: list[str] = []
-    surface = blended([(surface_of(p), w) for p, w in zip(inner, weights, strict=True)], said)
-    for text in dict.fromkeys(said):
-        plugin.say(text)
+    return _blended(plugin, [(surface_of(p), w) for p, w in zip(inner, weights, strict=True)])
+
+
+def _blended(plugin: Plugin, shares: list[tuple[Surface, float]]) -> Surface:
+    notes: list[str] = []
+    surface = blended(shares, notes)
+    for text in notes:
+        plugin.note(text)
     return surface
-
-
-def _is_share(word: str) -> bool:
-    try:
-        return 0 <= float(word) <= 1
-    except ValueError:
-        return False
 
 
 def _nothing(plugin: Plugin) -> Surface:
@@ -298,31 +278,31 @@ def _nothing(plugin: Plugin) -> Surface:
 
 KINDS: dict[str, Callable[[Plugin], Surface]] = {
     "diffuse": _diffuse, "roughdiffuse": _rough_diffuse, "difftrans": _diffuse_transmitter,
-    "plastic": _smooth_plastic, "roughplastic": _plastic, "pplastic": _plastic, "conductor": _conductor,
-    "roughconductor": _rough_conductor, "dielectric": _dielectric, "thindielectric": _thin_dielectric,
-    "roughdielectric": _rough_dielectric, "phong": _phong, "ward": _ward, "principled": principled,
-    "principledthin": principled_thin, "twosided": _nested, "coating": _coating, "roughcoating": _coating,
-    "mask": _mask, "normalmap": _normal_map, "bumpmap": _bump_map, "blendbsdf": _blend, "mixturebsdf": _mixture,
-    "null": _nothing,
+    "plastic": partial(_plastic, rough=False), "roughplastic": _plastic, "pplastic": _plastic, "conductor": _conductor,
+    "roughconductor": partial(_conductor, rough=True), "dielectric": _dielectric, "thindielectric": _thin_dielectric,
+    "roughdielectric": partial(_dielectric, rough=True), "phong": _phong, "ward": _ward, "principled": principled,
+    "principledthin": partial(principled, thin=True), "twosided": _nested, "coating": _coating,
+    "roughcoating": _coating, "mask": _mask, "normalmap": _normal_map, "bumpmap": _bump_map, "blendbsdf": _blend,
+    "mixturebsdf": _mixture, "null": _nothing,
 }  # fmt: skip
 
 
-def _smooth(plugin: Plugin) -> Varying:
-    plugin.reading.say(f"mirrors and clear glass have the roughness {ROUGHNESS_MIN}, the smallest there is")
+def _smooth(plugin: Plugin) -> Textured:
+    plugin.reading.note(f"mirrors and clear glass have the roughness {ROUGHNESS_MIN}, the smallest there is")
     return constant(ROUGHNESS_MIN)
 
 
-def _facets(plugin: Plugin, rough: bool) -> tuple[Distribution, Varying, float]:
+def _facets(plugin: Plugin, rough: bool) -> tuple[Distribution, Textured, float]:
     return _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
 
 
-def _roughness(plugin: Plugin) -> tuple[Distribution, Varying, float]:
-    """Distribution, roughness along t, and roughness across by that along."""
+def _roughness(plugin: Plugin) -> tuple[Distribution, Textured, float]:
+    """Distribution, roughness along t, and the ratio of that across t to it."""
     distribution = plugin.text("distribution", "beckmann").lower()
     if distribution not in ("beckmann", "ggx", "phong", "as"):
-        plugin.say(f"unknown distribution {distribution}: beckmann")
+        plugin.note(f"unknown distribution {distribution}: beckmann")
     if distribution in ("phong", "as"):
-        plugin.say(f"distribution {distribution} is Beckmann's here, of the same slopes")
+        plugin.note(f"distribution {distribution} is Beckmann's here, of the same slopes")
     m = number(plugin, "alpha_u" if plugin.has("alpha_u") else "alpha", 0.1)
     aspect = 1.0
     if plugin.has("alpha_v"):
@@ -332,7 +312,7 @@ def _roughness(plugin: Plugin) -> tuple[Distribution, Varying, float]:
 
 
 def _eta(plugin: Plugin, inside: str) -> float:
-    """Relative index of refraction; of one below 1, its inverse: sheets have no inside."""
+    """Relative index of refraction, inverted if below 1, because sheets have no inside."""
     eta = _index(plugin, "int_ior", inside) / _index(plugin, "ext_ior", "air")
     eta = max(eta, 1e-3)
     return eta if eta >= 1 else 1 / eta
@@ -369,7 +349,7 @@ def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
         return WHITE, WHITE
     known = {**METALS, **{f"{n}_palik": metal for n, metal in METALS.items()}}
     if name not in known:
-        plugin.say(f"unknown metal {name}, it is aluminium{_guess(name)}")
+        plugin.note(f"unknown metal {name}, it is aluminium{_guess(name)}")
         name = "Al"
     straight, grazing = (np.array(v) for v in known[name])
     return straight / grazing, grazing

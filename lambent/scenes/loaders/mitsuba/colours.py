@@ -1,13 +1,12 @@
 """Colours and spectra of Mitsuba's elements as linear RGB.
 
-A spectrum of wavelengths that is reflected is seen under D65; one that is emitted is what the eye makes of it, so that
-an even one is not white but of equal energy. Mitsuba 3 takes a single emitted number for such a spectrum, version 0.6
-for white.
+A reflected spectrum is seen under D65. An emitted one is converted as it is: a flat one is the equal-energy colour, not
+white. Mitsuba 3 takes a single emitted number for a flat spectrum, version 0.6 for white.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,19 +14,18 @@ from lambent.core.colour import XYZ_TO_RGB, srgb_decode
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.scenes.loaders.mitsuba.document import Element
+from lambent.scenes.loaders.mitsuba.document import Document, Element
 from lambent.scenes.loaders.mitsuba.numbers import floats_of
-from lambent.scenes.loaders.place import named
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
 LIMIT_BYTES = 1 << 20
 WAVELENGTHS_MAX = 4096
 
 
-def colour_of(element: Element, root: Path, *, emitted: bool = False, old: bool = False) -> Floats:
+def colour_of(element: Element, document: Document, *, emitted: bool = False) -> Floats:
     """Linear RGB (3,) of a float, rgb, srgb, spectrum or blackbody element; not negative.
 
-    Blackbodies are in W/(sr m^2 nm), weighed as by Mitsuba. Files lie below `root`; `old` is version 0.6.
+    Blackbodies are in W/(sr m^2 nm), weighted as by Mitsuba.
     """
     text = element.attributes.get("value", "").strip()
     if element.tag == "blackbody" or element.type == "blackbody":
@@ -35,7 +33,7 @@ def colour_of(element: Element, root: Path, *, emitted: bool = False, old: bool 
     if element.tag not in ("float", "rgb", "srgb", "spectrum", "integer", "color"):
         raise element.error("is no colour", expected="float, rgb, srgb or spectrum")
     if element.tag == "spectrum" and element.type:
-        return _plugin(element, root, emitted)
+        return _plugin(element, document, emitted)
     if text.startswith("#"):
         digits = text[1:]
         if len(digits) != 6 or any(c not in "0123456789abcdefABCDEF" for c in digits):
@@ -44,28 +42,28 @@ def colour_of(element: Element, root: Path, *, emitted: bool = False, old: bool 
     if ":" in text:
         return _spectrum(element, text, [pair.split(":") for pair in text.replace(",", " ").split()], emitted)
     if "filename" in element.attributes:
-        return _file(element, root, emitted)
+        return _file(element, document, emitted)
     values = floats_of(element)
     if len(values) not in (1, 3):
         raise element.error("wrong count of numbers", got=len(values), expected="1 or 3")
     rgb = np.maximum(np.array(values * 3 if len(values) == 1 else values), 0.0)
-    if emitted and not old and element.tag == "spectrum" and len(values) == 1:
+    if emitted and not document.is_old and element.tag == "spectrum" and len(values) == 1:
         rgb = rgb * XYZ_TO_RGB.sum(axis=1)
     return srgb_decode(rgb) if element.tag == "srgb" else rgb
 
 
-def _plugin(element: Element, root: Path, emitted: bool) -> Floats:
+def _plugin(element: Element, document: Document, emitted: bool) -> Floats:
     """A spectrum that is a plugin of version 3, its parameters below it."""
-    said = {child.name: child for child in element.children}
+    inner = {child.name: child for child in element.children}
 
     def number(name: str, default: float) -> float:
-        return floats_of(said[name], 1)[0] if name in said else default
+        return floats_of(inner[name], 1)[0] if name in inner else default
 
     def numbers(name: str) -> list[float]:
-        return floats_of(said[name]) if name in said else []
+        return floats_of(inner[name]) if name in inner else []
 
     if element.type in ("uniform", "d65"):
-        tint = colour_of(said["color"], root) if "color" in said else np.ones(3)
+        tint = colour_of(inner["color"], document) if "color" in inner else np.ones(3)
         return np.maximum(number("scale", 1) * number("value", 1) * tint, 0)
     if element.type == "irregular":
         nm, values = numbers("wavelengths"), numbers("values")
@@ -81,10 +79,10 @@ def _plugin(element: Element, root: Path, emitted: bool) -> Floats:
     return _spectrum(element, element.type, list(zip(nm, values, strict=True)), emitted)
 
 
-def _file(element: Element, root: Path, emitted: bool) -> Floats:
+def _file(element: Element, document: Document, emitted: bool) -> Floats:
     """A text file of a wavelength and a value a line."""
     written = element.attributes["filename"]
-    path = named(written, element.file, root, f"line {element.line} <{element.tag}> filename")
+    path = document.files.path(written, element.file, f"line {element.line} <{element.tag}> filename")
     if not path.is_file():
         raise element.error("file not found", got=written)
     lines = read_bytes(path, LIMIT_BYTES).decode("utf-8", "replace").splitlines()
@@ -95,7 +93,7 @@ def _file(element: Element, root: Path, emitted: bool) -> Floats:
         raise UserError(error.message, file=path, expected="a wavelength in nm and a value on each line") from error
 
 
-def _spectrum(element: Element, text: str, pairs: list, emitted: bool) -> Floats:  # type: ignore[type-arg]
+def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]], emitted: bool) -> Floats:
     from lambent.materials.measured.spectral import rgb_of_spectra
 
     try:
@@ -122,10 +120,10 @@ def _observer() -> tuple[Floats, Floats]:
 
 
 def _blackbody(element: Element) -> Floats:
-    said = {child.name: child.attributes.get("value", "") for child in element.children} | element.attributes
-    text = said.get("temperature", said.get("value", "")).strip().rstrip("kK")
+    values = {child.name: child.attributes.get("value", "") for child in element.children} | element.attributes
+    text = values.get("temperature", values.get("value", "")).strip().rstrip("kK")
     try:
-        kelvin, scale = float(text), float(said.get("scale", 1))
+        kelvin, scale = float(text), float(values.get("scale", 1))
     except ValueError as error:
         raise element.error("not a temperature", got=text) from error
     if not (100 <= kelvin <= 1e6 and 0 <= scale < 1e12):

@@ -1,7 +1,7 @@
-"""Mitsuba's XML as a tree: read by events, parameters put in, other files included, names of 0.6 turned into 3's.
+"""Mitsuba's XML as a tree: parameters filled in, other files included, names of version 0.6 turned into those of 3.
 
-The file is untrusted. A document type declaration is refused, and with it every entity of the file's own; elements,
-depth, included files and what parameters may grow to are limited. Files lie below the folder of the first.
+The file is untrusted. A document type declaration is refused, and with it every entity of the file's own; the number of
+elements, their depth, the included files and the length of parameters are limited.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.files import read_bytes
-from lambent.scenes.loaders.place import named
+from lambent.scenes.loaders.scene_files import SceneFiles
 
 LIMIT_BYTES = 256 << 20
 ELEMENTS_MAX, DEPTH_MAX, FILES_MAX, TEXT_MAX = 1_000_000, 64, 64, 1 << 20
@@ -53,18 +52,21 @@ class Element:
 
 @dataclass
 class Document:
-    """What a scene file holds, includes within it; `ids` are the elements by their id."""
+    """A scene file with its includes; `ids` are the elements by their id, `files` those it was read from."""
 
-    path: Path
-    root: Path
     version: str
     elements: list[Element]
     ids: dict[str, Element]
-    sources: list[Path]
+    files: SceneFiles
+
+    @property
+    def is_old(self) -> bool:
+        """Whether it is of version 0.6 or before."""
+        return self.version.startswith("0.")
 
 
 def snake(name: str) -> str:
-    """The name version 3 has for a parameter of version 0.6: toWorld -> to_world."""
+    """The name in version 3 of a parameter of version 0.6: toWorld -> to_world."""
     return _HUMP.sub("_", name).lower()
 
 
@@ -73,17 +75,17 @@ def is_scene(head: bytes) -> bool:
     return _SCENE.match(head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe")) is not None
 
 
-def load(path: Path, root: Path) -> Document:
+def read(path: Path, files: SceneFiles) -> Document:
     """The document of a file.
 
     Raises
     ------
     UserError
-        Where it is not XML, not a scene, names files that are not there, or parameters that nobody set.
+        Where it is not XML, not a scene, names files that are not there, or uses parameters that are not set.
     """
-    files = _Files(root)
-    scene = files.scene(path)
-    parameters = files.parameters
+    parser = _Parser(files)
+    scene = parser.scene(path)
+    parameters = parser.parameters
     ids: dict[str, Element] = {}
     stack = list(scene.children)
     while stack:
@@ -100,7 +102,7 @@ def load(path: Path, root: Path) -> Document:
             if wanted not in ids:
                 raise element.error("unknown id", got=wanted, hint=did_you_mean(wanted, ids))
             ids[new] = ids[wanted]
-    return Document(path, root, scene.attributes.get("version", ""), scene.children, ids, files.sources)
+    return Document(scene.attributes.get("version", ""), scene.children, ids, files)
 
 
 def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
@@ -122,23 +124,21 @@ def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
     return filled
 
 
-class _Files:
+class _Parser:
     """Reads a scene file and those it includes."""
 
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    def __init__(self, files: SceneFiles) -> None:
         self.parameters: dict[str, str] = {}
-        self.sources: list[Path] = []
-        self._elements = 0
+        self._files, self._count, self._elements = files, 0, 0
         self._open: list[Path] = []
 
     def scene(self, path: Path) -> Element:
         if path in self._open:
             raise UserError("includes itself", file=path)
-        if len(self.sources) >= FILES_MAX:
+        self._count += 1
+        if self._count > FILES_MAX:
             raise UserError("too many included files", file=path, expected=f"at most {FILES_MAX}")
         self._open.append(path)
-        self.sources.append(path)
         scene = self._parse(path)
         children: list[Element] = []
         for element in scene.children:
@@ -146,7 +146,7 @@ class _Files:
                 self.parameters.setdefault(element.attributes.get("name", ""), element.attributes.get("value", ""))
             elif element.tag == "include":
                 name = _filled(element.attributes.get("filename", ""), self.parameters, element)
-                children += self.scene(named(name, path, self.root, f"line {element.line} <include>")).children
+                children += self.scene(self._files.path(name, path, f"line {element.line} <include>")).children
             elif element.tag != "path":
                 children.append(element)
         scene.children = children
@@ -176,7 +176,7 @@ class _Files:
         parser.EndElementHandler = lambda _: stack.pop()
         parser.StartDoctypeDeclHandler = refuse
         try:
-            parser.Parse(read_bytes(path, LIMIT_BYTES), True)
+            parser.Parse(self._files.read(path, LIMIT_BYTES), True)
         except (expat.ExpatError, UnicodeError, ValueError) as error:
             raise UserError(f"not XML ({error})", file=path) from error
         if not top.children or top.children[0].tag != "scene":

@@ -8,10 +8,11 @@ import numpy as np
 
 from lambent.core.camera import Camera
 from lambent.core.directions import Floats, normalize
-from lambent.core.plain import triple
+from lambent.core.plain import Triple, triple
+from lambent.scenes.loaders.defaults import DAYLIGHT
 from lambent.scenes.loaders.mitsuba.textures import colour
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surface import rgb
+from lambent.scenes.loaders.surfaces.surface import rgb
 from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
@@ -20,13 +21,10 @@ from lambent.scenes.scene import (
     Light,
     PointLight,
     SunSky,
-    Triple,
 )
 
 ENVIRONMENTS = ("envmap", "constant", "sunsky", "sky", "sun")
 UPRIGHT = 0.9995  # cosine of a tilt that does not matter
-NOON: Triple = (0.4558, 0.7597, 0.4637)
-OLD_TO_DEGREES = 180 / math.pi
 
 
 def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
@@ -39,7 +37,7 @@ def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
         made = _picture(plugin, matrix)
     else:
         made = _daylight(plugin, world, matrix)
-    plugin.say_unread()
+    plugin.note_unread()
     return made
 
 
@@ -47,18 +45,17 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
     """Mitsuba's pictures have +y on top, as ours, and +z in the middle, where ours have -z."""
     path = plugin.file()
     if not path.is_file():
-        plugin.say(f"picture {plugin.text('filename')} is not there: left out")
+        plugin.note(f"picture {plugin.text('filename')} is not there: left out")
         return None
-    if path not in plugin.reading.sources:
-        plugin.reading.sources.append(path)
+    plugin.reading.files.use(path)
     axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
     if axes[1, 1] < UPRIGHT:
-        plugin.say("its picture is tilted: it stands upright here")
+        plugin.note("its picture is tilted: it stands upright here")
     if np.linalg.det(axes) < 0:
-        plugin.say("its picture is mirrored: it is not here")
+        plugin.note("its picture is mirrored: it is not here")
     gamma = plugin.number("gamma", 0.0)
     if gamma > 0:
-        plugin.say("its gamma is not read")
+        plugin.note("its gamma is not read")
     turned_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
     rotation_deg = turned_deg % 360 - 180
     return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4))
@@ -66,19 +63,18 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
 
 def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:
     """sunsky, sky or sun; in version 3 its own up is z, in 0.6 y."""
-    old = plugin.reading.document.version.startswith("0.")
-    up = normalize(matrix[:3, :3] @ ([0.0, 1.0, 0.0] if old else [0.0, 0.0, 1.0]))
+    up = normalize(matrix[:3, :3] @ ([0.0, 1.0, 0.0] if plugin.reading.document.is_old else [0.0, 0.0, 1.0]))
     if up[1] < UPRIGHT:
-        plugin.say("its sky is tilted: it stands upright here")
+        plugin.note("its sky is tilted: it stands upright here")
     given = plugin.vector("sun_direction")
     if given is not None and given.any():
         towards = normalize(world[:3, :3] @ given)
     else:
-        plugin.say("place and time are not read: the sun stands where Lambent's daylight has it")
+        plugin.note("place and time are not read: the sun stands where Lambent's daylight has it")
         plugin.ignore("latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second")
-        towards = np.array(NOON)
+        towards = np.array(DAYLIGHT.sun_direction)
     if towards[1] < 0:
-        plugin.say("its sun is below the horizon: it stands on it")
+        plugin.note("its sun is below the horizon: it stands on it")
         towards = normalize(np.array([towards[0] + 1e-9, 0.0, towards[2]]))
     scale = plugin.number("scale", 1.0)
     plugin.ignore("resolution", "sun_radius_scale", "stretch", "sun_aperture")
@@ -92,62 +88,61 @@ def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:
 
 
 def light_of(plugin: Plugin, world: Floats) -> Light | None:
-    """A light without extent; None, and a warning, where its kind is unknown."""
+    """A light without extent; None, and a warning, if its kind is unknown."""
     matrix = world @ plugin.transform()
-    scale = plugin.number("scale", 1.0)
-    made: Light | None = None
+    made: Light
     if plugin.type == "point":
         position = plugin.vector("position")
-        at = matrix[:3, 3] if position is None else _point(matrix, position)
-        made = PointLight(triple(at), rgb(scale * colour(plugin, "intensity", 1.0, emitted=True).mean))
+        at = matrix[:3, 3] if position is None else matrix[:3, :3] @ position + matrix[:3, 3]
+        made = PointLight(triple(at), _emitted(plugin, "intensity"))
     elif plugin.type == "spot":
         outer = min(max(plugin.number("cutoff_angle", 20.0), 0.01), 90.0)
         inner = min(max(plugin.number("beam_width", outer * 0.75), 0.0), outer)
         direction = triple(normalize(matrix[:3, 2]))
-        intensity = rgb(scale * colour(plugin, "intensity", 1.0, emitted=True).mean)
-        made = PointLight(triple(matrix[:3, 3]), intensity, direction, inner, outer)
+        made = PointLight(triple(matrix[:3, 3]), _emitted(plugin, "intensity"), direction, inner, outer)
     elif plugin.type == "directional":
         given = plugin.vector("direction")
-        way = matrix[:3, 2] if given is None else matrix[:3, :3] @ given
-        if not way.any():
+        direction_world = matrix[:3, 2] if given is None else matrix[:3, :3] @ given
+        if not direction_world.any():
             raise plugin.element.error("direction is zero")
-        made = DirectionalLight(
-            triple(normalize(way)), rgb(scale * colour(plugin, "irradiance", 1.0, emitted=True).mean)
-        )
+        made = DirectionalLight(triple(normalize(direction_world)), _emitted(plugin, "irradiance"))
     else:
-        plugin.say("left out, an emitter of an unknown kind")
+        plugin.note("left out, an emitter of an unknown kind")
         return None
-    plugin.say_unread()
+    plugin.note_unread()
     return made
 
 
 def emission_of(shape: Plugin) -> Triple:
     """Radiance of a shape's area emitter."""
-    emitters = shape.objects("emitter")
-    if not emitters:
+    plugin = next(iter(shape.objects("emitter")), None)
+    if plugin is not None and plugin.type != "area":
+        plugin.note("left out, only area emitters are read on shapes")
+    if plugin is None or plugin.type != "area":
         return 0.0, 0.0, 0.0
-    plugin = emitters[0]
-    if plugin.type != "area":
-        plugin.say("left out, only area emitters are read on shapes")
-        return 0.0, 0.0, 0.0
-    radiance = colour(plugin, "radiance", 1.0, emitted=True)
-    if radiance.is_picture:
-        plugin.say("its radiance is averaged over its picture")
-    scale = plugin.number("scale", 1.0)
-    plugin.say_unread()
-    return rgb(scale * radiance.mean)
+    radiance = _emitted(plugin, "radiance")
+    plugin.note_unread()
+    return radiance
+
+
+def _emitted(plugin: Plugin, name: str) -> Triple:
+    """Linear RGB of what an emitter emits, times its scale."""
+    value = colour(plugin, name, 1.0, emitted=True)
+    if value.is_texture:
+        plugin.note(f"its {name} is averaged over its picture")
+    return rgb(plugin.number("scale", 1.0) * value.mean)
 
 
 def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
-    """A perspective camera; None, and a warning, where it is of another kind."""
+    """A perspective camera; None, and a warning, if it is of another kind."""
     if plugin.type not in ("perspective", "thinlens"):
-        plugin.say("left out, only perspective cameras are read")
+        plugin.note("left out, only perspective cameras are read")
         return None
     if plugin.type == "thinlens":
-        plugin.say("its depth of field is not read")
+        plugin.note("its depth of field is not read")
         plugin.ignore("aperture_radius", "focus_distance")
     if plugin.has("principal_point_offset_x", "principal_point_offset_y"):
-        plugin.say("its principal point is in the middle here")
+        plugin.note("its principal point is in the middle here")
         plugin.ignore("principal_point_offset_x", "principal_point_offset_y")
     film = next(iter(plugin.objects("film")), None)
     width, height = (film.number(n, d) if film else d for n, d in (("width", 768.0), ("height", 576.0)))
@@ -155,17 +150,17 @@ def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
         raise plugin.element.error("film has no size", got=f"{width} x {height}")
     matrix = world @ plugin.transform()
     if np.linalg.det(matrix[:3, :3]) < 0:
-        plugin.say("its picture is mirrored: it is not here")
+        plugin.note("its picture is mirrored: it is not here")
     fov_y_deg = min(max(_fov_y_deg(plugin, width / height), 1.0), 150.0)
     plugin.objects("sampler")
     plugin.ignore("focus_distance")
-    plugin.say_unread()
+    plugin.note_unread()
     position, ahead, up = matrix[:3, 3], normalize(matrix[:3, 2]), normalize(matrix[:3, 1])
     return Camera(name, triple(position), triple(position + ahead), triple(up), fov_y_deg)
 
 
 def _fov_y_deg(plugin: Plugin, aspect: float) -> float:
-    """Full vertical field of view; Mitsuba's is horizontal where nothing is said."""
+    """Full vertical field of view; Mitsuba's is horizontal by default."""
     length = plugin.text("focal_length", "50mm")
     axis = plugin.text("fov_axis", "x").lower()
     if plugin.has("fov"):
@@ -190,8 +185,3 @@ def _fov_y_deg(plugin: Plugin, aspect: float) -> float:
     elif axis != "y":
         raise plugin.element.error("unknown fov_axis", got=axis, expected="x, y, diagonal, smaller or larger")
     return math.degrees(2 * math.atan(half))
-
-
-def _point(matrix: Floats, position: Floats) -> Floats:
-    moved: Floats = matrix[:3, :3] @ position + matrix[:3, 3]
-    return moved

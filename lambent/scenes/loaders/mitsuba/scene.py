@@ -1,92 +1,91 @@
 """A Mitsuba scene file, versions 0.6 and 3, as parts of a scene.
 
-What is read becomes objects, materials, textures, lights, cameras and an environment; whatever is not is dropped and
-said. A scene whose cameras stand upright along another axis than y is turned until they stand along y.
+Everything that is not read is dropped, with a warning. A scene whose cameras have another up axis than y is turned to
+have y up.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lambent.core.camera import Camera
-from lambent.core.directions import Floats, normalize
+from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import UserError
-from lambent.materials.document import Material
+from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.loaders.meshes.repair import check_triangles
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
-from lambent.scenes.loaders.mitsuba.document import load
+from lambent.scenes.loaders.mitsuba.document import read
 from lambent.scenes.loaders.mitsuba.numbers import floats_of
 from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
-from lambent.scenes.loaders.parts import Parts, unique_name
-from lambent.scenes.loaders.surface import finished
-from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject
+from lambent.scenes.loaders.scene_files import SceneFiles
+from lambent.scenes.loaders.surfaces.surface import MadeMaterials
+from lambent.scenes.scene import Environment, Light, SceneObject
 
-TRIANGLES_MAX = 20_000_000
 GROUPS = ("shapegroup", "instance", "merge")
 LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
 UNREAD = {"medium": "participating media are not read", "volume": "volumes are not read",
           "subsurface": "subsurface scattering is not read"}  # fmt: skip
 
 
-def read_mitsuba(path: Path, root: Path | None = None) -> Parts:
-    """Parts of a Mitsuba scene.
+def load(path: Path, root: Path | None = None) -> Contents:
+    """Contents of a Mitsuba scene; files it names lie below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where the file, or a mesh it names, cannot be used, or there is nothing to see.
+        Where the file, or a mesh it names, cannot be used, or it holds no triangles.
     """
-    root = path.resolve().parent if root is None else root
-    return _Scene(Reading(load(path, root)), path).parts()
+    return _Scene(Reading(read(path, SceneFiles(path, root))), path).contents()
 
 
 class _Scene:
-    """One scene on its way to parts."""
+    """One scene on its way to contents."""
 
     def __init__(self, reading: Reading, path: Path) -> None:
         self._reading, self._path = reading, path
-        self._world = np.eye(4)
+        self._world: Floats = np.eye(4)
         self._objects: list[SceneObject] = []
-        self._materials: dict[str, Material] = {}
-        self._textures: dict[str, MaterialTextures] = {}
         self._by_element: dict[int, str] = {}
         self._names: set[str] = set()
         self._material_names: set[str] = set()
         self._local: dict[int, Made] = {}
         self._triangles = 0
         self._warnings: list[str] = []
+        self._made = MadeMaterials(self._warnings)
 
-    def parts(self) -> Parts:
-        document = self._reading.document
-        sensors = list(children_of(document, self._reading, "sensor"))
+    def contents(self) -> Contents:
+        sensors = list(children_of(self._reading, "sensor"))
         self._world, turned = _upright(sensors)
         if turned:
             self._warnings.append(f"its cameras have {turned} up: the scene is turned to have y up")
-        for shape in children_of(document, self._reading, "shape"):
+        for shape in children_of(self._reading, "shape"):
             self._add_shape(shape, self._world)
         if not self._objects:
-            raise UserError("holds no triangles", file=self._path, hint="; ".join(self._said()) or None)
+            raise UserError("holds no triangles", file=self._path, hint="; ".join(self._notes()) or None)
         environment, point_lights = self._lights()
         cameras = self._cameras(sensors)
         self._say_the_rest()
-        return Parts(
+        return Contents(
             tuple(self._objects),
-            self._materials,
+            self._made.materials,
             tuple(point_lights),
             tuple(cameras),
-            tuple(self._reading.sources),
-            tuple(self._said()),
-            self._textures,
+            tuple(self._reading.files.sources),
+            tuple(self._notes()),
+            self._made.textures,
             environment,
             tells_its_light=True,
         )
 
-    def _said(self) -> list[str]:
-        return self._warnings + self._reading.said + self._reading.pictures.said
+    def _notes(self) -> list[str]:
+        return self._warnings + self._reading.notes + self._reading.images.notes
 
     def _add_shape(self, shape: Plugin, world: Floats) -> None:
         if shape.type == "instance":
@@ -102,21 +101,19 @@ class _Scene:
         bsdf = next(iter(shape.objects("bsdf")), None)
         for what, words in UNREAD.items():
             if shape.objects(what):
-                self._reading.say(words)
+                self._reading.note(words)
         if bsdf is not None and is_nothing(bsdf) and not any(emission):
-            shape.say("left out, it has no surface (null)")
+            shape.note("left out, it has no surface (null)")
             return
         wanted = stem_of(shape)
-        mesh, said = mesh_of_shape(shape, wanted, world, self._local)
-        self._warnings += said
+        mesh, notes = mesh_of_shape(shape, wanted, world, self._local)
+        self._warnings += notes
         if mesh is None:
             return
         shape.objects("sensor")
-        shape.say_unread(but=("max_smooth_angle", "name", "id"))
+        shape.note_unread(but=("max_smooth_angle", "name", "id"))
         self._triangles += len(mesh.faces)
-        if self._triangles > TRIANGLES_MAX:
-            got, most = f"{self._triangles} triangles", f"at most {TRIANGLES_MAX}"
-            raise UserError("scene is too large", file=self._path, got=got, expected=most)
+        check_triangles(self._triangles, self._path)
         material = self._material(bsdf, wanted)
         self._objects.append(SceneObject(unique_name(wanted, self._names), mesh, material, emission))
 
@@ -125,37 +122,31 @@ class _Scene:
         placed = world @ shape.transform()
         for group in shape.objects("shape"):
             if group.type != "shapegroup":
-                shape.say("its shape is not a shapegroup")
+                shape.note("its shape is not a shapegroup")
             for inner in group.objects("shape", refs=False):
                 if inner.type in GROUPS:
                     raise inner.element.error("groups within groups are not read")
                 self._add_shape(inner, placed)
-        shape.say_unread()
+        shape.note_unread()
 
     def _material(self, bsdf: Plugin | None, shape: str) -> str:
-        """The name of a BSDF's material, made when it is first met."""
+        """The name of a BSDF's material, made when it is first used."""
         key = id(bsdf.element) if bsdf is not None else 0
         if key not in self._by_element:
             wanted = "default" if bsdf is None else bsdf.element.id or f"{shape}_{bsdf.type}"
-            name = unique_name(wanted, self._material_names)
-            said: list[str] = []
-            surface = grey() if bsdf is None else surface_of(bsdf)
-            self._materials[name], textures = finished(name, surface, said)
-            if textures is not None:
-                self._textures[name] = textures
-            self._warnings += [f"material {name}: {text}" for text in dict.fromkeys(said)]
-            self._by_element[key] = name
+            name = self._by_element[key] = unique_name(wanted, self._material_names)
+            self._made.make(name, lambda _: grey() if bsdf is None else surface_of(bsdf))
         return self._by_element[key]
 
     def _lights(self) -> tuple[Environment | None, list[Light]]:
         environment: Environment | None = None
         found: list[Light] = []
-        for plugin in children_of(self._reading.document, self._reading, "emitter"):
+        for plugin in children_of(self._reading, "emitter"):
             if plugin.type not in lights.ENVIRONMENTS:
                 light = lights.light_of(plugin, self._world)
                 found += [light] if light is not None else []
             elif environment is not None:
-                plugin.say("left out, a scene has one environment")
+                plugin.note("left out, a scene has one environment")
             else:
                 environment = lights.environment_of(plugin, self._world)
         return environment, found
@@ -166,49 +157,43 @@ class _Scene:
         for plugin in sensors:
             camera = lights.camera_of(plugin, plugin.element.id or "camera", self._world)
             if camera is not None:
-                cameras.append(Camera(unique_name(camera.name, names), *_fields(camera)))
+                cameras.append(replace(camera, name=unique_name(camera.name, names)))
         return cameras
 
     def _say_the_rest(self) -> None:
-        """What stands at the top of the file and nobody looked at."""
+        """Note what stands at the top of the file and is not read."""
         kinds = Counter(e.tag for e in self._reading.document.elements)
         for tag, words in UNREAD.items():
             if kinds[tag]:
-                self._reading.say(words)
+                self._reading.note(words)
         known = {"shape", "sensor", "emitter", "bsdf", "texture", "integrator", "sampler", "film", "rfilter", "alias"}
         left = [tag for tag in kinds if tag not in known | set(UNREAD)]
         if left:
-            self._reading.say(f"not read: {', '.join(f'<{tag}>' for tag in left)}")
+            self._reading.note(f"not read: {', '.join(f'<{tag}>' for tag in left)}")
         integrators = [e.type for e in self._reading.document.elements if e.tag == "integrator"]
         if integrators:
-            self._reading.say(f"its integrator ({integrators[0]}) is not read: Lambent has its own")
-
-
-def _fields(camera: Camera) -> tuple:  # type: ignore[type-arg]
-    return camera.position, camera.target, camera.up, camera.fov_y_deg
+            self._reading.note(f"its integrator ({integrators[0]}) is not read: Lambent has its own")
 
 
 def _upright(sensors: list[Plugin]) -> tuple[Floats, str | None]:
-    """Rotation (4, 4) that turns the axis along which most cameras stand to +y, and that axis where it is another."""
+    """Rotation (4, 4) that turns the up axis of most cameras to +y, and the name of that axis if it is another."""
     votes = Counter(axis for axis in map(_up_axis, sensors) if axis is not None)
     if not votes:
         return np.eye(4), None
     index, sign = votes.most_common(1)[0][0]
     if (index, sign) == (1, 1):
         return np.eye(4), None
-    up = np.eye(3)[index] * sign
     world = np.eye(4)
     if index == 1:
         world[:3, :3] = np.diag([1.0, -1.0, -1.0])
-    else:  # the shortest turn from `up` to y, about up x y
-        axis = np.cross(up, [0.0, 1.0, 0.0])
-        cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-        world[:3, :3] = np.eye(3) + cross + cross @ cross
+    else:  # the shortest turn to y, by a right angle about up x y; rounded to exact numbers without -0
+        axis = np.cross(np.eye(3)[index] * sign, [0.0, 1.0, 0.0])
+        world[:3, :3] = np.round(rotation_about(axis, math.pi / 2)) + 0.0
     return world, f"{'-' if sign < 0 else ''}{'xyz'[index]}"
 
 
 def _up_axis(sensor: Plugin) -> tuple[int, int] | None:
-    """The signed world axis along which a camera stands upright; None where that cannot be said."""
+    """The signed world axis that is up for a camera; None if its transform does not tell."""
     element = sensor.transform_element("to_world")
     if element is None:
         return None

@@ -13,17 +13,18 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.scenes.loaders.polygons import Arrays
+from lambent.scenes.loaders.meshes.repair import TRIANGLES_MAX, MeshArrays
 
 LIMIT_BYTES = 2 << 30
 MAGIC = 0x041C
-NORMALS, UV, COLOURS, SINGLE, DOUBLE = 0x0001, 0x0002, 0x0008, 0x1000, 0x2000
-VERTICES_MAX, TRIANGLES_MAX = 60_000_000, 20_000_000
-NAME_MAX = 1 << 16
+DOUBLE = 0x2000
+OPTIONAL = ((0x0001, "normals", 3), (0x0002, "uv", 2), (0x0008, "colours", 3))
+VERTICES_MAX = 60_000_000
+HEAD_BYTES = 1 << 16  # of a mesh: its flags, name and counts lie in them
 
 
-def read(path: Path, index: int) -> Arrays:
-    """The mesh of a number in a file.
+def read(path: Path, index: int) -> MeshArrays:
+    """The mesh number `index` of a file.
 
     Raises
     ------
@@ -32,34 +33,38 @@ def read(path: Path, index: int) -> Arrays:
     """
     data = read_bytes(path, LIMIT_BYTES)
     start, version = _offset(data, index, path)
-    stream = _Stream(data, start + 4, path)
-    flags = struct.unpack("<I", stream.take(4))[0]
-    if version == 4:
-        for _ in range(NAME_MAX):
-            if stream.take(1) == b"\0":
-                break
-        else:
-            raise UserError("name does not end", file=path)
-    vertices, triangles = struct.unpack("<QQ", stream.take(16))
+    inflate = zlib.decompressobj()
+
+    def unpacked(packed: bytes | memoryview, limit_bytes: int) -> bytes:
+        try:
+            return inflate.decompress(packed, limit_bytes)
+        except zlib.error as error:
+            raise UserError(f"packed data is damaged ({error})", file=path) from error
+
+    head = unpacked(memoryview(data)[start + 4 :], HEAD_BYTES)
+    begin = 4 if version == 3 else head.find(b"\0", 4) + 1  # after the name, which version 4 has
+    if not 4 <= begin <= len(head) - 16:
+        raise UserError("mesh is cut off, or its name does not end", file=path, got=f"{len(head)} bytes")
+    flags, (vertices, triangles) = struct.unpack_from("<I", head)[0], struct.unpack_from("<QQ", head, begin)
     if vertices > VERTICES_MAX or triangles > TRIANGLES_MAX:
         got, most = f"{vertices} vertices, {triangles} triangles", f"at most {VERTICES_MAX} and {TRIANGLES_MAX}"
         raise UserError("mesh is too large", file=path, got=got, expected=most)
-    kind = np.dtype("<f8" if flags & DOUBLE else "<f4")
-
-    def array(count: int, width: int, dtype: np.dtype) -> np.ndarray:  # type: ignore[type-arg]
-        return np.frombuffer(stream.take(count * width * dtype.itemsize), dtype).reshape(count, width)
-
-    positions = array(vertices, 3, kind).astype(float)
-    normals = array(vertices, 3, kind).astype(float) if flags & NORMALS else None
-    uv = array(vertices, 2, kind).astype(float) if flags & UV else None
-    if flags & COLOURS:
-        stream.take(vertices * 3 * kind.itemsize)
-    index_kind = np.dtype("<u8" if vertices > 0xFFFFFFFF else "<u4")
-    return Arrays(positions, normals, uv, array(triangles, 3, index_kind).astype(np.int64))
+    real = np.dtype("<f8" if flags & DOUBLE else "<f4")
+    widths = {"positions": 3, **{name: width for bit, name, width in OPTIONAL if flags & bit}}
+    size = 12 * triangles + vertices * real.itemsize * sum(widths.values())
+    body = head[begin + 16 :] + unpacked(inflate.unconsumed_tail, max(size - len(head) + begin + 16, 1))
+    if len(body) < size:
+        raise UserError("mesh is cut off", file=path, got=f"{len(body)} bytes", expected=size)
+    arrays, at = {}, 0
+    for name, width in widths.items():
+        values = np.frombuffer(body, real, vertices * width, at)
+        arrays[name], at = values.reshape(vertices, width).astype(float), at + values.nbytes
+    faces = np.frombuffer(body, "<u4", triangles * 3, at).reshape(triangles, 3)
+    return MeshArrays(arrays["positions"], faces.astype(np.int64), arrays.get("normals"), arrays.get("uv"))
 
 
 def _offset(data: bytes, index: int, path: Path) -> tuple[int, int]:
-    """Where a mesh begins, and the file's version."""
+    """First byte of a mesh, and the file's version."""
     if len(data) < 8 or struct.unpack_from("<H", data)[0] != MAGIC:
         raise UserError("not a serialized mesh", file=path, got=repr(data[:2]))
     version = struct.unpack_from("<H", data, 2)[0]
@@ -74,28 +79,3 @@ def _offset(data: bytes, index: int, path: Path) -> tuple[int, int]:
     if start + 4 > len(data) or struct.unpack_from("<H", data, start)[0] != MAGIC:
         raise UserError("dictionary is damaged", file=path, field="shape_index", got=index)
     return start, version
-
-
-class _Stream:
-    """Deflated data, unpacked no further than it is asked for."""
-
-    def __init__(self, data: bytes, start: int, path: Path) -> None:
-        self._packed: bytes | memoryview = memoryview(data)[start:]
-        self._inflate, self._path = zlib.decompressobj(), path
-        self._ready = b""
-
-    def take(self, count: int) -> bytes:
-        parts, have = [self._ready], len(self._ready)
-        while have < count:
-            try:
-                piece = self._inflate.decompress(self._packed, max(count - have, 4096))
-            except zlib.error as error:
-                raise UserError(f"packed data is damaged ({error})", file=self._path) from error
-            self._packed = self._inflate.unconsumed_tail
-            if not piece:
-                raise UserError("mesh is cut off", file=self._path, got=f"{have} bytes", expected=count)
-            parts.append(piece)
-            have += len(piece)
-        whole = b"".join(parts)
-        self._ready = whole[count:]
-        return whole[:count]

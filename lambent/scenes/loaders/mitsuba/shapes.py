@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.directions import Floats, basis, normalize
-from lambent.core.files import read_bytes
 from lambent.scenes.geometry import grid, merge, transformed
-from lambent.scenes.loaders import obj, obj_text, ply
+from lambent.scenes.loaders import ply
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.mitsuba import serialized
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.polygons import Ints, smooth_normals
-from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.loaders.obj import objects as obj
+from lambent.scenes.loaders.obj import text as obj_text
 from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 80, 40  # quads of a sphere
@@ -24,7 +24,7 @@ Made = tuple[Mesh | None, list[str], bool]  # the mesh, what was repaired, wheth
 
 
 def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Made]) -> tuple[Mesh | None, list[str]]:
-    """Mesh of a shape under `world` (4, 4) and what was repaired; None where nothing is left.
+    """Mesh of a shape under `world` (4, 4) and what was repaired; None if nothing is left.
 
     `known` remembers the shapes of instances before they are moved.
     """
@@ -34,19 +34,19 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
     to_world = world @ plugin.transform()
     key = id(plugin.element)
     if key in known:
-        local, said, from_faces = known[key]
+        local, notes, from_faces = known[key]
         plugin.ignore("center", "radius", "p0", "p1", "filename", "shape_index", "face_normals", "flip_tex_coords")
-        said = []
+        notes = []
     else:
-        local, said, from_faces = known[key] = make(plugin, name)
+        local, notes, from_faces = known[key] = make(plugin, name)
     if local is None:
-        return None, said
+        return None, notes
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
-        return None, [*said, f"{name}: left out, its transform is flat"]
+        return None, [*notes, f"{name}: left out, its transform is flat"]
     mesh = transformed(local, to_world)
     # Mitsuba makes missing normals of faces that a mirroring transform has turned; given ones are moved as ours are.
     turned = from_faces and np.linalg.det(to_world[:3, :3]) < 0
-    return (flipped(mesh) if plugin.flag("flip_normals", False) != turned else mesh), said
+    return (flipped(mesh) if plugin.flag("flip_normals", False) != turned else mesh), notes
 
 
 def flipped(mesh: Mesh) -> Mesh:
@@ -62,45 +62,36 @@ def stem_of(plugin: Plugin) -> str:
 
 def _obj(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
-    text = obj_text.parse(read_bytes(path, obj.LIMIT_BYTES), path)
+    text = obj_text.read(path)
     if not plugin.flag("flip_tex_coords", True):
         text = replace(text, vt=_turned(text.vt))
     faceted = plugin.flag("face_normals", False)
     plugin.ignore("collapse", "load_materials", "shape_index")
     triangles = obj.triangles_of(text, path)
-    mesh, said = obj.mesh_of_triangles(text, triangles, name, path, faceted=faceted)
-    return mesh, said, faceted or not len(text.vn)
+    mesh, notes = obj.mesh_of_triangles(text, triangles, name, path, faceted=faceted)
+    return mesh, notes, faceted or not len(text.vn)
 
 
 def _ply(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
-    arrays = ply.read(path)
     plugin.ignore("srgb")
-    return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
+    return _from_arrays(plugin, name, path, ply.read(path))
 
 
 def _serialized(plugin: Plugin, name: str) -> Made:
     path = _file(plugin)
-    arrays = serialized.read(path, int(plugin.number("shape_index", 0)))
-    return _from_arrays(plugin, name, path, arrays.positions, arrays.normals, arrays.uv, arrays.triangles)
+    return _from_arrays(plugin, name, path, serialized.read(path, int(plugin.number("shape_index", 0))))
 
 
-def _from_arrays(
-    plugin: Plugin, name: str, path: Path, positions: Floats, normals: Floats | None, uv: Floats | None, faces: Ints
-) -> Made:
-    """A mesh whose v points down, unless flip_tex_coords says that it does not."""
-    if uv is not None and not plugin.flag("flip_tex_coords", False):
-        uv = _turned(uv)
+def _from_arrays(plugin: Plugin, name: str, path: Path, arrays: MeshArrays) -> Made:
+    """A mesh whose v points down, unless flip_tex_coords is set."""
+    if arrays.uv is not None and not plugin.flag("flip_tex_coords", False):
+        arrays = replace(arrays, uv=_turned(arrays.uv))
     plugin.ignore("flip_tex_coords")
-    from_faces = normals is None or plugin.flag("face_normals", False)
-    if plugin.flag("face_normals", False):
-        normals = None
-    elif normals is None and len(faces) and int(faces.max()) < len(positions):
-        normals = np.zeros_like(positions)
-        made = smooth_normals(positions, faces, faces)
-        normals[: len(made)] = made
-    mesh, said = mesh_of(positions, faces, normals, uv, None, name=name, file=path)
-    return mesh, said, from_faces
+    faceted = plugin.flag("face_normals", False)
+    from_faces = arrays.normals is None or faceted
+    mesh, notes = mesh_of(replace(arrays, normals=None) if faceted else arrays.smooth(), name=name, file=path)
+    return mesh, notes, from_faces
 
 
 def _turned(uv: Floats) -> Floats:
@@ -111,13 +102,7 @@ def _file(plugin: Plugin) -> Path:
     path = plugin.file()
     if not path.is_file():
         raise plugin.element.error("file not found", got=plugin.text("filename"))
-    return _remembered(plugin, path)
-
-
-def _remembered(plugin: Plugin, path: Path) -> Path:
-    if path not in plugin.reading.sources:
-        plugin.reading.sources.append(path)
-    return path
+    return plugin.reading.files.use(path)
 
 
 def _rectangle(plugin: Plugin, name: str) -> Made:

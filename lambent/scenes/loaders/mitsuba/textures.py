@@ -1,25 +1,23 @@
-"""Mitsuba's textures as quantities that vary over the surface.
-
-Its v counts from the top of a picture, ours from the bottom: layouts are turned over on both sides.
-"""
+"""Mitsuba's textures."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from lambent.core.directions import Floats
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.place import found
-from lambent.scenes.loaders.varying import UvTransform, Varying, combined, constant
+from lambent.scenes.loaders.surfaces.texture_images import TextureImage
+from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, flipped_uv
+from lambent.scenes.scene import UvTransform
 
 CHECKS = 128  # texels along a checkerboard of 2 x 2 fields
 GREY = 0.5
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)
-_TURNED = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
-# What an exporter leaves of a picture's name that says it holds numbers, not colours, is `raw`; 0.6 says gamma = 1.
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for parity with it
 
 
-def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool = False) -> Varying:
+def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool = False) -> Textured:
     """Linear RGB of a plugin's parameter, which may be of light that is `emitted`."""
     fixed = plugin.constant(name, emitted=emitted)
     if fixed is not None:
@@ -30,27 +28,27 @@ def colour(plugin: Plugin, name: str, default: float | Floats, *, emitted: bool 
     return of_texture(texture)
 
 
-def number(plugin: Plugin, name: str, default: float) -> Varying:
-    """One channel of a plugin's parameter: of a texture its luminance."""
+def number(plugin: Plugin, name: str, default: float) -> Textured:
+    """A plugin's parameter as one channel, of a texture the luminance."""
     v = colour(plugin, name, default)
-    if not v.is_picture:
+    if not v.is_texture:
         return constant(float(v.values.mean()))
-    return Varying((v.values @ LUMINANCE)[..., None], v.uv_transform)
+    return Textured((v.values @ LUMINANCE)[..., None], v.uv_transform)
 
 
-def opacity(plugin: Plugin, name: str) -> Varying:
-    """As `number`; of a picture with an alpha channel that is meant."""
+def opacity(plugin: Plugin, name: str) -> Textured:
+    """As `number`; of an image with an alpha channel, that channel."""
     texture = plugin.texture(name)
     if texture is not None and texture.type == "bitmap":
-        read = _picture(texture)
-        if read is not None and read[0].alpha:
+        image = _image(texture)
+        if image is not None and image.alpha:
             texture.ignore("gamma", "raw")
-            plugin.say("its mask is the picture's alpha channel")
-            return Varying(read[0].opacity(), read[1])
+            plugin.note("its mask is the picture's alpha channel")
+            return image.opacity()
     return number(plugin, name, GREY)
 
 
-def of_texture(texture: Plugin) -> Varying:
+def of_texture(texture: Plugin) -> Textured:
     """Linear RGB of a texture."""
     if texture.type == "bitmap":
         v = _bitmap(texture)
@@ -60,78 +58,66 @@ def of_texture(texture: Plugin) -> Varying:
         inner = next(iter(texture.objects("texture")), None)
         factor = texture.constant("scale")
         base = of_texture(inner) if inner is not None else constant(np.full(3, GREY))
-        v = combined(lambda a, b: a * b, base, constant(np.ones(3) if factor is None else factor), said=[])
+        v = combined(lambda a, b: a * b, base, constant(np.ones(3) if factor is None else factor), notes=[])
     elif texture.type in ("rgb", "srgb", "uniform", "d65", "rawconstant", "constant"):
         v = colour(texture, "color" if texture.has("color") else "value", GREY)
     else:
-        texture.say("unknown texture, it is grey")
+        texture.note("unknown texture, it is grey")
         return constant(np.full(3, GREY))
-    texture.say_unread()
+    texture.note_unread()
     return v
 
 
-def raw_picture(texture: Plugin) -> Varying | None:
-    """Values of a bitmap as they stand, (H, W, 3), for normal maps."""
-    read = _picture(texture)
-    if read is None:
+def raw_values(texture: Plugin) -> Textured | None:
+    """Values of a bitmap as stored, 3 channels, for normal maps."""
+    image = _image(texture)
+    if image is None:
         return None
     texture.ignore("gamma", "raw", "wrap_mode", "wrap_mode_u", "wrap_mode_v")
-    return Varying(read[0].rgb(srgb=False), read[1])
+    return image.rgb(srgb=False)
 
 
-def _bitmap(texture: Plugin) -> Varying:
-    read = _picture(texture)
-    if read is None:
+def _bitmap(texture: Plugin) -> Textured:
+    image = _image(texture)
+    if image is None:
         return constant(np.full(3, GREY))
-    picture, layout = read
     gamma = texture.number("gamma", 0.0)
     raw = texture.flag("raw", False) or gamma == 1
-    texels = picture.rgb(srgb=not raw and gamma <= 0)
-    if not raw and gamma > 0 and picture.texels.dtype == np.uint8:
+    texels = image.rgb(srgb=not raw and gamma <= 0).values
+    if not raw and gamma > 0 and image.texels.dtype == np.uint8:
         texels = texels ** np.float32(gamma)
     for side in ("wrap_mode", "wrap_mode_u", "wrap_mode_v"):
         mode = texture.text(side, "repeat").lower()
         if mode != "repeat":
-            texture.say(f"its picture is repeated beyond its edges, not {mode}")
+            texture.note(f"its picture is repeated beyond its edges, not {mode}")
     channel = texture.text("channel").lower()
     if channel in ("r", "g", "b"):
         texels = np.repeat(texels[..., ["r", "g", "b"].index(channel), None], 3, axis=-1)
     elif channel == "a":
-        texels = np.repeat(picture.opacity(), 3, axis=-1)
-    return Varying(texels, layout)
+        texels = np.repeat(image.opacity().values, 3, axis=-1)
+    return Textured(texels, image.uv_transform)
 
 
-def _picture(texture: Plugin):  # type: ignore[no-untyped-def]
-    """The picture of a bitmap and its layout; None where the file is not there, which is said."""
-    reading = texture.reading
-    name = texture.text("filename")
-    layout = _layout(texture)
-    path, moved = found(name, texture.element.file, reading.document.root, f"line {texture.element.line} filename")
-    if not path.is_file():
-        texture.say(f"picture {name} is not there: it is grey")
-        return None
-    if moved:
-        texture.say(f"picture {name} was found beside {texture.element.file.name}")
-    if path not in reading.sources:
-        reading.sources.append(path)
-    return reading.pictures.of_file(path), layout
+def _image(texture: Plugin) -> TextureImage | None:
+    """The image of a bitmap; None, and a note, if its file is not there."""
+    name, uv_transform, element = texture.text("filename"), _uv_transform(texture), texture.element
+    field = f"line {element.line} filename"
+    image = texture.reading.images.named(name, element.file, field, texture.note, ": it is grey")
+    return None if image is None else replace(image, uv_transform=uv_transform)
 
 
-def _layout(texture: Plugin) -> UvTransform:
-    """Our uv transform of Mitsuba's to_uv (3), or of its scales and offsets (0.6)."""
+def _uv_transform(texture: Plugin) -> UvTransform:
+    """Our uv transform of Mitsuba's to_uv (version 3), or of its scales and offsets (0.6)."""
     theirs = np.eye(3)
     matrix = texture.transform("to_uv")
     theirs[:2, :2], theirs[:2, 2] = matrix[:2, :2], matrix[:2, 3]
     both = texture.number("uvscale", 1.0)
-    scale = [texture.number(f"{c}scale", both) for c in "uv"]
-    old = np.diag([*scale, 1.0])
+    old = np.diag([*(texture.number(f"{c}scale", both) for c in "uv"), 1.0])
     old[:2, 2] = [texture.number(f"{c}offset", 0.0) for c in "uv"]
-    m = _TURNED @ old @ theirs @ _TURNED
-    (a, b, c), (d, e, f) = m[:2].tolist()
-    return (a, b, c), (d, e, f)
+    return flipped_uv(old @ theirs)
 
 
-def _checkerboard(texture: Plugin) -> Varying:
+def _checkerboard(texture: Plugin) -> Textured:
     dark, light = (
         colour(texture, name if texture.has(name) else other, default).mean
         for name, other, default in (("color0", "color_0", 0.4), ("color1", "color_1", 0.2))
@@ -139,4 +125,4 @@ def _checkerboard(texture: Plugin) -> Varying:
     second = np.arange(CHECKS) >= CHECKS // 2
     differs = second[:, None] != second[None, :]
     texels = np.where(differs[..., None], light, dark).astype(np.float32)
-    return Varying(texels, _layout(texture))
+    return Textured(texels, _uv_transform(texture))

@@ -1,4 +1,4 @@
-"""Values of a plugin's parameters: numbers, names, colours, transforms. What nobody asked for can be listed."""
+"""Values of a plugin's parameters: numbers, names, colours, transforms. Parameters that nothing reads are noted."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats, normalize
+from lambent.core.camera import Camera, camera_axes
+from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import did_you_mean
+from lambent.core.plain import triple
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 from lambent.scenes.loaders.mitsuba.numbers import floats_of, triple_of
-from lambent.scenes.loaders.pictures import Pictures
-from lambent.scenes.loaders.place import named
-from lambent.scenes.loaders.surface import Surface
+from lambent.scenes.loaders.surfaces.surface import Surface
+from lambent.scenes.loaders.surfaces.texture_images import TextureImages
 
 OBJECTS = {
     "bsdf", "texture", "shape", "emitter", "sensor", "film", "sampler", "rfilter", "medium", "phase", "volume",
@@ -24,7 +25,7 @@ OBJECTS = {
 PLUGINS_MAX = 400_000
 NESTING_MAX = 32
 FAR = 1e9
-# Filters, caches, samplers: how Mitsuba works, not what the scene is.
+# Filters, caches, samplers: settings of Mitsuba that do not describe the scene.
 MACHINERY = {
     "filter_type", "max_anisotropy", "cache", "sample_visible", "format", "accel", "sampling_weight", "variant",
     "component_format", "shutter_open", "shutter_close", "near_clip", "far_clip",
@@ -32,18 +33,17 @@ MACHINERY = {
 
 
 class Reading:
-    """What is common to one scene file's reading: its document, pictures, and what has to be said."""
+    """The state of one scene file's reading: its document and files, its images, and notes for the user."""
 
     def __init__(self, document: Document) -> None:
-        self.document, self.pictures = document, Pictures()
-        self.said: list[str] = []
-        self.surfaces: dict[int, Surface] = {}  # by BSDF element: one that is referred to often is read once
-        self.sources = list(document.sources)
+        self.document, self.files, self.images = document, document.files, TextureImages(document.files)
+        self.notes: list[str] = []
+        self.surfaces: dict[int, Surface] = {}  # by BSDF element, so that each is read once
         self._plugins = 0
 
-    def say(self, text: str) -> None:
-        if text not in self.said:
-            self.said.append(text)
+    def note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
 
     def count_plugin(self, element: Element) -> None:
         self._plugins += 1
@@ -52,7 +52,7 @@ class Reading:
 
 
 class Plugin:
-    """A plugin's element and its parameters, each remembered once it was asked for."""
+    """A plugin's element and its parameters; it remembers which were read."""
 
     def __init__(self, element: Element, reading: Reading, trail: tuple[int, ...] = (), within: str = "") -> None:
         reading.count_plugin(element)
@@ -87,14 +87,14 @@ class Plugin:
 
     @property
     def label(self) -> str:
-        """What to call it in a warning: by its id, or that of what it is in."""
+        """Its name in warnings: its id, or that of the element it is in."""
         return " ".join(filter(None, (self.element.tag, self._within, self.type and f"({self.type})")))
 
-    def say(self, text: str) -> None:
-        self.reading.say(f"{self.label}: {text}")
+    def note(self, text: str) -> None:
+        self.reading.note(f"{self.label}: {text}")
 
     def objects(self, tag: str, name: str | None = None, *, refs: bool = True) -> list[Plugin]:
-        """Plugins of one kind within it, in order; of one name where that is given; `refs` with those referred to."""
+        """Plugins of one kind within it, in order; of one name if given; with `refs` those referred to as well."""
         found = [(n, e) for n, e in self._objects if e.tag == tag and name in (None, n)]
         if not refs:
             found = [(n, e) for n, e in found if any(e is child for child in self.element.children)]
@@ -105,15 +105,15 @@ class Plugin:
         return any(n in self._values or any(n == o for o, _ in self._objects) for n in names)
 
     def ignore(self, *names: str) -> None:
-        """Count parameters as read: they change nothing here."""
+        """Count parameters as read: they have no effect here."""
         self._asked |= set(names)
 
-    def say_unread(self, *, but: tuple[str, ...] = ()) -> None:
-        """Say what nobody asked for."""
+    def note_unread(self, *, but: tuple[str, ...] = ()) -> None:
+        """Note the parameters that nothing has read."""
         names = {**self._values, **{n or e.tag: e for n, e in self._objects}}
         left = sorted(n for n in names if n and n not in self._asked and n not in MACHINERY and n not in but)
         if left:
-            self.say(f"not read: {', '.join(left)}")
+            self.note(f"not read: {', '.join(left)}")
 
     def _take(self, name: str) -> Element | None:
         self._asked.add(name)
@@ -144,12 +144,12 @@ class Plugin:
         return None if element is None else triple_of(element)
 
     def transform(self, name: str = "to_world") -> Floats:
-        """(4, 4); the identity where it is not given."""
+        """(4, 4); the identity if it is not given."""
         element = self._take(name)
         if element is None:
             return np.eye(4)
         if element.tag == "animation":
-            self.say("its movement is not read: it stands as at the beginning")
+            self.note("its movement is not read: it stands as at the beginning")
             element = next((e for e in element.children if e.tag == "transform"), element)
         matrix = transform_of(element)
         if not (np.abs(matrix) < FAR).all():
@@ -160,35 +160,33 @@ class Plugin:
         return self._values.get(name)
 
     def constant(self, name: str, *, emitted: bool = False) -> Floats | None:
-        """Linear RGB (3,) of a parameter that is the same everywhere; None where it is not given, or is a texture."""
+        """Linear RGB (3,) of a parameter that is the same everywhere; None if it is not given, or is a texture."""
         element = self._values.get(name)
         if element is None:
-            return None
+            return None  # and is not read yet: it may be a texture
         self._asked.add(name)
-        document = self.reading.document
-        return colour_of(element, document.root, emitted=emitted, old=document.version.startswith("0."))
+        return colour_of(element, self.reading.document, emitted=emitted)
 
     def texture(self, name: str) -> Plugin | None:
         return next(iter(self.objects("texture", name)), None)
 
     def file(self, name: str = "filename") -> Path:
         """A file that a parameter names; it need not exist."""
-        written = self.text(name)
-        root = self.reading.document.root
-        return named(written, self.element.file, root, f"line {self.element.line} <{self.element.tag}> {name}")
+        field = f"line {self.element.line} <{self.element.tag}> {name}"
+        return self.reading.files.path(self.text(name), self.element.file, field)
 
 
 def transform_of(element: Element) -> Floats:
-    """(4, 4) of a transform: its parts one after the other, each applied to what the others made."""
-    matrix = np.eye(4)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by whoever asked
+    """(4, 4) of a transform: the product of its parts, the first applied first."""
+    matrix: Floats = np.eye(4)
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses what is not finite
         for part in element.children:
             matrix = _part(part) @ matrix
     return matrix
 
 
 def _part(part: Element) -> Floats:
-    matrix = np.eye(4)
+    matrix: Floats = np.eye(4)
     if part.tag == "translate":
         matrix[:3, 3] = triple_of(part)
     elif part.tag == "scale":
@@ -197,7 +195,7 @@ def _part(part: Element) -> Floats:
         axis = triple_of(part)
         if not axis.any():
             raise part.error("axis is zero")
-        matrix[:3, :3] = _rotation(normalize(axis), math.radians(floats_of(part, 1, "angle")[0]))
+        matrix[:3, :3] = rotation_about(normalize(axis), math.radians(floats_of(part, 1, "angle")[0]))
     elif part.tag == "matrix":
         values = floats_of(part)
         if len(values) not in (9, 16):
@@ -214,30 +212,19 @@ def _part(part: Element) -> Floats:
 
 
 def look_at(part: Element) -> Floats:
-    """(4, 4): x to the left, y up, z ahead, as Mitsuba's cameras stand."""
-    origin, target = (np.array(floats_of(part, 3, a)) for a in ("origin", "target"))
-    up = np.array(floats_of(part, 3, "up")) if "up" in part.attributes else np.array([0.0, 1.0, 0.0])
-    ahead = normalize(target - origin)
-    left = normalize(np.cross(up, ahead))
-    if not ahead.any():
+    """(4, 4) of a camera or object: x to the left, y up, z forward."""
+    origin, target = (triple(floats_of(part, 3, a)) for a in ("origin", "target"))
+    if origin == target:
         raise part.error("origin and target are the same point")
-    if not left.any():
-        left = normalize(np.cross(np.eye(3)[np.argmin(np.abs(ahead))], ahead))
+    up = triple(floats_of(part, 3, "up")) if "up" in part.attributes else (0.0, 1.0, 0.0)
+    right, upwards, forward = camera_axes(Camera("", origin, target, up))
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = left, np.cross(ahead, left), ahead, origin
+    matrix[:3] = np.stack([-right, upwards, forward, origin], axis=-1)
     return matrix
 
 
-def _rotation(axis: Floats, angle_rad: float) -> Floats:
-    """(3, 3) right-handed rotation about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turned: Floats = np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * cross @ cross
-    return turned
-
-
-def children_of(document: Document, reading: Reading, tag: str) -> Iterator[Plugin]:
+def children_of(reading: Reading, tag: str) -> Iterator[Plugin]:
     """Plugins of a kind at the top of the scene."""
-    for element in document.elements:
+    for element in reading.document.elements:
         if element.tag == tag:
             yield Plugin(element, reading)

@@ -13,20 +13,17 @@ from lambent.core.camera import Camera
 from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
-from lambent.core.plain import triple
-from lambent.materials.document import Material
+from lambent.core.plain import Triple, triple
 from lambent.scenes.geometry import transformed
-from lambent.scenes.loaders import glb
-from lambent.scenes.loaders.glb import Gltf
-from lambent.scenes.loaders.gltf_material import surface_of
-from lambent.scenes.loaders.gltf_schema import MaterialDocument, Node, Primitive
-from lambent.scenes.loaders.gltf_texture import Textures, main_uv_set
-from lambent.scenes.loaders.parts import Parts, unique_name
-from lambent.scenes.loaders.repair import mesh_of
-from lambent.scenes.loaders.surface import finished
-from lambent.scenes.scene import DirectionalLight, Light, MaterialTextures, Mesh, PointLight, SceneObject, Triple
+from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.loaders.gltf.container import Gltf, read
+from lambent.scenes.loaders.gltf.materials import surface_of
+from lambent.scenes.loaders.gltf.schema import MaterialDocument, Node, Primitive
+from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
+from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
+from lambent.scenes.loaders.surfaces.surface import MadeMaterials
+from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
-TRIANGLES_MAX = 20_000_000
 FAR = 1e9  # metres
 
 
@@ -35,7 +32,7 @@ class _Reading:
     """What has been read so far of one file."""
 
     gltf: Gltf
-    looks: _Looks
+    materials: _Materials
     variants: dict[str, dict[str, tuple[str, Triple]]] = field(default_factory=dict)
     objects: list[SceneObject] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
@@ -47,67 +44,53 @@ class _Reading:
     triangles: int = 0
 
 
-def read_gltf(path: Path, root: Path | None = None) -> Parts:
-    """Parts of a .glb or .gltf file.
+def load(path: Path, root: Path | None = None) -> Contents:
+    """Contents of a .glb or .gltf file.
 
-    Names are the nodes' (made unique, which is said in the warnings); a mesh of several materials becomes an object
-    per material. Files it names lie below the folder `root`, unsaid its own.
+    Names are the nodes', made unique (with a warning); a mesh of several materials becomes an object per material.
+    Files it names lie below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where the file is damaged or holds nothing to see.
+        Where the file is damaged or holds no triangles.
     """
-    gltf = glb.read(path, root)
-    taken: set[str] = set()
-    documents = [*gltf.document.materials, MaterialDocument()]
-    names = [
-        unique_name(d.name or ("default" if i == len(documents) - 1 else f"material_{i}"), taken)
-        for i, d in enumerate(documents)
-    ]
-    reading = _Reading(gltf, _Looks(gltf, documents, names))
+    gltf = read(path, root)
+    reading = _Reading(gltf, _Materials(gltf))
     _walk(reading)
     if not reading.objects:
         raise UserError("holds no triangles", file=path, hint="; ".join(reading.warnings) or None)
-    looks = reading.looks
-    return Parts(
+    made, images = reading.materials.made, reading.materials.textures.images
+    return Contents(
         tuple(reading.objects),
-        looks.materials,
+        made.materials,
         tuple(reading.lights),
         tuple(reading.cameras),
-        (*gltf.sources, *looks.textures.sources),
-        (*reading.warnings, *looks.said, *looks.textures.pictures.said),
-        looks.of_material,
+        tuple(gltf.files.sources),
+        (*reading.warnings, *made.notes, *images.notes),
+        made.textures,
         variants=reading.variants,
     )
 
 
-class _Looks:
-    """The materials of a file, each made when something first wears it."""
+class _Materials:
+    """The materials of a file by their number, -1 for the default."""
 
-    def __init__(self, gltf: Gltf, documents: list[MaterialDocument], names: list[str]) -> None:
-        self._documents, self._names = documents, names
+    def __init__(self, gltf: Gltf) -> None:
+        self._documents = [*gltf.document.materials, MaterialDocument(name="default")]
+        taken: set[str] = set()
+        self._names = [unique_name(d.name or f"material_{i}", taken) for i, d in enumerate(self._documents)]
         self.textures = Textures(gltf)
-        self.materials: dict[str, Material] = {}
-        self.of_material: dict[str, MaterialTextures] = {}
-        self.said: list[str] = []
-        self._glow: dict[str, Triple] = {}
+        self.made = MadeMaterials()
 
-    def wear(self, index: int) -> tuple[str, Triple]:
+    def use(self, number: int) -> tuple[str, Triple]:
         """Name of a material, and the radiance it emits."""
-        name = self._names[index]
-        if name not in self.materials:
-            said: list[str] = []
-            surface = surface_of(self._documents[index], self.textures, said)
-            self.materials[name], textures = finished(name, surface, said)
-            if textures is not None:
-                self.of_material[name] = textures
-            self._glow[name] = surface.emission
-            self.said += [f"material {name}: {text}" for text in dict.fromkeys(said)]
-        return name, self._glow[name]
+        name = self._names[number]
+        self.made.make(name, lambda notes: surface_of(self._documents[number], self.textures, notes))
+        return name, self.made.emission[name]
 
-    def uv_set(self, index: int) -> int:
-        return main_uv_set(self._documents[index])
+    def uv_set(self, number: int) -> int:
+        return main_uv_set(self._documents[number])
 
 
 def _walk(reading: _Reading) -> None:
@@ -152,8 +135,8 @@ def _visit(reading: _Reading, node: Node, index: int, world: Floats) -> None:
         _add_mesh(reading, node, world)
     if node.camera is not None:
         _add_camera(reading, node, world)
-    if node.extensions.KHR_lights_punctual is not None:
-        _add_light(reading, node.extensions.KHR_lights_punctual.light, world)
+    if node.light is not None:
+        _add_light(reading, node.light, world)
 
 
 def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
@@ -165,38 +148,36 @@ def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
         reading.warnings.append(f"{wanted}: left out, its node's scale is zero")
         return
     for k, primitive in enumerate(mesh.primitives):
-        look = -1 if primitive.material is None else _index(gltf, primitive.material)
-        uv_set = reading.looks.uv_set(look)
+        number = -1 if primitive.material is None else _index(gltf, primitive.material)
+        uv_set = reading.materials.uv_set(number)
         key = (node.mesh, k, uv_set)
         if key not in reading.meshes:
-            reading.meshes[key], said = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
-            reading.warnings += said
+            reading.meshes[key], notes = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
+            reading.warnings += notes
         local = reading.meshes[key]
         if local is None:
             continue
         reading.triangles += len(local.faces)
-        if reading.triangles > TRIANGLES_MAX:
-            got, expected = f"{reading.triangles} triangles", f"at most {TRIANGLES_MAX}"
-            raise UserError("scene is too large", file=gltf.path, got=got, expected=expected)
-        material, glow = reading.looks.wear(look)
+        check_triangles(reading.triangles, gltf.path)
+        material, emission = reading.materials.use(number)
         single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
         name = unique_name(single, reading.names)
         if name != single:
             reading.warnings.append(f"{single}: the name is used twice, one is now {name}")
-        reading.objects.append(SceneObject(name, transformed(local, world), material, glow))
+        reading.objects.append(SceneObject(name, transformed(local, world), material, emission))
         _note_variants(reading, primitive, name)
 
 
 def _note_variants(reading: _Reading, primitive: Primitive, name: str) -> None:
-    """What an object wears in each of the file's material sets that says so."""
-    listed = reading.gltf.document.extensions.KHR_materials_variants.variants
+    """Note an object's material in each of the file's material sets that has one for it."""
+    listed = reading.gltf.document.variants
     for variant in listed:
         reading.variants.setdefault(variant.name, {})
-    for mapping in primitive.extensions.KHR_materials_variants.mappings:
-        look = reading.looks.wear(_index(reading.gltf, mapping.material))
+    for mapping in primitive.variants:
+        material = reading.materials.use(_index(reading.gltf, mapping.material))
         for number in mapping.variants:
             variant = reading.gltf.pick(listed, number, "variants")
-            reading.variants[variant.name][name] = look
+            reading.variants[variant.name][name] = material
 
 
 def _index(gltf: Gltf, material: int) -> int:
@@ -215,31 +196,30 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         order = np.arange(len(positions))
     else:
         order = gltf.accessor(primitive.indices)[:, 0].astype(np.int64)
-    said = []
+    notes = []
     faces = _faces(order, primitive.mode)
     if primitive.mode == 4 and len(order) % 3:
-        said.append(f"{name}: {len(order) % 3} indices left over")
+        notes.append(f"{name}: {len(order) % 3} indices left over")
 
     def optional(attribute: str, width: int) -> Floats | None:
         if attribute not in attributes:
             return None
         array = gltf.floats(attributes[attribute], width, f"{name} {attribute}")
         if len(array) != len(positions):
-            field = f"{name} {attribute}"
-            raise UserError("wrong length", file=gltf.path, field=field, got=len(array), expected=len(positions))
+            raise gltf.error("wrong length", f"{name} {attribute}", len(array), len(positions))
         return array
 
     if "COLOR_0" in attributes:
-        said.append(f"{name}: colours of its vertices are not read")
+        notes.append(f"{name}: colours of its vertices are not read")
     uv = optional(f"TEXCOORD_{uv_set}", 2)
     if uv is not None:
         uv = uv * (1, -1) + (0, 1)  # glTF counts v from the top
     tangents = optional("TANGENT", 4)
-    normals = optional("NORMAL", 3)
-    mesh, repaired = mesh_of(
-        positions, faces, normals, uv, None if tangents is None else tangents[:, :3], name=name, file=gltf.path
-    )
-    return mesh, said + repaired
+    if tangents is not None:
+        tangents = tangents[:, :3]
+    arrays = MeshArrays(positions, faces, optional("NORMAL", 3), uv, tangents)
+    mesh, repaired = mesh_of(arrays, name=name, file=gltf.path)
+    return mesh, notes + repaired
 
 
 def _faces(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
@@ -271,7 +251,7 @@ def _add_camera(reading: _Reading, node: Node, world: Floats) -> None:
 
 def _add_light(reading: _Reading, index: int, world: Floats) -> None:
     gltf = reading.gltf
-    light = gltf.pick(gltf.document.extensions.KHR_lights_punctual.lights, index, "lights")
+    light = gltf.pick(gltf.document.lights, index, "lights")
     power = triple(radiometric(np.asarray(light.color) * light.intensity))
     direction = triple(-normalize(world[:3, 2]))
     if light.type == "directional":

@@ -1,10 +1,15 @@
-"""What a scene.toml may say, key by key. Unknown keys are errors."""
+"""The keys of a scene.toml, and the scene's values of each section. Unknown keys are errors."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.plain import Triple, triple
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, PointLight, SunSky
 
 FORMAT = "lambent-scene"
 
@@ -20,6 +25,10 @@ def _not_zero(vector: Any) -> Any:
     if not any(vector):
         raise ValueError("a direction cannot be zero")
     return vector
+
+
+def _unit(vector: Triple) -> Triple:
+    return triple(np.asarray(vector, float) / np.linalg.norm(vector))
 
 
 class Section(BaseModel):
@@ -50,6 +59,9 @@ class SunSkySection(Section):
             raise ValueError("the sun is below the horizon (its y is negative)")
         return _not_zero(vector)
 
+    def environment(self) -> SunSky:
+        return SunSky(_unit(self.sun_direction), self.turbidity, self.albedo, self.sun_scale, self.sky_scale)
+
 
 class ImageSection(Section):
     """A lat-long HDR picture."""
@@ -66,9 +78,12 @@ class ConstantSection(Section):
     kind: Literal["constant"]
     radiance: Colour
 
+    def environment(self) -> ConstantEnvironment:
+        return ConstantEnvironment(self.radiance)
+
 
 class ObjectSection(Section):
-    """What is said of the objects whose name fits a pattern; unsaid, the geometry file's word stands."""
+    """Settings of the objects whose name fits a pattern; those left out stay as in the geometry file."""
 
     material: str | None = None
     emission: Colour | None = None
@@ -89,6 +104,9 @@ class PointSection(Section):
     position: Vector
     intensity: Colour
 
+    def light(self) -> PointLight:
+        return PointLight(self.position, self.intensity)
+
 
 class SpotSection(Section):
     kind: Literal["spot"]
@@ -106,6 +124,9 @@ class SpotSection(Section):
             raise ValueError("inner_deg is larger than outer_deg")
         return self
 
+    def light(self) -> PointLight:
+        return PointLight(self.position, self.intensity, _unit(self.direction), self.inner_deg, self.outer_deg)
+
 
 class DirectionalSection(Section):
     kind: Literal["directional"]
@@ -114,9 +135,12 @@ class DirectionalSection(Section):
 
     _direction = field_validator("direction")(_not_zero)
 
+    def light(self) -> DirectionalLight:
+        return DirectionalLight(_unit(self.direction), self.irradiance)
+
 
 class ViewSection(Section):
-    """Where a camera stands and what it looks at."""
+    """A camera without a name."""
 
     position: Vector
     target: Vector
@@ -129,6 +153,9 @@ class ViewSection(Section):
             raise ValueError("position and target are the same point")
         return self
 
+    def camera(self, name: str) -> Camera:
+        return Camera(name, self.position, self.target, self.up, self.fov_y_deg)
+
 
 class CameraSection(ViewSection):
     name: str
@@ -139,9 +166,12 @@ class PathSection(Section):
     seconds: Positive = 20.0
     keys: Annotated[tuple[ViewSection, ...], Field(min_length=2)]
 
+    def path(self) -> CameraPath:
+        return CameraPath(self.name, tuple(k.camera(f"{self.name}_{i}") for i, k in enumerate(self.keys)), self.seconds)
+
 
 class ReflectorSection(Section):
-    """Objects that are, or are not, planar reflectors; see scenes.reflectors."""
+    """Objects that are, or are not, planar reflectors; see `scenes.reflectors`."""
 
     objects: str
     use: bool = True
@@ -181,7 +211,7 @@ class SceneDocument(Section):
 
 
 def known_keys() -> set[str]:
-    """Every key that has a meaning somewhere in a scene.toml."""
+    """Every key of a scene.toml."""
     sections: list[type[BaseModel]] = [SceneDocument, *_below(Section)]
     return {key for section in sections for key in section.model_fields}
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
+from lambent.core.files import read_bytes
+from lambent.scenes.loaders.meshes.polygons import Ints, ranges
 
+LIMIT_BYTES = 4 << 30
 BLOCK_BYTES = 8 << 20
 INDICES_MAX = 240_000_000
-Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 WIDTHS = {"v": 3, "vt": 2, "vn": 3}
 # Slashes per corner, and how many of its pairs are double: which of v, vt, vn the corner names.
@@ -45,6 +49,11 @@ class ObjText:
     sizes: Ints
     lines: Ints
     words: list[tuple[int, str, str]]
+
+
+def read(file: Path) -> ObjText:
+    """The text of a file: see `parse`."""
+    return parse(read_bytes(file, LIMIT_BYTES), file)
 
 
 def parse(data: bytes, file: Path) -> ObjText:
@@ -182,7 +191,7 @@ class _Block:
         if len(made) > 1:
             order = np.argsort(where, kind="stable")
             starts = (np.cumsum(count) - count)[order]
-            picked = np.repeat(starts, count[order]) + _ranges(count[order])
+            picked = np.repeat(starts, count[order]) + ranges(count[order])
             corners, count, where = corners[picked], count[order], where[order]
         yield corners, count, where + self.first_line
 
@@ -213,18 +222,16 @@ class _Block:
         for lines in self._kinds.values():
             other[lines] = False
         other &= (self._head[0] != ord("#")) & (self._head[0] != 10)
-        said = []
+        notes = []
         for i in np.flatnonzero(other):
             line = self.bytes[self.starts[i] : self.ends[i]].tobytes().decode("utf-8", "replace")
             word, _, rest = line.partition(" ")
-            said.append((int(i) + self.first_line, word, rest.strip()))
-        return said
+            notes.append((int(i) + self.first_line, word, rest.strip()))
+        return notes
 
-    def _parsed(self, text: bytes, kind: type, lines: Ints) -> NDArray[np.generic]:
-        try:
-            return np.fromstring(text, dtype=kind, sep=" ")  # type: ignore[call-overload]
-        except ValueError:
-            pass  # which line it is, is found out below
+    def _parsed(self, text: bytes, kind: type, lines: Ints) -> np.ndarray[Any, Any]:
+        with suppress(ValueError):  # the line is found below
+            return np.fromstring(text, dtype=kind, sep=" ")
         for line, words in zip(lines, text.split(b"\n"), strict=False):
             for word in words.split():
                 try:
@@ -253,7 +260,7 @@ def _per_line(marks: NDArray[np.bool_], ends: Ints) -> Ints:
 def _begins(flat: Bytes) -> NDArray[np.bool_]:
     """Where words begin."""
     blank = flat <= 32
-    return ~blank & np.concatenate([[True], blank[:-1]])
+    return np.asarray(~blank & np.concatenate([[True], blank[:-1]]))
 
 
 def _tokens(text: bytes) -> Ints:
@@ -274,9 +281,3 @@ def _forms(text: bytes) -> Ints:
     for code, (single, twice) in enumerate(FORMS):
         codes[(slashes == single) & (doubles == twice)] = code
     return codes
-
-
-def _ranges(counts: Ints) -> Ints:
-    """0..c-1 for each c of counts, one after the other."""
-    starts = np.cumsum(counts) - counts
-    return np.arange(int(counts.sum())) - np.repeat(starts, counts)

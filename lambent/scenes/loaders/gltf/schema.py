@@ -1,11 +1,14 @@
-"""The part of glTF 2.0 that Lambent reads; everything else in a file is let pass."""
+"""The part of glTF 2.0 that Lambent reads; everything else in a file is ignored.
+
+The fields of an extension are fields of the object that it extends; `_extension` names their place.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0)]
@@ -14,10 +17,21 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Three = tuple[Finite, Finite, Finite]
 Four = tuple[Finite, Finite, Finite, Finite]
 Colour = tuple[NotNegative, NotNegative, NotNegative]
+READ_EXTENSIONS = {"KHR_mesh_quantization"}  # needs no field of its own; `_extension` adds the others
+
+
+def _extension(name: str, *place: str, default: Any = None) -> Any:
+    """A field at a place within an extension."""
+    READ_EXTENSIONS.add(name)
+    return Field(default, validation_alias=AliasPath("extensions", name, *place))
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class _Extended(_Part):
+    extensions: dict[str, dict[str, Any]] = {}
 
 
 class Asset(_Part):
@@ -68,20 +82,12 @@ class VariantMapping(_Part):
     variants: list[Index]
 
 
-class PrimitiveVariants(_Part):
-    mappings: list[VariantMapping] = []
-
-
-class PrimitiveExtensions(_Part):
-    KHR_materials_variants: PrimitiveVariants = PrimitiveVariants()
-
-
-class Primitive(_Part):
+class Primitive(_Extended):
     attributes: dict[str, Index]
     indices: Index | None = None
     material: Index | None = None
     mode: Index = 4
-    extensions: PrimitiveExtensions = PrimitiveExtensions()
+    variants: list[VariantMapping] = _extension("KHR_materials_variants", "mappings", default=[])
 
 
 class MeshDocument(_Part):
@@ -89,43 +95,26 @@ class MeshDocument(_Part):
     name: str | None = None
 
 
-class LightReference(_Part):
-    light: Index
-
-
-class NodeExtensions(_Part):
-    KHR_lights_punctual: LightReference | None = None
-
-
-class Node(_Part):
+class Node(_Extended):
     name: str | None = None
     children: list[Index] = []
     mesh: Index | None = None
     camera: Index | None = None
+    light: Index | None = _extension("KHR_lights_punctual", "light")
     matrix: Annotated[list[Finite], Field(min_length=16, max_length=16)] | None = None
     translation: Three = (0, 0, 0)
     rotation: Four = (0, 0, 0, 1)
     scale: Three = (1, 1, 1)
-    extensions: NodeExtensions = NodeExtensions()
 
 
-class WebpSource(_Part):
-    source: Index
-
-
-class TextureExtensions(_Part):
-    EXT_texture_webp: WebpSource | None = None
-
-
-class Texture(_Part):
+class Texture(_Extended):
     source: Index | None = None
+    webp: Index | None = _extension("EXT_texture_webp", "source")
     sampler: Index | None = None
-    extensions: TextureExtensions = TextureExtensions()
 
     @property
     def image(self) -> int | None:
-        webp = self.extensions.EXT_texture_webp
-        return webp.source if webp is not None else self.source
+        return self.source if self.webp is None else self.webp
 
 
 class Sampler(_Part):
@@ -145,14 +134,10 @@ class TextureTransform(_Part):
     texCoord: Index | None = None
 
 
-class ReferenceExtensions(_Part):
-    KHR_texture_transform: TextureTransform | None = None
-
-
-class TextureReference(_Part):
+class TextureReference(_Extended):
     index: Index
     texCoord: Index = 0
-    extensions: ReferenceExtensions = ReferenceExtensions()
+    transform: TextureTransform | None = _extension("KHR_texture_transform")
 
 
 class NormalReference(TextureReference):
@@ -165,14 +150,6 @@ class MetallicRoughness(_Part):
     roughnessFactor: Share = 1
     baseColorTexture: TextureReference | None = None
     metallicRoughnessTexture: TextureReference | None = None
-
-
-class EmissiveStrength(_Part):
-    emissiveStrength: NotNegative = 1
-
-
-class Ior(_Part):
-    ior: NotNegative = 1.5
 
 
 class Specular(_Part):
@@ -210,7 +187,6 @@ class DiffuseTransmission(_Part):
 
 class Volume(_Part):
     thicknessFactor: NotNegative = 0
-    thicknessTexture: TextureReference | None = None
     attenuationDistance: Annotated[float, Field(gt=0)] = math.inf
     attenuationColor: Colour = (1, 1, 1)
 
@@ -223,21 +199,7 @@ class SpecularGlossiness(_Part):
     specularGlossinessTexture: TextureReference | None = None
 
 
-class MaterialExtensions(_Part):
-    model_config = ConfigDict(extra="allow", frozen=True)  # what is left over is not read, which is said
-
-    KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
-    KHR_materials_ior: Ior = Ior()
-    KHR_materials_specular: Specular = Specular()
-    KHR_materials_anisotropy: Anisotropy = Anisotropy()
-    KHR_materials_transmission: Transmission = Transmission()
-    KHR_materials_clearcoat: ClearCoat = ClearCoat()
-    KHR_materials_diffuse_transmission: DiffuseTransmission = DiffuseTransmission()
-    KHR_materials_volume: Volume = Volume()
-    KHR_materials_pbrSpecularGlossiness: SpecularGlossiness | None = None
-
-
-class MaterialDocument(_Part):
+class MaterialDocument(_Extended):
     name: str | None = None
     pbrMetallicRoughness: MetallicRoughness = MetallicRoughness()
     emissiveFactor: Colour = (0, 0, 0)
@@ -245,7 +207,17 @@ class MaterialDocument(_Part):
     normalTexture: NormalReference | None = None
     alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alphaCutoff: NotNegative = 0.5
-    extensions: MaterialExtensions = MaterialExtensions()
+    emissive_strength: NotNegative = _extension("KHR_materials_emissive_strength", "emissiveStrength", default=1)
+    ior: NotNegative = _extension("KHR_materials_ior", "ior", default=1.5)
+    specular: Specular = _extension("KHR_materials_specular", default=Specular())
+    anisotropy: Anisotropy = _extension("KHR_materials_anisotropy", default=Anisotropy())
+    transmission: Transmission = _extension("KHR_materials_transmission", default=Transmission())
+    clear_coat: ClearCoat = _extension("KHR_materials_clearcoat", default=ClearCoat())
+    diffuse_transmission: DiffuseTransmission = _extension(
+        "KHR_materials_diffuse_transmission", default=DiffuseTransmission()
+    )
+    volume: Volume = _extension("KHR_materials_volume", default=Volume())
+    specular_glossiness: SpecularGlossiness | None = _extension("KHR_materials_pbrSpecularGlossiness")
 
 
 class Perspective(_Part):
@@ -260,7 +232,6 @@ class CameraDocument(_Part):
 
 class SceneNodes(_Part):
     nodes: list[Index] = []
-    name: str | None = None
 
 
 class Spot(_Part):
@@ -270,30 +241,16 @@ class Spot(_Part):
 
 class LightDocument(_Part):
     type: Literal["directional", "point", "spot"]
-    name: str | None = None
     color: Colour = (1, 1, 1)
     intensity: NotNegative = 1
     spot: Spot = Spot()
-
-
-class LightList(_Part):
-    lights: list[LightDocument] = []
 
 
 class Variant(_Part):
     name: str
 
 
-class VariantList(_Part):
-    variants: list[Variant] = []
-
-
-class RootExtensions(_Part):
-    KHR_lights_punctual: LightList = LightList()
-    KHR_materials_variants: VariantList = VariantList()
-
-
-class GltfDocument(_Part):
+class GltfDocument(_Extended):
     """A whole glTF document."""
 
     asset: Asset
@@ -309,5 +266,6 @@ class GltfDocument(_Part):
     images: list[Image] = []
     samplers: list[Sampler] = []
     cameras: list[CameraDocument] = []
+    lights: list[LightDocument] = _extension("KHR_lights_punctual", "lights", default=[])
+    variants: list[Variant] = _extension("KHR_materials_variants", "variants", default=[])
     extensionsRequired: list[str] = []
-    extensions: RootExtensions = RootExtensions()

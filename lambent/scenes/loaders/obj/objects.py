@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
-from lambent.scenes.loaders import mtl, obj_text
-from lambent.scenes.loaders.obj_text import Ints, ObjText
-from lambent.scenes.loaders.parts import Parts, unique_name
-from lambent.scenes.loaders.pictures import Pictures
-from lambent.scenes.loaders.polygons import smooth_normals, triangulate
-from lambent.scenes.loaders.repair import mesh_of
+from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.loaders.meshes.polygons import Ints, smooth_normals, triangulate
+from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
+from lambent.scenes.loaders.obj.mtl import Library
+from lambent.scenes.loaders.obj.text import ObjText, read
+from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.scene import Mesh, SceneObject
 
-LIMIT_BYTES = 4 << 30
-TRIANGLES_MAX = 20_000_000
-OBJECTS_MAX = 4096  # more groups than this are not things but an exporter's habit
+OBJECTS_MAX = 4096  # more groups than this are an exporter's habit, not objects
 UNREAD = {"l": "lines", "p": "points", "curv": "curves", "surf": "surfaces", "vp": "curves"}
 
 
@@ -32,58 +31,57 @@ class Triangles:
     lines: Ints
     smoothing: Ints
 
+    def of(self, which: Ints) -> Triangles:
+        return Triangles(self.corners[which], self.lines[which], self.smoothing[which])
 
-def read_obj(path: Path, root: Path | None = None) -> Parts:
-    """Parts of an .obj file: an object for each of its objects (or groups) and each material on it.
+
+def load(path: Path, root: Path | None = None) -> Contents:
+    """Contents of an .obj file: an object for each of its objects (or groups) and each material on it.
+
+    Files it names lie below `root`, by default its own folder.
 
     Raises
     ------
     UserError
-        Where a line cannot be read, or the file holds nothing to see.
+        Where a line cannot be read, or the file holds no triangles.
     """
-    text = obj_text.parse(read_bytes(path, LIMIT_BYTES), path)
-    root = path.resolve().parent if root is None else root
+    files = SceneFiles(path, root)
+    text = read(path)
     warnings = [f"{what} are not read" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
-    all_triangles = triangles_of(text, path)
-    names, material_names, owner = _owners(text, all_triangles.lines, warnings)
-    pictures = Pictures()
-    library = mtl.Library(pictures, root)
+    triangles = triangles_of(text, path)
+    names, material_names, owner = _owners(text, triangles.lines, warnings)
+    library = Library(files)
     for line, word, rest in text.words:
         if word == "mtllib":
-            library.add(path, rest, f"line {line}")
+            library.add(path, rest, line)
     taken: set[str] = set()
     objects = []
-    used: dict[str, None] = {}
-    parts_of = Counter(name for name, _ in names)
+    materials_of = Counter(name for name, _ in names)
     by_owner = np.argsort(owner, kind="stable")
     ends = np.searchsorted(owner[by_owner], np.arange(len(names) + 1))
     for number, (name, material) in enumerate(names):
         mine = by_owner[ends[number] : ends[number + 1]]
-        single = name if parts_of[name] == 1 else f"{name}_{material_names[material]}"
-        mesh, said = mesh_of_triangles(text, _picked(all_triangles, mine), single, path)
-        warnings += said
-        if mesh is None:
-            continue
-        wanted = library.name_of(material_names[material])
-        used[wanted] = None
-        objects.append(SceneObject(unique_name(single, taken), mesh, wanted, library.emission(wanted)))
+        single = name if materials_of[name] == 1 else f"{name}_{material_names[material]}"
+        mesh, notes = mesh_of_triangles(text, triangles.of(mine), single, path)
+        warnings += notes
+        if mesh is not None:
+            used = library.use(material_names[material])
+            objects.append(SceneObject(unique_name(single, taken), mesh, used, library.made.emission[used]))
     if not objects:
         raise UserError("holds no triangles", file=path, hint="; ".join(warnings) or None)
-    return Parts(
+    return Contents(
         tuple(objects),
-        {n: library.material(n) for n in used},
-        sources=(path, *library.sources),
-        warnings=(*warnings, *library.warnings(used), *pictures.said),
-        textures={n: t for n in used if (t := library.textures(n)) is not None},
+        library.made.materials,
+        sources=tuple(files.sources),
+        warnings=(*warnings, *library.warnings),
+        textures=library.made.textures,
     )
 
 
 def triangles_of(text: ObjText, file: Path) -> Triangles:
     """All faces cut into triangles."""
     places, polygon = triangulate(text.v, text.corners[:, 0], text.sizes)
-    if len(places) > TRIANGLES_MAX:
-        got, most = f"{len(places)} triangles", f"at most {TRIANGLES_MAX}"
-        raise UserError("scene is too large", file=file, got=got, expected=most)
+    check_triangles(len(places), file)
     lines = text.lines[polygon]
     at, groups = [0], [0]
     for line, word, rest in text.words:
@@ -91,10 +89,6 @@ def triangles_of(text: ObjText, file: Path) -> Triangles:
             at.append(line)
             groups.append(int(rest) if rest.isdecimal() and len(rest) < 10 else 0)
     return Triangles(text.corners[places], lines, np.array(groups)[np.searchsorted(at, lines) - 1])
-
-
-def _picked(triangles: Triangles, which: Ints) -> Triangles:
-    return Triangles(triangles.corners[which], triangles.lines[which], triangles.smoothing[which])
 
 
 def _owners(text: ObjText, lines: Ints, warnings: list[str]) -> tuple[list[tuple[str, int]], list[str], Ints]:
@@ -119,7 +113,7 @@ def _owners(text: ObjText, lines: Ints, warnings: list[str]) -> tuple[list[tuple
 
 
 def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[Ints, Ints]]:
-    """Names in order of appearance; and the lines from which each holds, with the number of the name."""
+    """Names in order of appearance; and the lines that begin one, with its number."""
     numbers = {start: 0}
     at, which = [0], [0]
     for line, word, rest in text.words:
@@ -134,12 +128,12 @@ def mesh_of_triangles(
 ) -> tuple[Mesh | None, list[str]]:
     """Mesh of some of a file's triangles, and what was repaired.
 
-    Normals that are missing come from the smoothing groups; `faceted` says instead that all normals are flat, or that
-    missing ones are smooth everywhere.
+    Missing normals come from the smoothing groups; with `faceted` True all normals are flat, with False missing ones
+    are smooth everywhere.
     """
-    said = []
+    notes = []
     corners, normals = triangles.corners.copy(), text.vn
-    lacking = (corners[..., 2] < 0).any(axis=1)
+    lacking = np.asarray((corners[..., 2] < 0).any(axis=1))
     if faceted:
         lacking[:] = True
     if lacking.any() and len(corners):
@@ -149,7 +143,7 @@ def mesh_of_triangles(
         normals = np.concatenate([normals, made])
         if faceted is None:
             how = "from its smoothing groups" if smooth[lacking].any() else "faces are flat"
-            said.append(f"{name}: no normals: {how}")
+            notes.append(f"{name}: no normals: {how}")
     flat = corners.reshape(-1, 3)
     sizes = (len(text.vt) + 1, len(normals) + 1)
     if len(text.v) * sizes[0] * sizes[1] < 1 << 62:
@@ -161,20 +155,13 @@ def mesh_of_triangles(
     uv = None
     if len(text.vt) and (vertex[:, 1] >= 0).any():
         uv = np.where(vertex[:, 1:2] >= 0, text.vt[np.maximum(vertex[:, 1], 0)], np.nan)
-    mesh, repaired = mesh_of(
-        text.v[vertex[:, 0]],
-        index.reshape(-1, 3),
-        normals[vertex[:, 2]] if len(vertex) else np.zeros((0, 3)),
-        uv,
-        None,
-        name=name,
-        file=file,
-    )
-    return mesh, said + repaired
+    own = normals[vertex[:, 2]] if len(vertex) else np.zeros((0, 3))
+    mesh, repaired = mesh_of(MeshArrays(text.v[vertex[:, 0]], index.reshape(-1, 3), own, uv), name=name, file=file)
+    return mesh, notes + repaired
 
 
-def _made_normals(positions: np.ndarray, vertices: Ints, smoothing: Ints, smooth: Ints) -> tuple[np.ndarray, Ints]:
-    """Normals, and which of them each corner (T, 3) has: shared within a smoothing group, else the triangle's own."""
+def _made_normals(positions: Floats, vertices: Ints, smoothing: Ints, smooth: NDArray[np.bool_]) -> tuple[Floats, Ints]:
+    """Normals, and the number of each corner's (T, 3): shared within a smoothing group, else the triangle's own."""
     triangle = np.arange(len(vertices))[:, None] + np.zeros((1, 3), int)
     group = np.where(smooth, smoothing, -1)[:, None]
     key = np.where(smooth[:, None], vertices, triangle) * (int(smoothing.max()) + 2) + group + 1

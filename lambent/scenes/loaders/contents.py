@@ -7,13 +7,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lambent.core.camera import Camera
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject, Triple
+from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject
 
 
 @dataclass(frozen=True)
-class Parts:
-    """Objects in world space, and whatever else the file holds."""
+class Contents:
+    """Objects in world space, and what else the file holds.
+
+    `variants` are its material sets: variant -> object -> its material there and the radiance it then emits;
+    `materials` holds those of all variants. A scene of this file alone gets daylight unless `tells_its_light`, or if
+    nothing in it emits light.
+    """
 
     objects: tuple[SceneObject, ...]
     materials: Mapping[str, Material] = field(default_factory=dict)
@@ -23,9 +29,8 @@ class Parts:
     warnings: tuple[str, ...] = ()
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     environment: Environment | None = None
-    tells_its_light: bool = False  # a scene of this file alone gets daylight where it is False, or where nothing shines
+    tells_its_light: bool = False
     variants: Mapping[str, Mapping[str, tuple[str, Triple]]] = field(default_factory=dict)
-    # variant -> object -> its material there and the radiance it then emits; `materials` holds those of all variants
 
 
 def unique_name(name: str, taken: set[str]) -> str:

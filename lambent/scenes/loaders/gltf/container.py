@@ -1,4 +1,4 @@
-"""glTF on disk: the container, its buffers and accessors. Every length is checked before a byte is touched."""
+"""glTF on disk: the container, its buffers and accessors. Every length is checked before anything is read by it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import base64
 import binascii
 import json
 import struct
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote
@@ -18,18 +18,12 @@ from pydantic import ValidationError
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.scenes.loaders.gltf_schema import GltfDocument
-from lambent.scenes.loaders.place import named
+from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, GltfDocument
+from lambent.scenes.loaders.scene_files import SceneFiles
 
 LIMIT_BYTES = 4 << 30
-ZEROS_MAX = 60_000_000  # elements that an accessor may make of nothing
+ZEROS_MAX = 60_000_000  # elements of an accessor without a buffer view
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
-READ_EXTENSIONS = {
-    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
-    "KHR_materials_anisotropy", "KHR_materials_transmission", "KHR_mesh_quantization", "KHR_texture_transform",
-    "KHR_materials_variants", "KHR_materials_clearcoat", "EXT_texture_webp", "KHR_materials_volume",
-    "KHR_materials_diffuse_transmission", "KHR_materials_pbrSpecularGlossiness",
-}  # fmt: skip
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 T = TypeVar("T")
@@ -37,32 +31,31 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Gltf:
-    """A document with its buffers in memory; `sources` are the files it was read from."""
+    """A document with its buffers in memory; `files` are those it was read from."""
 
     path: Path
     document: GltfDocument
     buffers: tuple[bytes, ...]
-    sources: tuple[Path, ...]
-    root: Path  # the folder that its files may lie in
+    files: SceneFiles
+
+    def error(self, message: str, field: str, got: object, expected: object) -> UserError:
+        return UserError(message, file=self.path, field=field, got=got, expected=expected)
 
     def pick(self, items: Sequence[T], index: int, field: str) -> T:
         """`items[index]`, or a `UserError` that names the field."""
         if index >= len(items):
-            raise UserError(
-                "index out of range", file=self.path, field=field, got=index, expected=f"below {len(items)}"
-            )
+            raise self.error("index out of range", field, index, f"below {len(items)}")
         return items[index]
 
     def view(self, index: int) -> tuple[bytes, int, int, int | None]:
         """Buffer, first byte, length and stride of a buffer view."""
         view = self.pick(self.document.bufferViews, index, "bufferViews")
         buffer = self.pick(self.buffers, view.buffer, f"bufferViews.{index}.buffer")
-        if view.byteOffset + view.byteLength > len(buffer):
-            end = view.byteOffset + view.byteLength
-            raise UserError(
-                "buffer view ends after its buffer", file=self.path, field=f"bufferViews.{index}", got=f"{end} bytes",
-                expected=f"at most {len(buffer)}",
-            )  # fmt: skip
+        end = view.byteOffset + view.byteLength
+        if end > len(buffer):
+            raise self.error(
+                "buffer view ends after its buffer", f"bufferViews.{index}", f"{end} bytes", f"at most {len(buffer)}"
+            )
         return buffer, view.byteOffset, view.byteLength, view.byteStride
 
     def accessor(self, index: int) -> np.ndarray[Any, Any]:
@@ -71,7 +64,7 @@ class Gltf:
         a = self.pick(self.document.accessors, index, "accessors")
         dtype, width = np.dtype(COMPONENTS[a.componentType]), WIDTHS[a.type]
         if a.bufferView is None and a.count > ZEROS_MAX:
-            raise UserError("too many zeros", file=self.path, field=field, got=a.count, expected=f"at most {ZEROS_MAX}")
+            raise self.error("too many zeros", field, a.count, f"at most {ZEROS_MAX}")
         if a.bufferView is None:
             array = np.zeros((a.count, width), dtype)
         else:
@@ -81,10 +74,7 @@ class Gltf:
             kind = np.dtype(COMPONENTS[at.componentType])
             places = self._elements(at.bufferView, at.byteOffset, kind, (a.sparse.count, 1), f"{field}.sparse.indices")
             if int(places.max()) >= a.count:
-                got, expected = int(places.max()), f"below {a.count}"
-                raise UserError(
-                    "index out of range", file=self.path, field=f"{field}.sparse", got=got, expected=expected
-                )
+                raise self.error("index out of range", f"{field}.sparse", int(places.max()), f"below {a.count}")
             shape = (a.sparse.count, width)
             array[places[:, 0]] = self._elements(put.bufferView, put.byteOffset, dtype, shape, f"{field}.sparse.values")
         return array
@@ -98,10 +88,7 @@ class Gltf:
         step = stride or dtype.itemsize * width
         need = offset + step * (count - 1) + dtype.itemsize * width if count else 0
         if need > length:
-            raise UserError(
-                "accessor ends after its buffer view", file=self.path, field=field, got=f"{need} bytes",
-                expected=f"at most {length}",
-            )  # fmt: skip
+            raise self.error("accessor ends after its buffer view", field, f"{need} bytes", f"at most {length}")
         if count == 0:
             return np.zeros((0, width), dtype)
         return np.ndarray(shape, dtype, buffer, start + offset, (step, dtype.itemsize)).copy()
@@ -110,23 +97,40 @@ class Gltf:
         """Accessor as float64 (count, width); normalised integers become [0, 1] or [-1, 1]."""
         array = self.accessor(index)
         if array.shape[1] != width:
-            got = f"{array.shape[1]} components"
-            raise UserError("wrong accessor type", file=self.path, field=field, got=got, expected=width)
+            raise self.error("wrong accessor type", field, f"{array.shape[1]} components", width)
         values = array.astype(float)
         if self.document.accessors[index].normalized and array.dtype.kind in "iu":
             values = np.maximum(values / np.iinfo(array.dtype).max, -1.0)
         return values
 
+    def is_missing(self, uri: str, field: str) -> bool:
+        """Whether a uri names a file that is not there."""
+        return not uri.startswith("data:") and "://" not in uri and not self._file(uri, field).exists()
+
+    def resource(self, uri: str, field: str) -> bytes:
+        """Bytes of a uri: data within it, or a file in the scene's folder or below."""
+        if uri.startswith("data:"):
+            try:
+                return base64.b64decode(uri.partition(",")[2], validate=True)
+            except binascii.Error as error:
+                raise UserError(f"its base64 data is damaged ({error})", file=self.path, field=field) from error
+        if "://" in uri:
+            hint = "put the file beside the scene"
+            raise UserError("is on the network", file=self.path, field=field, got=uri, hint=hint)
+        return self.files.read(self._file(uri, field), LIMIT_BYTES)
+
+    def _file(self, uri: str, field: str) -> Path:
+        return self.files.path(unquote(uri), self.path, field)
+
 
 def read(path: Path, root: Path | None = None) -> Gltf:
-    """A .glb or .gltf file with all its buffers; files it names lie below the folder `root`, unsaid its own.
+    """A .glb or .gltf file with all its buffers; files it names lie below `root`, by default its own folder.
 
     Raises
     ------
     UserError
         Where the file is truncated, not glTF 2.0, needs an extension that is not read, or names a file elsewhere.
     """
-    root = path.resolve().parent if root is None else root
     data = read_bytes(path, LIMIT_BYTES)
     text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
     try:
@@ -142,22 +146,27 @@ def read(path: Path, root: Path | None = None) -> Gltf:
         field = ".".join(str(part) for part in first["loc"])
         raise UserError(first["msg"], file=path, field=field, got=first["input"]) from error
     if not document.asset.version.startswith("2."):
-        raise UserError(
-            "unknown glTF version", file=path, field="asset.version", got=document.asset.version, expected=2
-        )
+        version = document.asset.version
+        raise UserError("unknown glTF version", file=path, field="asset.version", got=version, expected=2)
     unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
     if unread:
         hint = "export without compression" if any("compression" in name for name in unread) else None
         raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=hint)
-    buffers, sources = [], [path]
-    for i, buffer in enumerate(document.buffers):
-        content, source = _buffer(buffer.uri, binary if i == 0 else None, path, f"buffers.{i}", root)
+    gltf = Gltf(path, document, (), SceneFiles(path, root))
+    return replace(gltf, buffers=tuple(_buffers(gltf, binary)))
+
+
+def _buffers(gltf: Gltf, binary: bytes | None) -> Iterator[bytes]:
+    """The content of every buffer; `binary` is the first one's if it has no uri."""
+    for i, buffer in enumerate(gltf.document.buffers):
+        field = f"buffers.{i}"
+        if buffer.uri is None and (i or binary is None):
+            raise UserError("has neither a uri nor a binary chunk", file=gltf.path, field=field)
+        content = binary if buffer.uri is None else gltf.resource(buffer.uri, field)
+        assert content is not None
         if len(content) < buffer.byteLength:
-            got, expected = f"{len(content)} bytes", f"{buffer.byteLength}"
-            raise UserError("buffer is truncated", file=path, field=f"buffers.{i}", got=got, expected=expected)
-        buffers.append(content)
-        sources += [source] if source else []
-    return Gltf(path, document, tuple(buffers), tuple(sources), root)
+            raise gltf.error("buffer is truncated", field, f"{len(content)} bytes", buffer.byteLength)
+        yield content
 
 
 def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
@@ -181,30 +190,3 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
     if JSON_CHUNK not in chunks:
         raise UserError("no JSON chunk", file=path)
     return chunks[JSON_CHUNK], chunks.get(BIN_CHUNK)
-
-
-def _buffer(uri: str | None, binary: bytes | None, path: Path, field: str, root: Path) -> tuple[bytes, Path | None]:
-    """Bytes of a buffer or image, and the file they are from where it is another one."""
-    if uri is None:
-        if binary is None:
-            raise UserError("has neither a uri nor a binary chunk", file=path, field=field)
-        return binary, None
-    return resource(uri, path, field, root)
-
-
-def is_missing(uri: str, path: Path, field: str, root: Path) -> bool:
-    """Whether a uri of `path` names a file below `root` that is not there."""
-    return not uri.startswith("data:") and "://" not in uri and not named(unquote(uri), path, root, field).exists()
-
-
-def resource(uri: str, path: Path, field: str, root: Path) -> tuple[bytes, Path | None]:
-    """Bytes behind a uri of `path`: data within it, or a file below `root`."""
-    if uri.startswith("data:"):
-        try:
-            return base64.b64decode(uri.partition(",")[2], validate=True), None
-        except binascii.Error as error:
-            raise UserError(f"its base64 data is damaged ({error})", file=path, field=field) from error
-    if "://" in uri:
-        raise UserError("is on the network", file=path, field=field, got=uri, hint="put the file beside the scene")
-    source = named(unquote(uri), path, root, field)
-    return read_bytes(source, LIMIT_BYTES), source

@@ -1,7 +1,7 @@
-"""How much light a surface reflects and lets through, smooth or rough, and the nearest to it that lobes have.
+"""Reflectance and transmittance of smooth and rough dielectrics and metals, and their nearest fits by lobes.
 
-Rough ones as Mitsuba has them: one bounce on microfacets, Smith's masking (Walter et al. 2007, "Microfacet models for
-refraction", eqs 19-28, 34); light that would bounce twice is lost, so that reflected and passed do not sum to 1.
+Rough surfaces are Mitsuba's: one bounce on microfacets with Smith's masking (Walter et al. 2007, "Microfacet models for
+refraction", eqs 19-28, 34). Light of a second bounce is lost, so that reflectance and transmittance do not sum to 1.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ COS = (GAUSS_POINTS + 1) / 2  # where Fresnel's terms are compared
 
 
 def fresnel(cos_i: Floats, eta: float | complex) -> Floats:
-    """Reflectance of unpolarised light; eta - ik, inside by outside, of metals; below 1 there is total reflection."""
+    """Fresnel reflectance of unpolarised light at the relative index eta (eta - ik of metals), inside by outside."""
     inside = np.conj(complex(eta)) if abs(eta) > 1e-3 else 1e-3 + 0j
     cos_t = np.sqrt(1 - (1 - cos_i**2) / inside**2 + 0j)
     across = (cos_i - inside * cos_t) / (cos_i + inside * cos_t)
@@ -24,13 +24,8 @@ def fresnel(cos_i: Floats, eta: float | complex) -> Floats:
     return np.asarray((np.abs(across) ** 2 + np.abs(parallel) ** 2) / 2)
 
 
-def normal_reflectance(eta: float) -> float:
-    """Reflectance of a dielectric at normal incidence."""
-    return ((eta - 1) / (eta + 1)) ** 2
-
-
 def reflectance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
-    """Share of light from one direction that is reflected, at each of cos_i (N,); m is the slope roughness."""
+    """Share of the light from one direction that is reflected, at cos_i (N,); m is the slope roughness."""
     if m == 0:
         return fresnel(cos_i, eta)
     ci, z, cos_d = _facets(cos_i, m, distribution)
@@ -38,7 +33,7 @@ def reflectance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "
 
 
 def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
-    """Share of light from one direction that passes, at each of cos_i (N,)."""
+    """Share of the light from one direction that is transmitted, at cos_i (N,)."""
     if m == 0:
         return 1 - fresnel(cos_i, eta)
     ci, z, cos_d = _facets(cos_i, m, distribution)
@@ -48,22 +43,22 @@ def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str =
 
 
 def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
-    """Share of diffuse light that is reflected. Of a smooth surface seen from inside it follows from outside."""
-    if m == 0 and eta < 1:
+    """Share of diffuse light that is reflected."""
+    if m == 0 and eta < 1:  # inside a smooth surface: by reciprocity from outside
         return 1 - (1 - mean_reflectance(1 / eta)) * eta**2
     return _mean(reflectance(COS, eta, m, distribution))
 
 
 def mean_transmittance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
-    """Share of diffuse light that passes."""
+    """Share of diffuse light that is transmitted."""
     return _mean(transmittance(COS, eta, m, distribution))
 
 
 def nearest_fresnel(exact: Floats) -> tuple[float, float]:
     """r0 and k of the k (r0 + (1 - r0)(1 - cos)^5) nearest to a reflectance at `COS`, k at most 1.
 
-    Weighed by the cosine and relative to what is reflected: metals, whose reflectance dips before it rises, come out
-    nearly flat; a dielectric gains a little at normal incidence for what Schlick's curve lacks at 60 degrees.
+    The error is relative and weighted by the cosine. Metals, whose reflectance dips before it rises, come out nearly
+    flat; a dielectric gains a little at normal incidence for what Schlick's curve lacks at 60 degrees.
     """
     rise = (1 - COS) ** 5
     weight = GAUSS_WEIGHTS * COS / np.maximum(exact, 1e-3)
@@ -85,7 +80,7 @@ def nearest_passage(exact: Floats) -> tuple[float, float]:
     shapes = under * COS ** powers[:, None]
     weight = GAUSS_WEIGHTS * COS
     k = (weight * shapes * exact).sum(axis=1) / (weight * shapes**2).sum(axis=1)
-    k = np.minimum(k, exact.max())  # so that glass which is hardly there does not return more than arrives
+    k = np.minimum(k, exact.max())  # thin glass must not have an albedo above 1
     off = (weight * (k[:, None] * shapes - exact) ** 2).sum(axis=1)
     best = int(np.argmin(off))
     return float(k[best]), float(powers[best])
@@ -96,7 +91,7 @@ def _mean(values: Floats) -> float:
 
 
 def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats, Floats]:
-    """cos_i (N, 1), and of facets drawn with density D cos their own cosine and that between them and the light."""
+    """cos_i (N, 1), and of facets of density D cos the cosines to the surface's normal and to the light (N, K)."""
     u = (np.arange(FACETS) + 0.5) / FACETS
     r = np.sqrt(u / (1 - u)) if distribution == "ggx" else np.sqrt(-np.log(1 - u))
     x = (m * r[:, None] * np.cos(2 * np.pi * u)).ravel()
@@ -108,13 +103,13 @@ def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats,
 def _returned(
     share: Floats, cos_o: Floats, ci: Floats, z: Floats, cos_d: Floats, m: float, distribution: str
 ) -> Floats:
-    """Mean over facets of what leaves at cos_o without meeting another one."""
+    """Mean over facets of the light that leaves at cos_o without masking."""
     held = share * _unmasked(ci, m, distribution) * _unmasked(np.maximum(cos_o, 1e-6), m, distribution)
     return np.asarray(np.where(cos_o > 0, held * cos_d / (ci * z), 0.0).mean(axis=1))
 
 
 def _unmasked(cosine: Floats, m: float, distribution: str) -> Floats:
-    """Smith's share of facets that are seen."""
+    """Share of facets that Smith's masking leaves visible."""
     tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / cosine
     if distribution == "ggx":
         return np.asarray(2 / (1 + np.sqrt(1 + (m * tangent) ** 2)))

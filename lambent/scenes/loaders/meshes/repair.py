@@ -1,0 +1,157 @@
+"""From the arrays of a file to a mesh that can be baked: missing ones are made, broken triangles dropped, all noted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.directions import Floats, basis, normalize
+from lambent.core.errors import UserError
+from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
+from lambent.scenes.geometry import tangents_along
+from lambent.scenes.geometry.grid import FLAT
+from lambent.scenes.loaders.meshes.polygons import Indices, smooth_normals
+from lambent.scenes.scene import Mesh
+
+TRIANGLES_MAX = 20_000_000  # of one file
+ABSURD = 1e15
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """Arrays of a file: positions, normals, tangents (V, 3), uv (V, 2), triangles (T, 3) integer, counter-clockwise.
+
+    Normals, uv and tangents may be absent.
+    """
+
+    positions: Floats
+    triangles: Indices
+    normals: Floats | None = None
+    uv: Floats | None = None
+    tangents: Floats | None = None
+
+    def smooth(self) -> MeshArrays:
+        """The same with smooth normals, if they are absent."""
+        if self.normals is not None or not len(self.triangles) or int(self.triangles.max()) >= len(self.positions):
+            return self
+        normals = np.zeros_like(self.positions)
+        made = smooth_normals(self.positions, self.triangles, self.triangles)
+        normals[: len(made)] = made
+        return replace(self, normals=normals)
+
+
+def check_triangles(count: int, file: Path) -> None:
+    """`UserError` where a scene has more triangles than can be held."""
+    if count > TRIANGLES_MAX:
+        got, most = f"{count} triangles", f"at most {TRIANGLES_MAX}"
+        raise UserError("scene is too large", file=file, got=got, expected=most)
+
+
+def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, list[str]]:
+    """Mesh of arrays read from a file, and what was repaired; None where no triangle is left.
+
+    Missing normals become flat ones, missing uv box-mapped metres, missing tangents the direction of u.
+
+    Raises
+    ------
+    UserError
+        Where a triangle names a vertex that is not there.
+    """
+    notes: list[str] = []
+    positions, faces = _tame(arrays.positions), arrays.triangles
+    normals, uv, tangents = (None if a is None else _tame(a) for a in (arrays.normals, arrays.uv, arrays.tangents))
+    if faces.size and int(faces.max()) >= len(positions):
+        got, expected = int(faces.max()), f"below {len(positions)}"
+        raise UserError("face index out of range", file=file, field=name, got=got, expected=expected)
+    faces = _usable(positions, faces, notes)
+    if not len(faces):
+        return None, [f"{name}: left out, it has no triangle with an area ({'; '.join(notes) or 'empty'})"]
+    if normals is None:  # every triangle gets vertices of its own
+        own = faces.reshape(-1)
+        faces = np.arange(len(own)).reshape(-1, 3)
+        positions, uv, tangents = positions[own], _at(uv, own), _at(tangents, own)
+        normals = np.repeat(triangle_normals(positions[faces]), 3, axis=0)
+        notes.append("no normals: faces are flat")
+    else:
+        normals = _unit_normals(positions, faces, normals, notes)
+    if uv is None:
+        uv = _box_mapped(positions, normals)
+        notes.append("no uv: box-mapped, one unit a metre")
+    elif not np.isfinite(uv).all():
+        uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
+        notes.append("uv not finite: set to 0")
+    direction = _along_u(positions, faces, uv) if tangents is None else np.nan_to_num(tangents)
+    used, index = np.unique(faces, return_inverse=True)
+    mesh = Mesh(
+        positions[used].astype(np.float32),
+        normals[used].astype(np.float32),
+        tangents_along(normals, direction)[used].astype(np.float32),
+        uv[used].astype(np.float32),
+        index.reshape(-1, 3).astype(np.uint32),
+    )
+    return mesh, [f"{name}: {what}" for what in notes]
+
+
+def _tame(values: Floats) -> Floats:
+    """`values`, and NaN for those too large to be meant: their squares would overflow in single precision."""
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(values) < ABSURD, values, np.nan)
+
+
+def _at(values: Floats | None, index: Indices) -> Floats | None:
+    return None if values is None else values[index]
+
+
+def _usable(positions: Floats, faces: Indices, notes: list[str]) -> Indices:
+    """Faces with finite corners and an area, in float32, as they will be stored."""
+    finite = np.asarray(np.isfinite(positions).all(axis=-1))[faces].all(axis=-1)
+    if not finite.all():
+        notes.append(f"{int((~finite).sum())} triangles dropped: a corner is not finite")
+    faces = faces[finite]
+    if not len(faces):
+        return faces
+    extent = float(np.ptp(positions[np.unique(faces)], axis=0).max())
+    wide = triangle_areas(positions.astype(np.float32)[faces].astype(float)) > FLAT * extent**2
+    if not wide.all():
+        notes.append(f"{int((~wide).sum())} triangles dropped: no area")
+    return faces[wide]
+
+
+def _unit_normals(positions: Floats, faces: Indices, normals: Floats, notes: list[str]) -> Floats:
+    """Unit normals; those without a direction become the mean of their faces'."""
+    length = np.linalg.norm(np.nan_to_num(normals), axis=-1)
+    broken = np.asarray(~np.isfinite(normals).all(axis=-1) | (length < 1e-6))
+    unit = normalize(np.nan_to_num(normals))
+    broken &= np.isin(np.arange(len(normals)), faces)
+    if broken.any():
+        mean = np.zeros_like(positions)
+        vectors = area_vectors(positions[faces])
+        for corner in range(3):
+            np.add.at(mean, faces[:, corner], vectors)
+        unit[broken] = normalize(mean)[broken]
+        notes.append(f"{int(broken.sum())} normals were no direction: taken from the faces")
+    unit[np.linalg.norm(unit, axis=-1) < 0.5] = (0.0, 1.0, 0.0)  # of faces that cancel, of vertices that nothing uses
+    return unit
+
+
+def _box_mapped(positions: Floats, normals: Floats) -> Floats:
+    """uv (V, 2) in metres: the two axes across which the normal is not largest."""
+    kept = np.array([(2, 1), (0, 2), (0, 1)])[np.argmax(np.abs(normals), axis=-1)]
+    return np.take_along_axis(np.nan_to_num(positions), kept, axis=-1)
+
+
+def _along_u(positions: Floats, faces: Indices, uv: Floats) -> Floats:
+    """Direction (V, 3) in which u grows, the mean over the faces of each vertex; +x where uv does not tell."""
+    finite = np.nan_to_num(positions)
+    a, b, c = (finite[faces[:, i]] for i in range(3))
+    ua, ub, uc = (uv[faces[:, i]] for i in range(3))
+    d1, d2 = ub - ua, uc - ua
+    along = np.sign(cross_2d(d1, d2))[:, None] * ((b - a) * d2[:, 1:] - (c - a) * d1[:, 1:])
+    total = np.zeros_like(finite)
+    for corner in range(3):
+        np.add.at(total, faces[:, corner], normalize(along))
+    lost = np.linalg.norm(total, axis=-1) < 1e-6
+    total[lost] = basis(np.array([0.0, 1.0, 0.0]))[0]
+    return total

@@ -1,0 +1,81 @@
+"""Files that a scene's files name: in the scene's folder or below, however they were written down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path, PureWindowsPath
+
+from lambent.core.errors import UserError
+from lambent.core.files import inside, read_bytes
+
+HINT = "put the file into the scene's folder or below"
+
+
+class SceneFiles:
+    """The files of one scene, below the folder `root`, which is that of its first file if not given.
+
+    `sources` are those used so far, in order.
+    """
+
+    def __init__(self, first: Path, root: Path | None = None) -> None:
+        self.root = first.resolve().parent if root is None else root
+        self.sources = [first]
+
+    def use(self, path: Path) -> Path:
+        """`path`, noted as a source."""
+        if path not in self.sources:
+            self.sources.append(path)
+        return path
+
+    def read(self, path: Path, limit_bytes: int) -> bytes:
+        """Content of a file, noted as a source."""
+        return read_bytes(self.use(path), limit_bytes)
+
+    def path(self, name: str, file: Path, field: str) -> Path:
+        """The path of `name` as written in `file`, which may be Windows's; it need not exist.
+
+        Raises
+        ------
+        UserError
+            Where the name leads out of the scene's folder.
+        """
+        if not name.strip():
+            raise UserError("is not a file name", file=file, field=field, got=repr(name))
+        if PureWindowsPath(name).drive:
+            raise UserError("path leaves its folder", file=file, field=field, got=name, hint=HINT)
+        try:
+            return inside(self.root, str(file.resolve().parent / name.replace("\\", "/")))
+        except UserError as error:
+            raise UserError(error.message, file=file, field=field, got=name, hint=HINT) from error
+
+    def find(self, name: str, file: Path, field: str) -> tuple[Path, bool]:
+        """As `path`; a name that leads out, or nowhere, is also looked for beside `file`, without its folders.
+
+        Returns
+        -------
+        path, moved : Path, bool
+            Where the file is, and whether it was found only beside `file`. The path need not exist.
+        """
+        last = PureWindowsPath(name.replace("/", "\\")).name
+        is_beside = bool(last) and "\0" not in name and (file.resolve().parent / last).is_file()
+        try:
+            path = self.path(name, file, field)
+        except UserError:
+            if not is_beside:
+                raise
+        else:
+            if path.is_file() or not is_beside:
+                return path, False
+        return self.path(last, file, field), True
+
+    def look_for(
+        self, what: str, name: str, file: Path, field: str, note: Callable[[str], None], otherwise: str = ""
+    ) -> Path | None:
+        """The file that `name` means in `file`, as a source; None, and a note, where it is not there."""
+        path, moved = self.find(name, file, field)
+        if not path.is_file():
+            note(f"{what} {name} is not there{otherwise}")
+            return None
+        if moved:
+            note(f"{what} {name} was found beside {file.name}")
+        return self.use(path)

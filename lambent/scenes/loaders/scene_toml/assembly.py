@@ -1,0 +1,118 @@
+"""Several geometry files as one: unique names, a material set, materials assigned by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.materials.document import Material
+from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.scene import MaterialTextures, SceneObject
+
+NAMES_HINT = "see the names with `lambent inspect`"
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Objects of all files, their materials and textures by name."""
+
+    objects: tuple[SceneObject, ...]
+    materials: dict[str, Material]
+    textures: dict[str, MaterialTextures]
+    warnings: tuple[str, ...]
+
+
+def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> Assembly:
+    """The contents of all files as one, with the material set `variant` of the files that have it.
+
+    Names of objects that are taken get a number. So do those of materials, unless both are the same.
+
+    Raises
+    ------
+    UserError
+        Where no file has the variant.
+    """
+    known = {name for c in contents for name in c.variants}
+    if variant is not None and variant not in known:
+        hint = did_you_mean(variant, known) or ("the geometry has none" if not known else None)
+        raise UserError(
+            "unknown variant", file=path, field="variant", got=variant, expected=", ".join(sorted(known)) or None,
+            hint=hint,
+        )  # fmt: skip
+    objects: list[SceneObject] = []
+    materials: dict[str, Material] = {}
+    textures: dict[str, MaterialTextures] = {}
+    warnings: list[str] = []
+    taken: set[str] = set()
+    for c in contents:
+        called = _own_names(c, materials, textures, warnings)
+        variants = c.variants.get(variant, {}) if variant is not None else {}
+        for o in c.objects:
+            material, emission = variants.get(o.name, (o.material, o.emission))
+            name, material = unique_name(o.name, taken), called.get(material, material)
+            objects.append(replace(o, name=name, material=material, emission=emission))
+        materials |= {called[n]: m.model_copy(update={"name": called[n]}) for n, m in c.materials.items()}
+        textures |= {called[n]: t for n, t in c.textures.items() if n in called}
+        warnings += c.warnings
+    return Assembly(tuple(objects), materials, textures, tuple(warnings))
+
+
+def _own_names(
+    contents: Contents, materials: Mapping[str, Material], textures: Mapping[str, MaterialTextures], warnings: list[str]
+) -> dict[str, str]:
+    """Names of a file's materials beside those of other files."""
+    called: dict[str, str] = {}
+    taken = set(materials) | set(contents.materials)
+    for name, material in contents.materials.items():
+        same = name in materials and material == materials[name] and contents.textures.get(name) is textures.get(name)
+        called[name] = name
+        if name in materials and not same:
+            called[name] = unique_name(name, taken)
+            warnings.append(f"material {name}: two files have one of this name, the second is now {called[name]}")
+    return called
+
+
+def assigned(
+    rules: Mapping[str, str], objects: Iterable[SceneObject], materials: Mapping[str, Material], path: Path
+) -> tuple[tuple[SceneObject, ...], list[str]]:
+    """Objects with materials assigned by rules, and a warning for each rule that fits nothing.
+
+    A rule is a pattern with * and ? over the names of objects and of their original materials; later ones win.
+
+    Raises
+    ------
+    UserError
+        Where a rule names a material that is not there.
+    """
+    by_name = {o.name: o for o in objects}
+    originals = {name: o.material for name, o in by_name.items()}
+    warnings = []
+    for pattern, material in rules.items():
+        check_material(material, materials, path, f"assign.{pattern}")
+        fits = [n for n, was in originals.items() if fnmatchcase(n, pattern) or fnmatchcase(was, pattern)]
+        for name in fits:
+            by_name[name] = replace(by_name[name], material=material)
+        if not fits:
+            hint = did_you_mean(pattern, [*originals.values(), *originals]) or NAMES_HINT
+            warnings.append(f"assign.{pattern} fits no object and no material: {hint}")
+    return tuple(by_name.values()), warnings
+
+
+def check_material(name: str, materials: Mapping[str, Material], path: Path, field: str) -> None:
+    """`UserError` where a scene.toml names a material that is not there."""
+    if name not in materials:
+        hint = did_you_mean(name, materials) or f"describe it under [materials.{name}]"
+        raise UserError("unknown material", file=path, field=field, got=name, hint=hint)
+
+
+def fitting(pattern: str, names: Iterable[str], path: Path, field: str, got: str | None = None) -> list[str]:
+    """The names that fit a pattern with * and ?; a `UserError` where none does."""
+    names = list(names)
+    fits = [name for name in names if fnmatchcase(name, pattern)]
+    if not fits:
+        hint = did_you_mean(pattern, names) or NAMES_HINT
+        raise UserError("fits no object", file=path, field=field, got=got, hint=hint)
+    return fits

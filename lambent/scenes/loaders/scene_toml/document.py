@@ -1,0 +1,205 @@
+"""scene.toml: a scene described in text, its geometry in files beside it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.files import read_bytes
+from lambent.core.plain import Triple
+from lambent.materials.document import Material, load_material, material_from
+from lambent.scenes.geometry import transformed
+from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.scene_files import SceneFiles
+from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
+from lambent.scenes.loaders.scene_toml.schema import GeometrySection, ImageSection, SceneDocument, known_keys
+from lambent.scenes.scene import Environment, ImageEnvironment, PointLight, ReflectorRule, Scene, SceneObject
+
+LIMIT_BYTES = 4 << 20
+ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
+
+
+def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
+    """Scene of a scene.toml; files it names lie in its folder or below.
+
+    Raises
+    ------
+    UserError
+        Where the file is not TOML, has an unknown key or an impossible value, or names what is not there.
+    """
+    document, files = _parse(path), SceneFiles(path)
+    contents = [_geometry(entry, path, files, read_geometry) for entry in document.geometry]
+    for source in (s for c in contents for s in c.sources):
+        files.use(source)
+    environment = _environment(document, path, files) or next((c.environment for c in contents if c.environment), None)
+    whole = assembled(contents, document.variant, path)
+    described = _materials(document, path, files)
+    materials = {**whole.materials, **described}
+    objects, unfit = assigned(document.assign, whole.objects, materials, path)
+    objects, centres, planes = _apply(document, objects, path)
+    for o in objects:
+        check_material(o.material, materials, path, f"objects.{o.name}.material")
+    if isinstance(environment, ImageEnvironment):
+        files.use(environment.file)
+    cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
+    _check_names([c.name for c in cameras], path, "cameras")
+    _check_names([p.name for p in document.paths], path, "paths")
+    return Scene(
+        name=document.name,
+        objects=objects,
+        materials=materials,
+        environment=environment,
+        lights=(*(light for c in contents for light in c.lights), *(section.light() for section in document.lights)),
+        cameras=cameras,
+        paths=tuple(section.path() for section in document.paths),
+        exposure_ev=document.exposure_ev,
+        sources=tuple(files.sources),
+        warnings=(*whole.warnings, *unfit),
+        textures={name: t for name, t in whole.textures.items() if name not in described},
+        measured=_measured(document, materials, path, files),
+        probe_planes=planes,
+        probe_centres=centres,
+        reflector_rules=_reflector_rules(document, objects, path),
+    )
+
+
+def _parse(path: Path) -> SceneDocument:
+    try:
+        data = tomllib.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"not a TOML document ({error})", file=path) from error
+    try:
+        return SceneDocument.model_validate(data)
+    except ValidationError as error:
+        raise _one_line(error, path) from error
+
+
+def _one_line(error: ValidationError, path: Path) -> UserError:
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        return UserError("unknown key", file=path, field=where, hint=did_you_mean(str(first["loc"][-1]), known_keys()))
+    if first["type"] == "missing":
+        return UserError("is missing", file=path, field=where)
+    return UserError(first["msg"].removeprefix("Value error, "), file=path, field=where, got=first["input"])
+
+
+def _geometry(entry: str | GeometrySection, path: Path, files: SceneFiles, read_geometry: ReadGeometry) -> Contents:
+    if isinstance(entry, str):
+        return read_geometry(entry, path, files)
+    contents, size = read_geometry(entry.file, path, files), entry.scale
+    matrix = np.diag([size] * 3 + [1.0])
+
+    def scaled(position: Triple) -> Triple:
+        x, y, z = position
+        return x * size, y * size, z * size
+
+    return replace(
+        contents,
+        objects=tuple(replace(o, mesh=transformed(o.mesh, matrix)) for o in contents.objects),
+        cameras=tuple(replace(c, position=scaled(c.position), target=scaled(c.target)) for c in contents.cameras),
+        lights=tuple(
+            replace(light, position=scaled(light.position)) if isinstance(light, PointLight) else light
+            for light in contents.lights
+        ),
+    )
+
+
+def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[str, Material]:
+    """Materials described in the document, or in files that it names."""
+    materials = {}
+    for name, table in document.materials.items():
+        where = f"{path}: materials.{name}"
+        if "file" in table:
+            if len(table) > 1:
+                raise UserError("says more than its file", file=where, got=sorted(set(table) - {"file"})[0])
+            field = f"materials.{name}.file"
+            if not isinstance(table["file"], str):
+                raise UserError("is not a file name", file=path, field=field, got=table["file"])
+            source = files.path(table["file"], path, field)
+            materials[name] = _material_of_file(source, field, path).model_copy(update={"name": name})
+            files.use(source)
+        else:
+            materials[name] = material_from({"name": name, **table}, where)
+    return materials
+
+
+def _measured(
+    document: SceneDocument, materials: Mapping[str, Material], path: Path, files: SceneFiles
+) -> dict[str, Path]:
+    """Files of the tables that materials scatter by while the scene is baked."""
+    for name in document.measured:
+        check_material(name, materials, path, f"measured.{name}")
+    return {name: files.path(file, path, f"measured.{name}") for name, file in document.measured.items()}
+
+
+def _material_of_file(source: Path, field: str, path: Path) -> Material:
+    """The material of a document; a `UserError` if the file is a measurement, which has to be fitted first."""
+    from lambent.materials.measured.registry import is_known
+
+    if source.is_file() and not _begins_as_json(source) and is_known(source):
+        fitted = source.with_suffix(".json").name
+        hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
+        raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
+    return load_material(source)
+
+
+def _begins_as_json(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
+
+
+def _apply(
+    document: SceneDocument, objects: tuple[SceneObject, ...], path: Path
+) -> tuple[tuple[SceneObject, ...], dict[str, Triple], dict[str, Any]]:
+    """Objects with the document's settings, and the probes' centres and planes by object; later patterns win."""
+    by_name = {o.name: o for o in objects}
+    centres: dict[str, Triple] = {}
+    planes: dict[str, Any] = {}
+    for pattern, section in document.objects.items():
+        settings = section.model_dump(exclude_none=True)
+        centre, own_planes = settings.pop("probe_centre", None), settings.pop("probe_planes", None)
+        for name in fitting(pattern, by_name, path, f"objects.{pattern}"):
+            by_name[name] = replace(by_name[name], **settings)
+            if centre is not None:
+                centres[name] = centre
+            if own_planes is not None:
+                planes[name] = _unit_planes(own_planes)
+    return tuple(by_name.values()), centres, planes
+
+
+def _reflector_rules(
+    document: SceneDocument, objects: tuple[SceneObject, ...], path: Path
+) -> tuple[ReflectorRule, ...]:
+    for section in document.reflectors:
+        fitting(section.objects, [o.name for o in objects], path, "reflectors.objects", got=section.objects)
+    return tuple(ReflectorRule(r.objects, r.use, r.plane) for r in document.reflectors)
+
+
+def _unit_planes(planes: Any) -> Any:
+    """(P, 4) planes with normals of unit length."""
+    array = np.asarray(planes, np.float32).reshape(-1, 4)
+    return array / np.linalg.norm(array[:, :3], axis=-1, keepdims=True)
+
+
+def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Environment | None:
+    section = document.environment
+    if not isinstance(section, ImageSection):
+        return None if section is None else section.environment()
+    file = files.path(section.file, path, "environment.file")
+    if not file.is_file():
+        raise UserError("file not found", file=path, field="environment.file", got=section.file)
+    return ImageEnvironment(file, section.scale, section.rotation_deg)
+
+
+def _check_names(names: list[str], path: Path, field: str) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise UserError("name is used twice", file=path, field=field, got=name)
