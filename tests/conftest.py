@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,28 +20,30 @@ def shared_data() -> Path:
     return SHARED
 
 
-@pytest.fixture(scope="session")
-def adapter() -> None:
-    """A graphics adapter, be it software; tests that draw skip where there is none."""
+def or_skip(start: Callable[[], object]) -> None:
+    """Skip where this machine cannot start what a test needs."""
     from lambent.core.errors import UserError
-    from lambent.realtime.device import choose_adapter
 
     try:
-        choose_adapter()
+        start()
     except UserError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def adapter() -> None:
+    """A graphics adapter, hardware or software; tests that draw skip without one."""
+    from lambent.realtime.device import choose_adapter
+
+    or_skip(choose_adapter)
 
 
 @pytest.fixture(scope="session")
 def mi() -> Any:
-    """Mitsuba, its variant chosen, our BSDFs known to it; tests that need it skip where no variant works."""
+    """Mitsuba with its variant set and our BSDFs registered; tests that need it skip where no variant works."""
     from lambent.bake.engine import engine
-    from lambent.core.errors import UserError
 
-    try:
-        engine()
-    except UserError as error:
-        pytest.skip(str(error))
+    or_skip(engine)
     from lambent.bake.material_plugin import register_material_plugin
     from lambent.bake.table_plugin import register_table_plugin
 

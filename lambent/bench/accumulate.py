@@ -1,107 +1,98 @@
-"""What a still camera gains from frame to frame: the error of 1, 2, 4 ... 256 accumulated `qmc` frames.
+"""Convergence for a still camera: the error of 1, 2, 4 ... 256 accumulated `qmc` frames.
 
-The truth is the mean of `REPLICAS` longer series of other samples: the picture moved by whole pixels, so that every
+The truth is the mean of `REPLICAS` longer series of other samples: the image is moved by whole pixels, so that every
 place has another pixel's rotation of the sequence. Replicas of `qmc-lobe`, which aims at no lamp and so shares
-no density with `qmc`, tell whether the two agree, pixel by pixel, within what the replicas scatter. Frames are counted,
-not seconds: how many of them two seconds hold is the adapter's affair; `PROMISED` is 2 s at 30 frames per second.
+no density with `qmc`, tell whether the two agree, pixel by pixel, within the scatter of the replicas. Frames are
+counted, not seconds: the adapter decides how many fit into two seconds; `PROMISED` is 2 s at 30 frames per second.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bench import planar_scene, specular_scene
-from lambent.bench.machine import inputs_of, machine
+from lambent.bench import planar_scene
+from lambent.bench.planar_quality import lobe_of
 from lambent.bench.quality_inputs import MATERIALS, OWN_ENVIRONMENTS
+from lambent.bench.reference import Floats, Reference
+from lambent.bench.specular_scene import sphere_and_torus
 from lambent.core import metrics
-from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import open_device
 from lambent.realtime.frame import QMC_N, FrameState, Renderer
+from lambent.realtime.unbaked import CAMERA, unbaked_scene
 
 NAME = "accumulate"
-Floats = NDArray[np.floating]
 PROMISED = 60
-FRAMES = (1, 2, 4, 8, 16, 32, PROMISED, 64, 128, 256)
-TRUTH_SPP = {True: 8192, False: 32768}  # by quick; of all replicas together
 TRUTH_N = 64  # samples per frame of the truth
 REPLICAS, REPLICAS_ALONE = 8, 16  # of the truth, and of `qmc-lobe`, whose rare bright samples skew a small sample
 MOST_MOVED = 2  # pixels
 BLOCK = 8  # pixels along the squares whose means are compared too: nearer to normal than single pixels
-SIZES = {True: 32, False: 64}
 LOBES = tuple(material.lobes[0] for material in MATERIALS if material.name in ("satin .1", "rough .4", "miro .013/.12"))
-PLANAR_LOBE = Lobe(mx=0.1, my=0.1, r0=0.9, alpha=0.5)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Pixels along each side, samples per pixel of all of the truth's replicas together, and what is measured."""
+
+    size_px: int = 64
+    truth_spp: int = 32768
+    frames: tuple[int, ...] = (1, 2, 4, 8, 16, 32, PROMISED, 64, 128, 256)
+    lobes: tuple[Lobe, ...] = LOBES
+    environments: Mapping[str, Callable[[], Floats]] = field(default_factory=lambda: OWN_ENVIRONMENTS)
+
+
+FULL, QUICK = Effort(), Effort(32, 8192)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A lobe in a scene: `name` is the environment, or planar."""
+    """A lobe in a scene, and the frame that shows it: `name` is the environment, or planar."""
 
     name: str
     renderer: Renderer
     state: FrameState
-    material: str  # the one that the lobe stands in for
     lobe: Lobe
 
-    def of(self, *lobes: Lobe) -> FrameState:
-        return replace(self.state, materials={self.material: Material(name=self.material, lobes=lobes)})
 
-
-def run(quick: bool, inputs: list[Path], progress: Progress = silent) -> dict[str, Any]:
-    """Rows case x frames; it reads no inputs."""
-    if inputs:
-        raise UserError("this bench reads no inputs", got=inputs[0])
-    device = open_device()
-    cases = list(_cases(device, SIZES[quick]))
+def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
+    """Rows case x frames."""
+    cases = list(_cases(open_device(), effort))
     rows: list[dict[str, Any]] = []
     for done, case in enumerate(cases):
-        rows += errors_of(case, TRUTH_SPP[quick])
+        rows += errors_of(case, effort)
         progress(done + 1, len(cases), f"{case.name} {case.lobe.mx:g}")
-    return {
-        "bench": NAME,
-        "machine": machine(device),
-        "inputs": inputs_of(inputs),
-        "rows": rows,
-        "summary": summary(rows),
-    }
+    return {"rows": rows, "summary": summary(rows)}
 
 
-def _cases(device: Any, size: int) -> Iterator[Case]:
-    state = FrameState(specular_scene.CAMERA, size, size, show="specular", lookup="plain", antialias=False)
-    meshes = specular_scene.sphere_and_torus(detail=48)
-    for name, make in OWN_ENVIRONMENTS.items():
-        base = Material(name="shown", lobes=(LOBES[0],))
-        renderer = Renderer(device, specular_scene.baked_scene(meshes, base, make()))
-        for lobe in LOBES:
-            yield Case(name, renderer, state, "shown", lobe)
-    renderer = Renderer(device, planar_scene.planar_scene(PLANAR_LOBE))
-    yield Case("planar", renderer, replace(state, camera=planar_scene.CAMERA), planar_scene.FLOOR, PLANAR_LOBE)
+def _cases(device: Any, effort: Effort) -> Iterator[Case]:
+    size, base = effort.size_px, Material(name="shown", lobes=(LOBES[0],))
+    meshes, planar = sphere_and_torus(detail=48), lobe_of(0.1, 0.1)
+    state = FrameState(CAMERA, size, size, show="specular", lookup="plain", antialias=False)
+    for name, make in effort.environments.items():
+        renderer = Renderer(device, unbaked_scene(meshes, base, make()))
+        for lobe in effort.lobes:
+            material = base.model_copy(update={"lobes": (lobe,)})
+            yield Case(name, renderer, replace(state, materials={"shown": material}), lobe)
+    renderer = Renderer(device, planar_scene.planar_scene(planar))
+    yield Case("planar", renderer, replace(planar_scene.floor_state(planar, size, size), lookup="plain"), planar)
 
 
 def replicas(case: Case, integrator: str, chosen: list[tuple[int, int]], spp: int) -> Floats:
     """(R, H, W, 3) series of at least `spp` samples each, one per move, all moved back."""
-    pictures, frames = [], max(1, -(-spp // TRUTH_N))
-    for right, down in chosen:
-        state = replace(case.of(case.lobe), integrator=integrator, n=TRUTH_N, jitter_px=(float(right), float(down)))
-        for index in range(frames - 1):
-            case.renderer.draw(replace(state, accumulate=index))
-            if index % 16 == 15:
-                case.renderer.finish()
-        last = case.renderer.image(replace(state, accumulate=frames - 1))
-        pictures.append(np.roll(last, (down, right), axis=(0, 1)))
-    return np.stack(pictures)
+    state = replace(case.state, integrator=integrator, n=TRUTH_N)
+    moved = (case.renderer.converged(replace(state, jitter_px=(float(x), float(y))), spp) for x, y in chosen)
+    return np.stack([np.roll(image, (y, x), axis=(0, 1)) for image, (x, y) in zip(moved, chosen, strict=True)])
 
 
 def moves() -> list[tuple[int, int]]:
-    """Whole pixels (right, down) by which replicas look elsewhere; none is (0, 0), where a series itself looks."""
+    """Whole pixels (right, down) by which replicas are moved; (0, 0) is left to the series itself."""
     steps = range(-MOST_MOVED, MOST_MOVED + 1)
     return [(right, down) for right in steps for down in steps if (right, down) != (0, 0)]
 
@@ -118,10 +109,10 @@ def z_of(a: Floats, b: Floats) -> Floats:
 
 
 def agreement(aimed: Floats, lobe_alone: Floats, shown: NDArray[np.bool_]) -> dict[str, float]:
-    """How two sets of replicas (R, H, W, 3) agree: by pixels shown, by blocks of them, and z_whole of their mean.
+    """Agreement of two sets of replicas (R, H, W, 3): of the shown pixels, of blocks of them, z_whole of their mean.
 
-    z_rms is 1 of unbiased ones, z_above_3 .0027, as far as means are distributed normally. Where rare samples are
-    bright those of pixels are not: most are too dark and seem exact. Those of blocks are nearer to it.
+    If both are unbiased, z_rms is 1 and z_above_3 .0027, as far as means are distributed normally. Where rare samples
+    are bright, means of pixels are not: most are too dark and seem exact. Means of blocks are nearer to normal.
     """
     a, b = (x[:, shown].astype(np.float64).mean(axis=-1) for x in (aimed, lobe_alone))
     z, by_block = z_of(a, b), z_of(block_means(a, shown), block_means(b, shown))
@@ -143,28 +134,27 @@ def block_means(values: Floats, shown: NDArray[np.bool_]) -> Floats:
     return np.stack([np.bincount(block, of_one) / np.bincount(block) for of_one in values])
 
 
-def errors_of(case: Case, truth_spp: int) -> list[dict[str, Any]]:
-    """One row per number of frames: the error of the mean so far, and how the truth agrees with `qmc-lobe`.
+def errors_of(case: Case, effort: Effort) -> list[dict[str, Any]]:
+    """One row per number of frames: the error of the mean so far, and the truth's agreement with `qmc-lobe`.
 
     mse is relative to the truth's mean square. bias is the mean difference as a share of the mean, its standard error
     from the differences of the pixels, whose samples are rotated independently.
     """
-    spp, chosen = truth_spp // REPLICAS, moves()
+    spp, chosen = effort.truth_spp // REPLICAS, moves()
     aimed = replicas(case, "qmc", chosen[:REPLICAS], spp)
     alone = replicas(case, "qmc-lobe", chosen[REPLICAS : REPLICAS + REPLICAS_ALONE], spp)
     truth = aimed.mean(axis=0)
     inside = np.zeros(truth.shape[:2], bool)
     inside[MOST_MOVED:-MOST_MOVED, MOST_MOVED:-MOST_MOVED] = True
-    # a silhouette may fall on either side of a pixel's centre once the picture is moved
+    # a silhouette may fall on either side of a pixel's centre once the image is moved
     shown = inside & np.all(aimed.max(axis=-1) > 0, axis=0) & np.all(alone.max(axis=-1) > 0, axis=0)
-    agrees = agreement(aimed, alone, shown)
-    exposure_ev = metrics.display_exposure(truth * shown[..., None])
-    encoded = metrics.displayed(truth, exposure_ev)[shown]
+    agrees, reference = agreement(aimed, alone, shown), Reference.of(truth, shown)
     rows = []
-    for frames, mean in _series(case):
-        difference = (mean - truth)[shown].astype(np.float64).mean(axis=-1)
+    for frames, image in _series(case, effort.frames):
+        difference = (image - truth)[shown].astype(np.float64).mean(axis=-1)
         light = float(truth[shown].mean())
         error = float(difference.std(ddof=1) / np.sqrt(difference.size))
+        encoded = metrics.displayed(image, reference.exposure_ev)
         rows.append(
             {
                 "case": case.name,
@@ -172,8 +162,8 @@ def errors_of(case: Case, truth_spp: int) -> list[dict[str, Any]]:
                 "my": case.lobe.my,
                 "frames": frames,
                 "samples": frames * QMC_N,
-                "mse": float(np.mean((mean - truth)[shown] ** 2) / np.mean(truth[shown] ** 2)),
-                "psnr": round(metrics.psnr(encoded, metrics.displayed(mean, exposure_ev)[shown]), 2),
+                "mse": float(np.mean((image - truth)[shown] ** 2) / np.mean(truth[shown] ** 2)),
+                "psnr": round(metrics.psnr(reference.encoded[shown], encoded[shown]), 2),
                 "bias_percent": round(100 * float(difference.mean()) / light, 4),
                 "bias_z": round(float(difference.mean()) / max(error, 1e-12), 2),
                 **agrees,
@@ -182,11 +172,12 @@ def errors_of(case: Case, truth_spp: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _series(case: Case) -> Iterator[tuple[int, Floats]]:
-    state = case.of(case.lobe)
-    for index in range(FRAMES[-1]):
-        now = replace(state, integrator="qmc", accumulate=index)
-        if index + 1 in FRAMES:
+def _series(case: Case, wanted: tuple[int, ...]) -> Iterator[tuple[int, Floats]]:
+    """The mean of the first n frames, for each n of `wanted`."""
+    state = replace(case.state, integrator="qmc")
+    for index in range(wanted[-1]):
+        now = replace(state, accumulate=index)
+        if index + 1 in wanted:
             yield index + 1, case.renderer.image(now)
         else:
             case.renderer.draw(now)
@@ -204,14 +195,11 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     for row in rows:
         cases[f"{row['case']} {row['mx']:g}/{row['my']:g}"].append(row)
     last = {name: series[-1] for name, series in cases.items()}
+    promised = {name: next(row for row in series if row["frames"] == PROMISED) for name, series in cases.items()}
+    agree = ("z_rms", "z_above_3", "z_blocks_rms", "z_whole")
     return {
         "slope": {name: round(slope_of(series), 2) for name, series in cases.items()},
-        "psnr_promised": {
-            name: next(row["psnr"] for row in series if row["frames"] == PROMISED) for name, series in cases.items()
-        },
+        "psnr_promised": {name: row["psnr"] for name, row in promised.items()},
         "bias_z_max": max(abs(row["bias_z"]) for row in last.values()),
-        "z_rms": {name: row["z_rms"] for name, row in last.items()},
-        "z_above_3": {name: row["z_above_3"] for name, row in last.items()},
-        "z_blocks_rms": {name: row["z_blocks_rms"] for name, row in last.items()},
-        "z_whole": {name: row["z_whole"] for name, row in last.items()},
+        **{key: {name: row[key] for name, row in last.items()} for key in agree},
     }

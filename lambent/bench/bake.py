@@ -1,9 +1,9 @@
-"""`bake`: what each artefact costs, how noisy it is, and what an interruption costs on top.
+"""`bake`: time and noise of each artefact, and the time that an interruption adds.
 
-Every artefact is baked into a store that holds what it needs; light maps in turns with an interrupted twin, stopped in
-the middle and resumed. Of what has no middle the overhead is what finding it finished takes. `noise` is before
-denoising, relative, root mean square: of light maps what the bake itself notes, of probes what two seeds differ by,
-over the root of 2. One process bakes with all cores; kernels are compiled before anything counts.
+Every artefact is baked into a store that holds what it needs. Light maps are baked in turns with an interrupted twin,
+stopped halfway and resumed; the overhead of an artefact without a middle is the time that finding it finished takes.
+`noise` is relative, root mean square, before denoising: the bake's own figure for light maps; for probes the difference
+of two seeds over the root of 2. One process bakes with all cores; kernels are compiled before anything counts.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import statistics
 import tempfile
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lambent.bake.quality import Quality, quality_named
 from lambent.core.colour import luminance
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.scenes import load_scene
@@ -26,14 +28,38 @@ from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
 NAME = "bake"
-RUNS = 5
 MAIN = "light_map, paths"  # the row that is scaled
 FACTORS = (0.5, 2.0)  # of the texels
 
 
 @dataclass(frozen=True)
+class Effort:
+    """The quality of the bakes, and how often each of them is timed."""
+
+    quality: Quality
+    runs: int = 5
+
+
+FULL = Effort(quality_named("preview"))
+QUICK = Effort(
+    replace(
+        FULL.quality,
+        name="bench",
+        light_map_texels=96,
+        tile_texels=64,  # several tiles, so that there is a middle to stop in
+        light_map_samples=(8, 8),
+        gather_samples=8,
+        photons_per_texel=8,
+        environment_texels=64,
+        probe_texels=16,
+        probe_samples=4,
+    )
+)
+
+
+@dataclass(frozen=True)
 class Case:
-    """One artefact: what `bake` is asked for, which array's meta and size tell of it, and how it is made."""
+    """One artefact: the kind and methods that `bake` gets, and the array whose meta and size describe it."""
 
     artefact: str
     kind: str
@@ -54,52 +80,31 @@ CASES = (
 )
 
 
-def run(quick: bool, inputs: Sequence[Path], progress: Progress) -> dict[str, Any]:
+def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows per artefact of the first input, a scene; without one, of the built-in box."""
-    scene = load_scene(str(inputs[0]) if inputs else "builtin:box")
-    quality = _quality(quick)
-    rows = []
+    scene, steps, rows = load_scene(str(inputs[0]) if inputs else "builtin:box"), len(CASES) + 1, []
     with tempfile.TemporaryDirectory() as folder:
         for number, case in enumerate(CASES):
-            progress(number, len(CASES) + 1, case.artefact)
-            rows.append(_row(scene, case, quality, Path(folder) / str(number)))
-        progress(len(CASES), len(CASES) + 1, "scaling")
-        scaled = [_scaled(scene, quality, factor, Path(folder) / f"x{factor}") for factor in FACTORS]
+            progress(number, steps, case.artefact)
+            rows.append(row_of(scene, case, effort, Path(folder) / str(number)))
+        progress(steps - 1, steps, "scaling")
+        scaled = [_scaled(scene, effort, factor, Path(folder) / f"x{factor}") for factor in FACTORS]
     main = next(row for row in rows if row["artefact"] == MAIN)
-    sizes = [scaled[0]["texels"], main["texels"], scaled[1]["texels"]]
-    seconds = [scaled[0]["seconds"], main["seconds"], scaled[1]["seconds"]]
+    sizes, seconds = ([scaled[0][key], main[key], scaled[1][key]] for key in ("texels", "seconds"))
     growth = float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
-    return {"rows": rows, "summary": {"scene": scene.name, "runs": RUNS, "growth": growth, "scaled": scaled}}
+    return {"rows": rows, "summary": {"scene": scene.name, "runs": effort.runs, "growth": growth, "scaled": scaled}}
 
 
-def _quality(quick: bool) -> Any:
-    from lambent.bake.quality import quality_named
-
-    if not quick:
-        return quality_named("preview")
-    return replace(
-        quality_named("preview"),
-        name="bench",
-        light_map_texels=96,
-        tile_texels=64,  # several tiles, so that there is a middle to stop in
-        light_map_samples=(8, 8),
-        gather_samples=8,
-        photons_per_texel=8,
-        environment_texels=64,
-        probe_texels=16,
-        probe_samples=4,
-    )
-
-
-def _row(scene: Scene, case: Case, quality: Any, folder: Path) -> dict[str, Any]:
-    quality = quality if case.gathers else replace(quality, gather_samples=0)
-    ready = _ready(scene, case, quality, folder / "ready")
+def row_of(scene: Scene, case: Case, effort: Effort, folder: Path) -> dict[str, Any]:
+    """Time, noise and overhead of one artefact, baked in `folder`."""
+    quality = effort.quality if case.gathers else replace(effort.quality, gather_samples=0)
+    bakes = Bakes(scene, case, quality, folder)
+    bakes.timed("whole")  # compiles the kernels
     whole, overhead = [], []
-    for turn in range(RUNS + 1):
-        one, store = _timed(scene, case, quality, ready, folder / "whole")
-        if turn:  # the first compiled the kernels
-            whole.append(one)
-            overhead.append(_overhead(scene, case, quality, ready, folder, one))
+    for _ in range(effort.runs):
+        seconds, store = bakes.timed("whole")
+        whole.append(seconds)
+        overhead.append(bakes.interrupted_s() - seconds if case.kind == "light_map" else bakes.again_s("whole"))
     seconds = statistics.median(whole)
     texels, maps = _size(store, case)
     return {
@@ -107,7 +112,7 @@ def _row(scene: Scene, case: Case, quality: Any, folder: Path) -> dict[str, Any]
         "seconds": seconds,
         "seconds_min": min(whole),
         "seconds_max": max(whole),
-        "noise": _noise(scene, case, quality, ready, store, folder / "other"),
+        "noise": bakes.noise(store),
         "texels": texels,
         "texels_per_s": texels / seconds,
         "maps_per_s": maps / seconds if case.kind in ("probe", "environment") else None,
@@ -116,59 +121,73 @@ def _row(scene: Scene, case: Case, quality: Any, folder: Path) -> dict[str, Any]
     }
 
 
-def _ready(scene: Scene, case: Case, quality: Any, folder: Path) -> Path:
-    """A store that holds all that the artefact needs."""
-    from lambent.bake.bake import NEEDS, bake
+@dataclass(frozen=True)
+class Bakes:
+    """Bakes of one artefact into stores below `folder`, each begun with all that the artefact needs."""
 
-    if NEEDS[case.kind]:
-        bake(scene, folder, quality=quality, only=NEEDS[case.kind], light_map=case.light_map, probes=case.probes)
-    return folder
+    scene: Scene
+    case: Case
+    quality: Quality
+    folder: Path
 
+    def __post_init__(self) -> None:
+        from lambent.bake.bake import NEEDS
 
-def _timed(scene: Scene, case: Case, quality: Any, ready: Path, folder: Path, seed: int = 0) -> tuple[float, Store]:
-    _copied(ready, folder)
-    began = time.perf_counter()
-    store = _bake(scene, case, quality, folder, silent, seed)
-    return time.perf_counter() - began, store
+        if NEEDS[self.case.kind]:
+            self._bake("ready", only=NEEDS[self.case.kind])
 
+    def _bake(self, name: str, only: Sequence[str] = (), progress: Progress = silent, seed: int = 0) -> Store:
+        from lambent.bake.bake import bake
 
-def _overhead(scene: Scene, case: Case, quality: Any, ready: Path, folder: Path, whole_s: float) -> float:
-    if case.kind == "light_map":
-        return _interrupted(scene, case, quality, ready, folder / "broken") - whole_s
-    began = time.perf_counter()
-    _bake(scene, case, quality, folder / "whole", silent, 0)
-    return time.perf_counter() - began
+        return bake(
+            self.scene, self.folder / name, quality=self.quality, only=only or (self.case.kind,), progress=progress,
+            seed=seed, light_map=self.case.light_map, probes=self.case.probes,
+        )  # fmt: skip
 
+    def _begin(self, name: str) -> None:
+        ready, folder = self.folder / "ready", self.folder / name
+        shutil.rmtree(folder, ignore_errors=True)
+        if ready.exists():
+            shutil.copytree(ready, folder)
 
-def _interrupted(scene: Scene, case: Case, quality: Any, ready: Path, folder: Path) -> float:
-    """Seconds of a bake that is stopped when half of a step is done, and of its resumption."""
-    _copied(ready, folder)
+    def timed(self, name: str, seed: int = 0) -> tuple[float, Store]:
+        """Seconds of a whole bake, and its store."""
+        self._begin(name)
+        began = time.perf_counter()
+        store = self._bake(name, seed=seed)
+        return time.perf_counter() - began, store
 
-    def stop(done: float, total: float, what: str) -> None:
-        if 0.5 <= done / total < 1:
-            raise Cancelled
+    def again_s(self, name: str) -> float:
+        """Seconds that finding a bake finished takes."""
+        began = time.perf_counter()
+        self._bake(name)
+        return time.perf_counter() - began
 
-    began = time.perf_counter()
-    try:
-        _bake(scene, case, quality, folder, stop, 0)
-    except Cancelled:
-        _bake(scene, case, quality, folder, silent, 0)
-    return time.perf_counter() - began
+    def interrupted_s(self) -> float:
+        """Seconds of a bake that is stopped when half of a step is done, and of its resumption."""
+        self._begin("broken")
 
+        def stop(done: float, total: float, what: str) -> None:
+            if 0.5 <= done / total < 1:
+                raise Cancelled
 
-def _bake(scene: Scene, case: Case, quality: Any, folder: Path, progress: Progress, seed: int) -> Store:
-    from lambent.bake.bake import bake
+        began = time.perf_counter()
+        with suppress(Cancelled):
+            self._bake("broken", progress=stop)
+        self._bake("broken")
+        return time.perf_counter() - began
 
-    return bake(
-        scene, folder, quality=quality, only=(case.kind,), progress=progress, seed=seed,
-        light_map=case.light_map, probes=case.probes,
-    )  # fmt: skip
-
-
-def _copied(ready: Path, folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    if ready.exists():
-        shutil.copytree(ready, folder)
+    def noise(self, store: Store) -> float | None:
+        """Relative noise of the artefact in `store`; None where it has none."""
+        arrays = _arrays(store, self.case)
+        if self.case.kind == "light_map":
+            return float(store.artefact(arrays[0]).meta["noise"])
+        if self.case.kind != "probe" or not arrays:
+            return None
+        both = store, self.timed("other", seed=1)[1]
+        one, two = (np.concatenate([luminance(s.read(name).astype(float)).ravel() for name in arrays]) for s in both)
+        mean = (one + two).mean() / 2
+        return float(np.sqrt(((one - two) ** 2).mean() / 2) / mean) if mean > 0 else 0.0
 
 
 def _arrays(store: Store, case: Case) -> list[str]:
@@ -186,23 +205,10 @@ def _size(store: Store, case: Case) -> tuple[int, int]:
     return sum(int(np.prod(shape[:-1])) for shape in shapes), len(shapes)
 
 
-def _noise(scene: Scene, case: Case, quality: Any, ready: Path, store: Store, folder: Path) -> float | None:
-    if case.kind == "light_map":
-        return float(store.artefact(case.array).meta["noise"])
-    if case.kind != "probe" or not _arrays(store, case):
-        return None
-    other = _timed(scene, case, quality, ready, folder, seed=1)[1]
-    pairs = [[luminance(s.read(name).astype(float)).ravel() for s in (store, other)] for name in _arrays(store, case)]
-    one, two = (np.concatenate(values) for values in zip(*pairs, strict=True))
-    mean = (one + two).mean() / 2
-    return float(np.sqrt(((one - two) ** 2).mean() / 2) / mean) if mean > 0 else 0.0
-
-
-def _scaled(scene: Scene, quality: Any, factor: float, folder: Path) -> dict[str, Any]:
+def _scaled(scene: Scene, effort: Effort, factor: float, folder: Path) -> dict[str, Any]:
     """Seconds of the main row at `factor` times its texels."""
     case = next(case for case in CASES if case.artefact == MAIN)
-    texels = round(quality.light_map_texels * factor**0.5)
-    quality = replace(quality, gather_samples=0, light_map_texels=texels)
-    ready = _ready(scene, case, quality, folder / "ready")
-    runs = [_timed(scene, case, quality, ready, folder / "whole") for _ in range(RUNS)]
+    texels = round(effort.quality.light_map_texels * factor**0.5)
+    bakes = Bakes(scene, case, replace(effort.quality, gather_samples=0, light_map_texels=texels), folder)
+    runs = [bakes.timed("whole") for _ in range(effort.runs)]
     return {"texels": _size(runs[0][1], case)[0], "seconds": statistics.median(seconds for seconds, _ in runs)}

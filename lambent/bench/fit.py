@@ -1,8 +1,8 @@
-"""`fit`: how well and how fast measured tables become lobes.
+"""`fit`: accuracy and speed of fits to measured tables.
 
-Without inputs: tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose answers are known.
-With inputs: the caller's measured files, each fit judged by the metric it was fitted under, as a share of the best
-Lambertian surface's error; with published parameters (`--against FILE.fit`) theirs on the same tuples beside it.
+Without inputs it fits tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose answers are
+known. With inputs it fits the caller's measured files, and each fit is judged by the metric it was fitted under, as a
+share of the best Lambertian surface's error; published parameters (`--against FILE.fit`) are judged on the same tuples.
 Both methods fit one lobe in turn, five times; the other rows are least squares alone.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from lambent.bench.known_answers import KNOWN, setup_of
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.core.progress import Cancelled, Progress
+from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting.account import lambertian_errors
@@ -31,12 +31,27 @@ from lambent.materials.measured.synthetic import synthesise
 from lambent.materials.models.published import Published, read_fits
 
 NAME = "fit"
-RUNS = 5
-QUICK_TUPLES = 6_000
 ALBEDO_THETA_DEG = 30.0
 KNOWN_METRIC = "l1"  # the thesis's
 METRICS = ("cuberoot", "log", "l2_ngan")
 MODELS = (("beckmann", 1), ("beckmann", 2), ("beckmann", 3), ("ggx", 1), ("ggx", 2))
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Numbers of tuples that are fitted of a measured and of a synthesised table (None: all), and of repetitions.
+
+    `methods` fit the synthesised tables of `known`; all methods fit measured tables, `runs` times where time counts.
+    """
+
+    tuples: int | None = None
+    known_tuples: int | None = None
+    methods: tuple[Method, ...] = METHODS
+    runs: int = 5
+    known: tuple[Material, ...] = tuple(KNOWN.values())
+
+
+FULL, QUICK = Effort(), Effort(6_000, 60_000, ("gradient",), 1)
 
 
 @dataclass(frozen=True)
@@ -49,63 +64,61 @@ class Case:
     truth: Material | None = None
 
 
-def run(quick: bool, inputs: Sequence[Path], progress: Progress, against: Sequence[Path] = ()) -> dict[str, Any]:
+def run(
+    effort: Effort, inputs: Sequence[Path] = (), against: Sequence[Path] = (), progress: Progress = silent
+) -> dict[str, Any]:
     """Rows per file, metric, model, number of lobes and method."""
     published = {path.stem: read_fits(path) for path in against}
     if published and not inputs:
         raise UserError("published fits have to be held against a measurement", field="--against", hint="add --input")
     rows: list[dict[str, Any]] = []
-    cases = [path for path in inputs] or list(KNOWN.values())
-    for done, source in enumerate(cases):
-        case = _case(source, quick)
-        progress(done, len(cases), case.name)
-        rows += _known_rows(case, quick) if case.truth is not None else _measured_rows(case, quick)
+    sources: Sequence[Path | Material] = inputs or effort.known
+    for done, source in enumerate(sources):
+        case = _case(source, effort)
+        progress(done, len(sources), case.name)
+        rows += _known_rows(case, effort) if case.truth is not None else _measured_rows(case, effort)
         rows += _published_rows(case, published)
-    progress(len(cases), len(cases), "done")
+    progress(len(sources), len(sources), "done")
     return {"rows": rows, "summary": _summary(rows)}
 
 
-def _case(source: Path | Material, quick: bool) -> Case:
+def _case(source: Path | Material, effort: Effort) -> Case:
     if isinstance(source, Material):
-        table: MeasuredTable = synthesise(source, setup_of(source))
-        return Case(source.name, table, table.samples(10 * QUICK_TUPLES if quick else None), source)
+        known = synthesise(source, setup_of(source))
+        return Case(source.name, known, known.samples(effort.known_tuples), source)
     table = load(source)
-    return Case(source.name, table, table.samples(QUICK_TUPLES if quick else None))
+    return Case(source.name, table, table.samples(effort.tuples))
 
 
-def _known_rows(case: Case, quick: bool) -> Iterator[dict[str, Any]]:
+def _known_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
     assert case.truth is not None
-    lobes = len(case.truth.reflection_lobes)
-    for method in ("gradient",) if quick else METHODS:
-        row = _row(case, method, *_timed(case, method, KNOWN_METRIC, "beckmann", lobes))
-        truth = MaterialBSDF(case.truth).eval(case.samples.wi, case.samples.wo)
-        row["error_of_truth"] = errors_of(case.samples, truth)[KNOWN_METRIC]
-        row["parameters"] = _compared(row.pop("material"), case.truth)
-        yield row
+    truth = errors_of(case.samples, MaterialBSDF(case.truth).eval(case.samples.wi, case.samples.wo))
+    for method in effort.methods:
+        result = _fitted(case, method, KNOWN_METRIC, "beckmann", len(case.truth.reflection_lobes))
+        compared = {"parameters": _compared(result.material, case.truth)}
+        yield _row(case, method, [result]) | {"error_of_truth": truth[KNOWN_METRIC]} | compared
 
 
-def _measured_rows(case: Case, quick: bool) -> Iterator[dict[str, Any]]:
+def _measured_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
     for metric in METRICS:
-        seconds: dict[Method, list[float]] = {method: [] for method in METHODS}
-        results: dict[Method, FitResult] = {}
-        for _ in range(RUNS if metric == METRICS[0] and not quick else 1):
-            for method in METHODS:
-                results[method], (once,) = _timed(case, method, metric, "beckmann", 1)
-                seconds[method].append(once)
+        turns = range(effort.runs if metric == METRICS[0] else 1)
+        results = [{method: _fitted(case, method, metric, *MODELS[0]) for method in METHODS} for _ in turns]
         for method in METHODS:
-            yield _without_material(_row(case, method, results[method], seconds[method]))
-        for distribution, lobes in MODELS[1:]:
-            yield _without_material(_row(case, "gradient", *_timed(case, "gradient", metric, distribution, lobes)))
+            yield _row(case, method, [turn[method] for turn in results])
+        for model in MODELS[1:]:
+            yield _row(case, "gradient", [_fitted(case, "gradient", metric, *model)])
 
 
-def _timed(case: Case, method: Method, metric: str, distribution: Any, lobes: int) -> tuple[FitResult, list[float]]:
+def _fitted(case: Case, method: Method, metric: str, distribution: Any, lobes: int) -> FitResult:
     result = fit(case.samples, lobes=lobes, method=method, metric=metric, distribution=distribution)
     if result.partial:
         raise Cancelled
-    return result, [result.seconds]
+    return result
 
 
-def _row(case: Case, method: str, result: FitResult, seconds: list[float]) -> dict[str, Any]:
+def _row(case: Case, method: str, results: Sequence[FitResult]) -> dict[str, Any]:
+    """The last of several fits that differ only in their time."""
+    result, seconds = results[-1], [result.seconds for result in results]
     wi = direction(np.radians(ALBEDO_THETA_DEG), 0.0)
     provenance = result.material.provenance
     assert provenance is not None and provenance.metric is not None
@@ -125,12 +138,7 @@ def _row(case: Case, method: str, result: FitResult, seconds: list[float]) -> di
         "error_lambertian": result.lambertian_errors,
         "albedo_measured": float(case.table.albedo(wi).mean()),
         "albedo_model": float(MaterialBSDF(result.material).albedo(wi).mean()),
-        "material": result.material,
     }
-
-
-def _without_material(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in row.items() if key != "material"}
 
 
 def _published_rows(case: Case, published: dict[str, dict[str, Published]]) -> Iterator[dict[str, Any]]:
@@ -162,7 +170,7 @@ def _compared(found: Material, truth: Material) -> list[dict[str, Any]]:
 
 
 def _parameters(material: Material) -> dict[str, float]:
-    """What can be recovered, by name; of a transmission lobe only the product kt (1 - r0) can."""
+    """The parameters that can be recovered, by name; of a transmission lobe only the product kt (1 - r0) can."""
     values = {"kd": material.kd[0]}
     for number, lobe in enumerate(material.reflection_lobes, 1):
         shape = {"ks": lobe.k[0], "mx": lobe.mx, "my": lobe.my, "r0": lobe.r0[0], "alpha": lobe.alpha}
@@ -174,49 +182,35 @@ def _parameters(material: Material) -> dict[str, float]:
 
 
 def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Largest deviation from a known parameter, geometric mean of the shares per model, what beats what."""
+    """Largest deviation from a known parameter, geometric mean of the shares per model, both methods' comparison."""
     known = [row for row in rows if "parameters" in row and row["method"] == "gradient"]
+    measured = [row for row in rows if "parameters" not in row]
     summary: dict[str, Any] = {}
     if known:
-        pairs = [p for row in known for p in row["parameters"]]
-        summary["largest_deviation"] = max(abs((p["found"] or 0.0) / p["true"] - 1) for p in pairs)
+        parameters = [p for row in known for p in row["parameters"]]
+        summary["largest_deviation"] = max(abs((p["found"] or 0.0) / p["true"] - 1) for p in parameters)
         summary["l1_over_truth"] = max(row["error"]["l1"] / row["error_of_truth"] for row in known)
     for metric in METRICS:
         for distribution, lobes in MODELS:
-            shares = [row["share"] for row in _of(rows, "gradient", metric, distribution, lobes)]
+            of_model = {"method": "gradient", "metric": metric, "distribution": distribution, "lobes": lobes}
+            shares = [row["share"] for row in measured if row.items() >= of_model.items()]
             if shares:
                 summary[f"share_{metric}_{distribution}_{lobes}"] = statistics.geometric_mean(shares)
-    pairs = [
-        (grid, gradient)
-        for metric in METRICS
-        for grid in _of(rows, "grid", metric, "beckmann", 1)
-        for gradient in _of(rows, "gradient", metric, "beckmann", 1)
-        if grid["file"] == gradient["file"]
-    ]
+    pairs = _beside_ours(measured, "grid")
     if pairs:
-        summary["gradient_over_grid_error_max"] = max(b["share"] / a["share"] for a, b in pairs)
-        summary["grid_over_gradient_seconds_min"] = min(a["seconds"] / b["seconds"] for a, b in pairs)
-    return summary | _against_published(rows)
+        summary["gradient_over_grid_error_max"] = max(ours["share"] / grid["share"] for grid, ours in pairs)
+        summary["grid_over_gradient_seconds_min"] = min(grid["seconds"] / ours["seconds"] for grid, ours in pairs)
+    ratios = [ours["share"] / theirs["share"] for theirs, ours in _beside_ours(measured, "published")]
+    if ratios:
+        summary["published_compared"], summary["published_beaten"] = len(ratios), sum(ratio < 1 for ratio in ratios)
+        summary["ours_over_published_max"] = max(ratios)
+        summary["ours_over_published"] = statistics.geometric_mean(ratios)
+    return summary
 
 
-def _against_published(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    ratios = [
-        ours["share"] / theirs["share"]
-        for theirs in rows
-        if theirs["method"].startswith("published")
-        for ours in _of(rows, "gradient", theirs["metric"], "beckmann", 1)
-        if ours["file"] == theirs["file"]
-    ]
-    if not ratios:
-        return {}
-    return {
-        "published_compared": len(ratios),
-        "published_beaten": sum(ratio < 1 for ratio in ratios),
-        "ours_over_published_max": max(ratios),
-        "ours_over_published": statistics.geometric_mean(ratios),
-    }
-
-
-def _of(rows: list[dict[str, Any]], method: str, metric: str, distribution: str, lobes: int) -> list[dict[str, Any]]:
-    wanted = {"method": method, "metric": metric, "distribution": distribution, "lobes": lobes}
-    return [row for row in rows if "parameters" not in row and all(row[key] == value for key, value in wanted.items())]
+def _beside_ours(rows: list[dict[str, Any]], method: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Rows of a method, each with the row of least squares for the same file and metric, one lobe."""
+    keys = ("file", "metric", "method", "distribution", "lobes")
+    ours = {tuple(row[key] for key in keys): row for row in reversed(rows)}  # a second lobe may have vanished
+    both = ((row, ours.get((row["file"], row["metric"], "gradient", *MODELS[0]))) for row in rows)
+    return [(row, one) for row, one in both if one is not None and row["method"].startswith(method)]

@@ -1,7 +1,7 @@
 """The thesis's fitted materials (tables 3.1 and 3.2), and the device that measures them again in software.
 
-Their tables have the thesis's incident grids, 2 % sensor noise and a sector that the lamp's arm hides; what a fit finds
-in them can be compared with what is in them.
+Their tables have the thesis's incident grids, 2 % sensor noise and a sector that the lamp's arm hides. The parameters
+that a fit finds in them can be compared with the true ones.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import replace
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.synthetic import ANISOTROPIC, Setup
 
-NARROW = 0.02  # roughness below which the outgoing directions have to be closer than the device's usual ones
+NARROW = 0.02  # below this roughness, outgoing directions have to be closer than usual
 NARROW_STEP_DEG = 0.25
 
 

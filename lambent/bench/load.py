@@ -1,29 +1,27 @@
-"""`load`: how long a command takes to its first frame from a cold start, and the memory it peaks at.
+"""`load`: time from a cold start to a command's first frame, and its peak memory.
 
-Every run is a process of its own, so that imports, pipelines and reading the store are all in the figure. `render` ends
+Every run is a process of its own, so that the figure includes imports, pipelines and reading the store. `render` ends
 with its frame; `walk` is a window that closes after one frame and needs a display; `--help` is the start-up alone.
-`gpu_mb` is what buffers and textures of that frame hold, counted where they are made: no driver is asked.
+`gpu_mb` is the size of the buffers and textures of that frame, counted where they are made; no driver is asked.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import statistics
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
-from lambent.core.progress import Progress
+from lambent.core.machine import has_display
+from lambent.core.progress import Progress, silent
 
 NAME = "load"
-RUNS = 5
-SIZE, QUICK_SIZE = (1680, 1050), (640, 400)
 TIMEOUT_S = 300
 
 _TIMED = """
@@ -43,31 +41,44 @@ _WALK = "import sys; from lambent.viewer.app import run; run(sys.argv[1], size=(
 _GPU = """
 import sys
 import wgpu
-from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.render import Settings, images
 from lambent.store.contract import scene_record
 from lambent.store.store import Store
 store = Store.open(sys.argv[1])
-renderer = Renderer(open_device(), store)
-renderer.display_image(FrameState(scene_record(store).cameras[0], {0}, {1}))
+drawn = images(store, Settings({0}, {1}), moving=True)  # holds what is counted
+drawn.displayed(scene_record(store).cameras[0])
 print("bytes", wgpu.diagnostics.object_counts.get_dict()["total"]["resource_mem"])
 """
 
 
-def run(quick: bool, inputs: Sequence[Path], progress: Progress) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Effort:
+    """Size of the frame in pixels, and how often every command is run."""
+
+    width: int = 1680
+    height: int = 1050
+    runs: int = 5
+
+
+FULL, QUICK = Effort(), Effort(640, 400)
+
+
+def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows per command on the first input, a baked store; without one, on the built-in box baked here."""
     with tempfile.TemporaryDirectory() as folder:
         store = inputs[0] if inputs else _box(Path(folder) / "box.store", progress)
-        size = QUICK_SIZE if quick else SIZE
+        size, runs = (effort.width, effort.height), effort.runs
         commands = _commands(store, Path(folder) / "frame.png", size)
         measured: dict[str, list[tuple[float, float | None]]] = {name: [] for name in commands}
-        for turn in range(RUNS):
+        for turn in range(runs):
             for index, (name, command) in enumerate(commands.items()):
-                progress(turn * len(commands) + index, RUNS * len(commands), f"load: {name}")
+                progress(turn * len(commands) + index, runs * len(commands), f"load: {name}")
                 measured[name].append(timed(command))
-        gpu_mb = _gpu_mb(store, size)
-    rows = [_row(name, runs, gpu_mb if name != "--help" else None) for name, runs in measured.items()]
-    return {"rows": rows, "summary": {"width": size[0], "height": size[1], "runs": RUNS, "store": store.name}}
+        drawing = [sys.executable, "-c", _GPU.format(*size), str(store)]
+        done = subprocess.run(drawing, capture_output=True, text=True, timeout=TIMEOUT_S, check=True)
+        gpu_mb = float(done.stdout.split()[-1]) / 1e6
+    rows = [_row(name, times, gpu_mb if name != "--help" else None) for name, times in measured.items()]
+    return {"rows": rows, "summary": {"width": size[0], "height": size[1], "runs": runs, "store": store.name}}
 
 
 def timed(command: list[str]) -> tuple[float, float | None]:
@@ -83,21 +94,11 @@ def timed(command: list[str]) -> tuple[float, float | None]:
 
 def _commands(store: Path, frame: Path, size: tuple[int, int]) -> dict[str, list[str]]:
     lambent = [sys.executable, "-m", "lambent.cli.main"]
-    still = ["render", str(store), "-o", str(frame), "--size", f"{size[0]}x{size[1]}"]
-    commands = {"--help": [*lambent, "--help"], "render": [*lambent, *still]}
-    if _has_display():
+    still = [*lambent, "render", str(store), "-o", str(frame), "--size", f"{size[0]}x{size[1]}"]
+    commands = {"--help": [*lambent, "--help"], "render": still}
+    if has_display():
         commands["walk"] = [sys.executable, "-c", _WALK.format(*size), str(store)]
     return commands
-
-
-def _has_display() -> bool:
-    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _gpu_mb(store: Path, size: tuple[int, int]) -> float:
-    command = [sys.executable, "-c", _GPU.format(*size), str(store)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=True)
-    return float(done.stdout.split()[-1]) / 1e6
 
 
 def _row(name: str, runs: list[tuple[float, float | None]], gpu_mb: float | None) -> dict[str, Any]:
@@ -114,7 +115,7 @@ def _row(name: str, runs: list[tuple[float, float | None]], gpu_mb: float | None
 
 
 def _box(folder: Path, progress: Progress) -> Path:
-    """The built-in box, baked as coarsely as will do: what is in the texels does not matter here."""
+    """The built-in box, baked coarsely: the values of its texels do not matter here."""
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
     from lambent.scenes import load_scene

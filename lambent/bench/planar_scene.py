@@ -1,7 +1,7 @@
 """The scene of the planar benches, in memory: a floor and a wall, with a cube, a cylinder, a ball, a lamp and a pole.
 
-What stands on the floor is patterned and sends the same radiance everywhere, so that its reflection can be traced
-exactly: `exact_reflection` casts rays at the triangles that the renderer draws and reads the same light map.
+Everything above the floor is diffuse and patterned, so that its reflection can be traced exactly: `exact_reflection`
+casts rays at the triangles that the renderer draws and reads the same light map.
 """
 
 from __future__ import annotations
@@ -13,20 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, pixel_rays
+from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
+from lambent.realtime.frame import FrameState
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
 from lambent.scenes.scene import Mesh, Scene, SceneObject
-from lambent.store.contract import ReflectorPart, ReflectorRecord, Triple
+from lambent.store.contract import ReflectorPart, ReflectorRecord
 
 Floats = NDArray[np.floating]
 FLOOR, PAINT, REACH = "floor", "paint", 4.0
 SKY: Triple = (0.25, 0.3, 0.4)
 LAMP: Triple = (12.0, 10.0, 8.0)
 CAMERA = Camera(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
-SECOND = Camera(name="second", position=(-1.6, 0.9, 3.4), target=(0.2, 0.3, -0.4), fov_y_deg=46.0)
 COLOURS: Mapping[str, Triple] = {
     "wall": (0.75, 0.7, 0.6), "cube": (0.8, 0.25, 0.15), "cylinder": (0.2, 0.5, 0.75), "ball": (0.3, 0.7, 0.3),
     "pole": (0.1, 0.1, 0.12), "lamp": (0.0, 0.0, 0.0),
@@ -51,20 +52,19 @@ def floor_material(lobe: Lobe) -> Material:
     return Material(name=FLOOR, lobes=(lobe,))
 
 
+def floor_state(lobe: Lobe, width: int, height: int) -> FrameState:
+    """The frame that shows the specular light of a floor of one lobe."""
+    materials = {FLOOR: floor_material(lobe)}
+    return FrameState(CAMERA, width, height, show="specular", antialias=False, materials=materials)
+
+
 def planar_scene(lobe: Lobe) -> BakedScene:
     """The scene with a floor of one lobe."""
     shapes = meshes()
-    sky = np.broadcast_to(np.float32(SKY), (6, 4, 4, 3)).copy()
+    sky = np.tile(np.array(SKY, np.float32), (6, 4, 4, 1))
     scene = unbaked_scene(shapes, Material(name=PAINT, kd=(1, 1, 1)), sky, name="planar bench")
-    objects = tuple(
-        o.model_copy(
-            update={
-                "material": FLOOR if o.name == FLOOR else PAINT,
-                "emission": LAMP if o.name == "lamp" else (0.0, 0.0, 0.0),
-            }
-        )
-        for o in scene.record.objects
-    )
+    changes: dict[str, dict[str, object]] = {FLOOR: {"material": FLOOR}, "lamp": {"emission": LAMP}}
+    objects = tuple(o.model_copy(update=changes.get(o.name, {})) for o in scene.record.objects)
     outline = ((-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH))
     part = ReflectorPart(object=FLOOR, faces=(0, 1), area_m2=4 * REACH * REACH)
     reflector = ReflectorRecord(plane=(0, 1, 0, 0), outline=outline, parts=(part,))
@@ -75,7 +75,7 @@ def planar_scene(lobe: Lobe) -> BakedScene:
 
 
 def light_map() -> Floats:
-    """Irradiance (TILE, TILE objects, 3): a tile of checks on a slope of brightness for each object."""
+    """Irradiance (TILE_TEXELS, TILE_TEXELS objects, 3): for each object a tile of checks, brighter to the right."""
     at = (np.arange(TILE_TEXELS) + 0.5) / TILE_TEXELS
     u, v = np.meshgrid(at, at)
     checks = np.where((np.floor(u * 10) + np.floor(v * 10)) % 2 == 0, 1.0, 0.45) * (0.6 + 0.6 * u)
@@ -107,8 +107,7 @@ def exact_reflection(
     engine()
     from lambent.bake.planar_reflection import ReflectionTracer
 
-    shapes = meshes()
-    lamps = {"lamp": LAMP}
+    shapes, lamps = meshes(), {"lamp": LAMP}
     objects = tuple(SceneObject(n, mesh, PAINT, lamps.get(n, (0.0, 0.0, 0.0))) for n, mesh in shapes.items())
     scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
     tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(), FLOOR, SKY)

@@ -1,6 +1,6 @@
-"""What `quality` looks at: its own materials and environments, and the caller's.
+"""The materials and environments of `quality`: its own, and the caller's.
 
-A caller's file is a lat-long picture (an environment), a material document (.json), or a measured table, which is
+A caller's file is a lat-long image (an environment), a material document (.json), or a measured table, which is
 fitted first: one lobe, as `lambent fit` does it.
 """
 
@@ -12,21 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bench import specular_scene
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
+from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material, load_material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.measured import registry
-from lambent.store.contract import Triple
+from lambent.scenes.environments import dusk, from_lat_long, night, studio
 
 Floats = NDArray[np.floating]
-OWN_ENVIRONMENTS = {
-    "studio": specular_scene.studio,
-    "night": specular_scene.night,
-    "dusk": specular_scene.dusk,
-}
+OWN_ENVIRONMENTS = {"studio": studio, "night": night, "dusk": dusk}
 
 
 def one_lobe(name: str, mx: float, my: float, r0: Triple | float, alpha: float) -> Material:
@@ -54,7 +50,7 @@ def read_inputs(paths: Iterable[Path], progress: Progress = silent) -> tuple[dic
     Raises
     ------
     UserError
-        Where a file is none of the three kinds, broken, or a material that reflects nothing specularly.
+        Where a file is of none of the three kinds, broken, or a material without specular reflection.
     """
     environments: dict[str, Floats] = {}
     materials: list[Material] = []
@@ -64,7 +60,7 @@ def read_inputs(paths: Iterable[Path], progress: Progress = silent) -> tuple[dic
         elif registry.is_known(path):
             materials.append(specular_part(fit(registry.load(path), progress=progress).material, path))
         else:
-            environments[path.stem] = specular_scene.from_lat_long(read_image(path))
+            environments[path.stem] = from_lat_long(read_image(path))
     return environments, tuple(materials)
 
 

@@ -1,71 +1,88 @@
 """Benches: found by discovery, run in one form.
 
-A bench is a module of this package with `NAME` and `run(quick, inputs, progress)`, which returns {"rows": [...],
-"summary": {...}}, and "machine" and "inputs" (see machine.py) where it knows them better than this module. Names, rows
-and fields are those of docs/performance.md; times are medians of at least five runs taken alternately, their spread
-beside them.
+A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of a frozen dataclass of its
+own), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also
+takes `inputs`; if it compares with published figures, `against`. Names, rows and fields are those of
+docs/performance.md; times are medians of at least five runs taken in turns, their spread beside them.
 """
 
 from __future__ import annotations
 
-import importlib
 import inspect
-import pkgutil
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from lambent import bench
-from lambent.bench.machine import inputs_of, machine
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.discovery import known, modules_in
+from lambent.core.errors import UserError
+from lambent.core.files import sha256_of
+from lambent.core.machine import core_count, cpu_name
 from lambent.core.progress import Progress, silent
 
 
-def benches() -> dict[str, str]:
-    """Name -> module of every bench; imports all of them."""
-    modules = (
-        importlib.import_module(f"{bench.__name__}.{info.name}") for info in pkgutil.iter_modules(bench.__path__)
-    )
-    return {module.NAME: module.__name__ for module in modules if hasattr(module, "NAME")}
+def benches() -> dict[str, ModuleType]:
+    """Module of every bench by the bench's name, sorted; imports all of them."""
+    return dict(sorted((module.NAME, module) for module in modules_in(bench, having="NAME").values()))
 
 
 def run_bench(
     name: str,
+    effort: object = "full",
     *,
-    quick: bool = False,
     inputs: Sequence[Path] = (),
     against: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run one bench; the report holds bench, machine, inputs, rows and summary, ready for JSON.
 
+    Parameters
+    ----------
+    effort : {'full', 'quick'} or object
+        Sizes and sample counts: those of the bench by name, or an instance of its `Effort`.
+
     Raises
     ------
     UserError
-        Where there is no such bench or an input cannot be read.
+        Where there is no such bench, or an input cannot be read or is not wanted.
     """
-    for path in [*inputs, *against]:
+    files = [*inputs, *against]
+    for path in files:
         if not path.exists():
             raise UserError("input does not exist", file=path)
-    module = _module(name)
-    options = {}
-    if against:
-        if "against" not in inspect.signature(module.run).parameters:
-            raise UserError("this bench compares with nothing published", field="--against", got=name)
-        options["against"] = list(against)
-    measured: Mapping[str, Any] = module.run(quick, list(inputs), progress, **options)
-    return {
-        "bench": name,
-        "machine": measured.get("machine") or machine(),
-        "inputs": measured.get("inputs") or inputs_of([*inputs, *against]),
-        "rows": list(measured["rows"]),
-        "summary": dict(measured["summary"]),
-    }
-
-
-def _module(name: str) -> ModuleType:
     found = benches()
-    if name not in found:
-        raise UserError("unknown bench", got=name, expected=", ".join(sorted(found)), hint=did_you_mean(name, found))
-    return importlib.import_module(found[name])
+    module = found[known("bench", name, found)]
+    options = {key: list(paths) for key, paths in (("inputs", inputs), ("against", against)) if paths}
+    refused = options.keys() - inspect.signature(module.run).parameters.keys()
+    if "inputs" in refused:
+        raise UserError("this bench reads no inputs", got=inputs[0])
+    if refused:
+        raise UserError("this bench compares with nothing published", field="--against", got=name)
+    if isinstance(effort, str):
+        effort = {"full": module.FULL, "quick": module.QUICK}[effort]
+    measured = module.run(effort, progress=progress, **options)
+    # Of a store, the manifest's hash stands for all of it.
+    hashed = [{"path": p.name, "sha256": sha256_of(p / "manifest.json" if p.is_dir() else p)} for p in files]
+    figures = {key: measured[key] for key in ("rows", "summary")}
+    return {"bench": name, "machine": machine(), "inputs": hashed, **figures}
+
+
+def machine() -> dict[str, Any]:
+    """cpu, cores; adapter, adapter_type and driver, or None without one; the path tracer's variant where it runs."""
+    from lambent.realtime.device import adapter_info, choose_adapter
+
+    try:
+        info = adapter_info(choose_adapter())
+    except UserError:
+        info = None
+    mitsuba = sys.modules.get("mitsuba")
+    return {
+        "cpu": cpu_name(),
+        "cores": core_count(),
+        "adapter": info and info.name,
+        "adapter_type": info and info.type,
+        "driver": info and f"{info.backend} {info.driver}".strip(),
+        "variant": mitsuba and mitsuba.variant(),
+    }

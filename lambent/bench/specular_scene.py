@@ -1,18 +1,21 @@
-"""The scenes of the real-time benches, in memory: a few shapes under an environment, with no other light."""
+"""The shapes of the real-time benches, and their path traced images."""
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
 import numpy as np
 
-from lambent.realtime.unbaked import CAMERA
-from lambent.realtime.unbaked import unbaked_scene as baked_scene
-from lambent.scenes.environments import dusk, from_lat_long, night, studio
-from lambent.scenes.geometry import patch, placed, sphere, tube
-from lambent.scenes.scene import Mesh
-
-__all__ = [
-    "CAMERA", "baked_scene", "dusk", "from_lat_long", "night", "sphere_and_torus", "studio", "torus", "wall",
-]  # fmt: skip
+from lambent.bench.reference import Floats
+from lambent.core.camera import Camera
+from lambent.core.cubemap import sample
+from lambent.core.images import write_image
+from lambent.core.latlong import lat_long_directions
+from lambent.materials.document import Material
+from lambent.scenes.geometry import placed, sphere, tube
+from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 
 
 def torus(radius: float, thickness: float, around: int, section: int) -> Mesh:
@@ -29,6 +32,20 @@ def sphere_and_torus(detail: int = 96) -> dict[str, Mesh]:
     return {"sphere": sphere(0.62, around=detail, rows=detail // 2), "torus": placed(ring, rotation=tilt)}
 
 
-def wall(width: float, height: float) -> dict[str, Mesh]:
-    """A rectangle at z = 0 that faces +z, centred at the origin."""
-    return {"wall": patch((-width / 2, -height / 2, 0), (width, 0, 0), (0, height, 0))}
+def to_lat_long(cube: Floats, height: int = 512) -> Floats:
+    """Lat-long image (height, 2 height, 3) of an environment (6, N, N, 3): top +y, middle column -z."""
+    return sample(cube, lat_long_directions(height, 2 * height))
+
+
+def path_traced(
+    meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: Camera, size: int, spp: int
+) -> Floats:
+    """Radiance (size, size, 3) of `meshes` in `material` under `environment` (6, N, N, 3), the sky behind them."""
+    from lambent.bake.reference import render_reference
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "environment.exr"
+        write_image(file, to_lat_long(environment))
+        objects = tuple(SceneObject(name, mesh, material.name) for name, mesh in meshes.items())
+        scene = Scene("bench", objects, {material.name: material}, ImageEnvironment(file))
+        return render_reference(scene, camera, size, size, spp)[0]

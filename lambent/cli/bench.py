@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Json, progress_bar, show, table
+from lambent.cli.console import Json, progress_bar, show, table, words
 
 
 def command(
@@ -26,12 +26,9 @@ def command(
     from lambent.bench.registry import run_bench
 
     with progress_bar() as progress:
-        report = run_bench(name, quick=quick, inputs=input_ or [], against=against or [], progress=progress)
+        effort = "quick" if quick else "full"
+        report = run_bench(name, effort, inputs=input_ or (), against=against or (), progress=progress)
     names = list(dict.fromkeys(key for row in report["rows"] for key in row))
-    rows = [tuple(names), *(tuple(_word(row.get(key, "")) for key in names) for row in report["rows"])]
-    summary = [(key, _word(value)) for key, value in {**report["machine"], **report["summary"]}.items()]
+    rows = [names, *([words(row.get(key, "")) for key in names] for row in report["rows"])]
+    summary = [(key, words(value)) for key, value in {**report["machine"], **report["summary"]}.items()]
     show(report, f"{table(rows)}\n\n{table(summary)}", json)
-
-
-def _word(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""`lambent check`: is a material, a model or a table physical, and does its sampler draw what its density says."""
+"""`lambent check`: whether a material, model or table is physical, and its sampler follows its density."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Json, progress_bar, show, table
+from lambent.cli.console import Json, metric_errors, progress_bar, show, table, words
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
-    from lambent.materials.check import CheckReport, Furnace, SamplerCheck
+    from lambent.materials.check import CheckReport
     from lambent.materials.check_table import TableReport
     from lambent.materials.document import Material
     from lambent.materials.measured.protocol import MeasuredTable
@@ -33,7 +33,7 @@ def command(
 ) -> None:
     """Check reciprocity, energy, and the sampler by chi-square and hemisphere integrals.
 
-    Of a measured table the percentages are reported, and what no device explains fails.
+    For a measured table it reports percentages, and fails only faults that no device explains.
     The exit code is 1 when the check fails.
 
     --normalise says what changed and by how much; where no direction returns more than arrives, nothing is written.
@@ -49,19 +49,17 @@ def command(
     from lambent.materials.document import Material
     from lambent.materials.models.model import Model
 
-    report: CheckReport | TableReport
     if normalise or output is not None:
         _normalise(subject, values or [], normalise, output, seed, json)
         return
     found = _subject(subject, values or [])
     with progress_bar() as progress:
+        report: CheckReport | TableReport
         if isinstance(found, Material | Model):
             report = check(found, seed=seed, progress=progress)
-            text = describe(report)
         else:
             report = check_table(found, seed=seed, progress=progress)
-            text = describe_table(report)
-    show(report.to_json(), text, json)
+    show(report.to_json(), describe(report), json)
     if not report.passed:
         raise typer.Exit(1)
 
@@ -74,15 +72,15 @@ def _normalise(subject: str, values: list[str], asked: bool, output: Path | None
     from lambent.materials.normalise import normalisation
 
     if not asked or output is None:
-        lacks = "-o is" if output is None else "--normalise is"
-        raise UserError("--normalise and -o go together", hint=f"{lacks} missing: --normalise -o OUT.json")
+        lacking = "-o" if output is None else "--normalise"
+        raise UserError("--normalise and -o go together", hint=f"{lacking} is missing: --normalise -o OUT.json")
     check_writable(output, (".json",))
     found = _subject(subject, values)
+    if isinstance(found, Model):
+        raise UserError("only material documents can be normalised, not a model", got=subject)
     if not isinstance(found, Material):
-        hint = None if isinstance(found, Model) else f"fit it first: lambent fit {subject} -o material.json"
-        kind = "a model" if isinstance(found, Model) else "a table"
-        got, file = (subject, None) if isinstance(found, Model) else (None, subject)
-        raise UserError(f"only material documents can be normalised, not {kind}", file=file, got=got, hint=hint)
+        hint = f"fit it first: lambent fit {subject} -o material.json"
+        raise UserError("only material documents can be normalised, not a table", file=subject, hint=hint)
     with progress_bar() as progress:
         done = normalisation(found, seed, progress)
     if done.needed:
@@ -100,11 +98,11 @@ def _subject(name: str, values: list[str]) -> Material | MeasuredTable | Model:
         if values:
             raise UserError("only models take --set", file=name, got=values[0])
         return subject_of(Path(name))
-    known = models()
-    if name not in known:
-        expected = f"a file, or a model: {', '.join(known)}"
-        raise UserError("neither a file nor a model", got=name, expected=expected, hint=did_you_mean(name, known))
-    return known[name](**dict(_value(text) for text in values))
+    found = models()
+    if name not in found:
+        expected = f"a file, or a model: {', '.join(found)}"
+        raise UserError("neither a file nor a model", got=name, expected=expected, hint=did_you_mean(name, found))
+    return found[name](**dict(_value(text) for text in values))
 
 
 def _value(text: str) -> tuple[str, object]:
@@ -119,63 +117,50 @@ def _value(text: str) -> tuple[str, object]:
     return name.strip(), value if len(value) > 1 else value[0]
 
 
-def describe(report: CheckReport) -> str:
-    """What was measured, then what is wrong with it, then the verdict."""
-    rows = [("reciprocity", f"largest relative change {report.reciprocity_error:.1e}")]
-    rows += _energy_rows(report.furnace) + _sampler_rows(report.sampler)
-    return _with_verdict(rows, report)
+def describe(report: CheckReport | TableReport) -> str:
+    """The figures, then the faults, then the verdict."""
+    from lambent.materials.check import CheckReport
 
-
-def describe_table(report: TableReport) -> str:
-    """The same of a table."""
-    rows = [
-        ("reciprocity", f"swapping wi and wo changes {report.reciprocity_share:.1%} of the light"),
-        ("in the path tracer", f"what it looks up deviates by {report.resampling_share:.1%} of the light"),
-    ]
-    rows += _energy_rows(report.furnace)
+    energy = report.furnace
+    albedo, theta_deg, phi_deg = energy.highest
+    if isinstance(report, CheckReport):
+        rows, integrals = [("reciprocity", f"largest relative change {report.reciprocity_error:.1e}")], []
+    else:
+        rows = [
+            ("reciprocity", f"swapping wi and wo changes {report.reciprocity_share:.1%} of the light"),
+            ("in the path tracer", f"what it looks up deviates by {report.resampling_share:.1%} of the light"),
+        ]
+        integrals = [
+            (f"albedo at {i.theta_deg:g} deg", f"{i.from_table:.4f} by the table, {i.quadrature:.4f} by quadrature")
+            for i in report.integrals
+        ]
+    sampler = [
+        (f"sampler at {one.theta_deg:g} deg", f"chi-square p {one.p_value:.3f}, density integrates to "
+         f"{one.pdf_integral:.4f}, albedo {one.albedo_sampled:.4f} (quadrature {one.albedo_quadrature:.4f})")
+        for one in report.sampler
+    ]  # fmt: skip
     rows += [
-        (f"albedo at {one.theta_deg:g} deg", f"{one.from_table:.4f} by the table, {one.quadrature:.4f} by quadrature")
-        for one in report.integrals
+        ("mean albedo", " ".join(f"{value:.4f}" for value in energy.mean_albedo)),
+        ("highest albedo", f"{albedo:.4f} at theta {theta_deg:g} deg, phi {phi_deg:g} deg"),
+        *integrals,
+        *sampler,
     ]
-    return _with_verdict(rows + _sampler_rows(report.sampler), report)
+    faults = [*(f"warning: {text}" for text in report.warnings), *(f"FAILED: {text}" for text in report.failures)]
+    return "\n".join([table(rows), *faults, "passed" if report.passed else "not passed"])
 
 
 def describe_normalisation(done: Normalisation, output: Path) -> str:
-    """What changed, by how much under the metrics, and what was written."""
-    from lambent.materials.fitting.metrics import METRICS
-
-    where = "highest albedo {:.4f} at theta {:g} deg, phi {:g} deg"
+    """The changes, their size under the metrics, and the file written."""
     if not done.needed:
-        return f"{where.format(*done.highest[0])}: nothing exceeds 1, nothing written"
-    rows: list[tuple[str, ...]] = [("changed", "before", "after")]
-    rows += [(name, _shown(was), _shown(now)) for name, (was, now) in done.changed.items()]
-    rows.append(("highest albedo", *(f"{albedo:.4f} at theta {theta:g} deg" for albedo, theta, _ in done.highest)))
-    errors: list[tuple[str, ...]] = [("error", "absolute", "unit", "of its size")]
-    errors += [(name, f"{value:.3g}", METRICS[name].unit, f"{done.share[name]:.2%}")
-               for name, value in done.errors.items()]  # fmt: skip
-    return f"{table(rows)}\n\n{table(errors)}\n\n{output}: written"
-
-
-def _shown(value: float | tuple[float, ...]) -> str:
-    return " ".join(f"{number:.4g}" for number in (value if isinstance(value, tuple) else (value,)))
-
-
-def _energy_rows(furnace: Furnace) -> list[tuple[str, ...]]:
-    albedo, theta_deg, phi_deg = furnace.highest
-    return [
-        ("mean albedo", " ".join(f"{value:.4f}" for value in furnace.mean_albedo)),
-        ("highest albedo", f"{albedo:.4f} at theta {theta_deg:g} deg, phi {phi_deg:g} deg"),
+        where = "highest albedo {:.4f} at theta {:g} deg, phi {:g} deg".format(*done.highest[0])
+        return f"{where}: nothing exceeds 1, nothing written"
+    rows = [
+        ("changed", "before", "after"),
+        *((name, _numbers(was), _numbers(now)) for name, (was, now) in done.changed.items()),
+        ("highest albedo", *(f"{albedo:.4f} at theta {theta:g} deg" for albedo, theta, _ in done.highest)),
     ]
+    return f"{table(rows)}\n\n{metric_errors(done.errors, done.share)}\n\n{output}: written"
 
 
-def _sampler_rows(sampler: tuple[SamplerCheck, ...]) -> list[tuple[str, ...]]:
-    return [
-        (f"sampler at {one.theta_deg:g} deg", f"chi-square p {one.p_value:.3f}, density integrates to "
-         f"{one.pdf_integral:.4f}, albedo {one.albedo_sampled:.4f} (quadrature {one.albedo_quadrature:.4f})")
-        for one in sampler
-    ]  # fmt: skip
-
-
-def _with_verdict(rows: list[tuple[str, ...]], report: CheckReport | TableReport) -> str:
-    lines = [table(rows), *(f"warning: {text}" for text in report.warnings), *(f"FAILED: {t}" for t in report.failures)]
-    return "\n".join([*lines, "passed" if report.passed else "not passed"])
+def _numbers(value: float | tuple[float, ...]) -> str:
+    return " ".join(map(words, value if isinstance(value, tuple) else (value,)))

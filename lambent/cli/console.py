@@ -1,10 +1,10 @@
-"""What commands share: the result on stdout, the progress bar on stderr, sizes and triples as a user types them."""
+"""What commands share: the result on stdout, the progress bar on stderr, sizes as a user types them."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -22,16 +22,30 @@ def show(result: Mapping[str, Any], text: str, as_json: bool) -> None:
     typer.echo(json.dumps(plain(result), indent=1, allow_nan=False) if as_json else text)
 
 
-def table(rows: list[tuple[str, ...]]) -> str:
+def table(lines: Iterable[Iterable[str]]) -> str:
     """Rows of words as aligned columns."""
+    rows = [tuple(line) for line in lines]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
                      for row in rows)  # fmt: skip
 
 
+def words(value: object) -> str:
+    """A number with four digits; anything else as it is."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> str:
+    """Table of errors under the metrics, with their units and as shares of the subject's own size."""
+    from lambent.materials.fitting.metrics import METRICS
+
+    rows = ((name, f"{value:.3g}", METRICS[name].unit, f"{share[name]:.2%}") for name, value in errors.items())
+    return table([("error", "absolute", "unit", "of its size"), *rows])
+
+
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr, where that is a terminal; otherwise nothing is shown."""
+    """A bar with the time left on stderr; nothing where stderr is no terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars

@@ -1,13 +1,13 @@
-"""`lambent convert`: a measurement or material in another tool's format, and what that costs."""
+"""`lambent convert`: a measurement or material in another tool's format, with its losses."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Json, progress_bar, show, table
+from lambent.cli.console import Json, metric_errors, progress_bar, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -20,11 +20,13 @@ def command(
     as_: Annotated[str | None, typer.Option("--as", help="Format, where the ending does not say it.")] = None,
     json: Json = False,
 ) -> None:
-    """Write a measurement or material in another format, and say what was lost and how far the file is off.
+    """Write a measurement or material in another format, and say what was lost and how large the errors are.
 
     Example: lambent convert chrome.binary chrome.bsdf --as rgl
     """
     from lambent.materials.export.registry import writer_for
+    from lambent.materials.export.resampled import read_back
+    from lambent.materials.measured.registry import is_known
 
     writer = writer_for(output, as_)
     _check_places(file, output)
@@ -32,8 +34,8 @@ def command(
     _check_kind(subject, writer, file)
     with progress_bar() as progress:
         cost = writer.write(subject, output, progress)
-        if not cost.errors:
-            cost = _compared(subject, output, cost)
+        if not cost.errors and is_known(output):
+            cost = read_back(subject, output, cost.lost)
     facts = {"written": output, "format": writer.NAME, "lost": cost.lost, "errors": cost.errors, "share": cost.share}
     show(facts, describe(output, writer, cost), json)
 
@@ -43,12 +45,21 @@ def subject_of(file: Path) -> Subject:
     from lambent.materials import measured
     from lambent.materials.document import load_material
 
+    return load_material(file) if is_document(head_of(file, 64)) else measured.load(file)
+
+
+def head_of(file: Path, size: int) -> bytes:
+    """The first bytes of a user's file."""
     try:
         with file.open("rb") as stream:
-            head = stream.read(64)
+            return stream.read(size)
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror})", file=file) from error
-    return load_material(file) if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else measured.load(file)
+
+
+def is_document(head: bytes) -> bool:
+    """Whether a file that begins so is a material document, with a byte order mark or without."""
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
 
 
 def _check_places(file: Path, output: Path) -> None:
@@ -70,28 +81,10 @@ def _check_kind(subject: Subject, writer: Writer, file: Path) -> None:
         raise UserError(f"{writer.NAME} takes no {kind}", file=file, hint=hint)
 
 
-def _compared(subject: Subject, output: Path, cost: Cost) -> Cost:
-    """The cost with the errors of the file read back, where it is of a format that is read."""
-    from lambent.materials.export.resampled import read_back
-    from lambent.materials.measured.registry import is_known
-
-    return read_back(subject, output, cost.lost) if is_known(output) else cost
-
-
 def describe(output: Path, writer: Writer, cost: Cost) -> str:
-    """What was written, lost, and the errors, absolute and as shares of the subject's own size."""
-    from lambent.materials.fitting.metrics import METRICS
-
-    lines = [f"{output}: {writer.NAME}", *(f"lost: {what}" for what in cost.lost)]
-    if not cost.lost:
-        lines.append("lost: nothing but what the errors say")
+    """The file, its losses, and its errors, absolute and as shares of the subject's own size."""
+    losses = cost.lost or ("nothing but what the errors say",)
+    lines = [f"{output}: {writer.NAME}", *(f"lost: {loss}" for loss in losses)]
     if cost.errors:
-        rows: list[tuple[str, ...]] = [("error", "absolute", "unit", "of its size")]
-        rows += [(name, f"{value:.3g}", _unit(METRICS, name), f"{cost.share.get(name, 0.0):.2%}")
-                 for name, value in cost.errors.items()]  # fmt: skip
-        lines += ["", table(rows)]
+        lines += ["", metric_errors(cost.errors, cost.share)]
     return "\n".join(lines)
-
-
-def _unit(metrics: Any, name: str) -> str:
-    return metrics[name].unit if name in metrics else ""

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lambent.cli.console import Json, progress_bar, say, show, table
+from lambent.core.machine import has_display
 
 
 def command(
     out: Annotated[Path, typer.Option(help="Folder for everything the demo makes.")] = Path("out/demo"),
-    headless: Annotated[bool, typer.Option("--headless", help="Write pictures and a film, open no window.")] = False,
+    headless: Annotated[bool, typer.Option("--headless", help="Write images and a film, open no window.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="A coarser bake, a smaller film.")] = False,
     json: Json = False,
 ) -> None:
@@ -30,20 +29,15 @@ def command(
     with progress_bar() as progress:
         flow = Flow(out, QUICK if quick else FULL, progress)
         scene = flow.prepare()
-        pictures = headless or not has_display()
-        if pictures:
+        windowless = headless or not has_display()
+        if windowless:
             flow.walk()
             flow.compare(scene)
     report = flow.finish()
-    rows = [(name, f"{seconds:.1f} s") for name, seconds in report["seconds"].items()]
+    rows = ((name, f"{seconds:.1f} s") for name, seconds in report["seconds"].items())
     show(report, f"{table(rows)}\n\n{out / 'demo.json'}", json)
-    if not pictures:
+    if not windowless:
         from lambent.viewer.app import run
 
         say(f"opening the window; later: lambent walk {flow.store_path}")
         run(flow.store_path, "walk")
-
-
-def has_display() -> bool:
-    """Whether a window can be opened here."""
-    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

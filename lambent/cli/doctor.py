@@ -1,4 +1,4 @@
-"""`lambent doctor`: what of this machine Lambent can use, what is missing, and the one command that mends it."""
+"""`lambent doctor`: what Lambent can use of this machine, what is missing, and the one command that mends it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from dataclasses import asdict, dataclass
 import typer
 
 from lambent.cli.console import Json, show, table
+from lambent.core.machine import core_count, memory_bytes
 
 MEMORY_NEEDED_GB = 4
 PROBE_SECONDS = 120
 
-# Package manager -> how it installs. The first one found is the one the command is for.
+# Package manager -> its command. The command to mend is for the first that is found.
 MANAGERS = {
     "apt-get": "apt-get install -y",
     "dnf": "dnf install -y",
@@ -47,7 +48,7 @@ PACKAGES = {
     },
 }
 
-# Drivers and native libraries can end the process that loads them: each of these is asked in one of its own.
+# Drivers and native libraries can end the process that loads them: each program runs in a process of its own.
 _ASK_GRAPHICS = """
 import json
 from dataclasses import asdict
@@ -64,12 +65,12 @@ _ASK_DENOISER = "import pyoidn; print('answer true')"
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the report. What is `essential` and not `ok` makes the command fail."""
+    """One line of the report. A check that is `essential` and not `ok` makes the command fail."""
 
     name: str
     ok: bool
     found: str
-    essential: bool = False
+    essential: bool
 
 
 def command(json: Json = False) -> None:
@@ -79,7 +80,7 @@ def command(json: Json = False) -> None:
 
     Example: lambent doctor
     """
-    checks = [check() for check in CHECKS]
+    checks = [Check(name, *look(), essential) for name, essential, look in CHECKS]
     packages = missing_packages(checks)
     ok = all(check.ok for check in checks if check.essential)
     mend = mending_command(packages)
@@ -87,89 +88,78 @@ def command(json: Json = False) -> None:
         "ok": ok,
         "python": platform.python_version(),
         "system": platform.platform(),
-        "cores": os.cpu_count(),
+        "cores": core_count(),
         "checks": [asdict(check) for check in checks],
         "packages": packages,
         "mend": mend,
     }
-    rows = [(_mark(check), check.name, check.found) for check in checks]
+    rows = [("ok" if check.ok else "NO" if check.essential else "- ", check.name, check.found) for check in checks]
     text = table([("  ", "python", f"{result['python']} on {result['system']}"), *rows])
     show(result, f"{text}\n\nTo mend: {mend}" if mend else text, json)
     if not ok:
         raise typer.Exit(1)
 
 
-def check_path_tracer() -> Check:
+def _path_tracer() -> tuple[bool, str]:
     from lambent.bake.engine import MEND, probe_engine
 
     probe = probe_engine()
-    if probe.engine is None:
-        reasons = list(probe.failures) if _manager() else [*probe.failures, MEND]
-        return Check("path tracer", False, "; ".join(reasons), essential=True)
-    version = f" {probe.engine.llvm_version}" if probe.engine.llvm_version else ""
-    found = f"{probe.engine.variant}{version}, {probe.engine.threads} threads"
-    return Check("path tracer", True, found, essential=True)
+    engine = probe.engine
+    if engine is None:
+        return False, "; ".join([*probe.failures, *([] if _manager() else [MEND])])
+    version = f" {engine.llvm_version}" if engine.llvm_version else ""
+    return True, f"{engine.variant}{version}, {engine.threads} threads"
 
 
-def check_denoiser() -> Check:
+def _denoiser() -> tuple[bool, str]:
     answer, reason = _ask(_ASK_DENOISER)
-    return Check("denoiser", answer is not None, "Open Image Denoise" if answer else reason, essential=True)
+    return answer is not None, "Open Image Denoise" if answer else reason
 
 
-def check_graphics() -> Check:
+def _graphics() -> tuple[bool, str]:
     answer, reason = _ask(_ASK_GRAPHICS)
     if not isinstance(answer, dict):
-        return Check("graphics", False, reason, essential=True)
+        return False, reason
     software = " (software: works, slowly)" if answer["type"] == "CPU" else ""
-    return Check("graphics", True, f"{answer['name']}, {answer['backend']}{software}", essential=True)
+    return True, f"{answer['name']}, {answer['backend']}{software}"
 
 
-def check_window() -> Check:
+def _window() -> tuple[bool, str]:
     answer, reason = _ask(_ASK_WINDOW)
     if answer is None:
-        return Check("window", False, reason)
-    return Check("window", True, "display found" if answer else "no display here: pictures and films only")
+        return False, reason
+    return True, "display found" if answer else "no display here: pictures and films only"
 
 
-def check_memory() -> Check:
+def _memory() -> tuple[bool, str]:
     gigabytes = memory_bytes() / 1e9
-    return Check("memory", gigabytes >= MEMORY_NEEDED_GB, f"{gigabytes:.1f} GB ({MEMORY_NEEDED_GB} GB needed)")
+    return gigabytes >= MEMORY_NEEDED_GB, f"{gigabytes:.1f} GB ({MEMORY_NEEDED_GB} GB needed)"
 
 
-def check_film() -> Check:
+def _film() -> tuple[bool, str]:
     try:
         import imageio_ffmpeg
 
-        return Check("film", True, f"ffmpeg {imageio_ffmpeg.get_ffmpeg_version()}")
+        return True, f"ffmpeg {imageio_ffmpeg.get_ffmpeg_version()}"
     except (ImportError, RuntimeError) as error:
-        return Check("film", False, f"no ffmpeg: pictures only ({error})")
+        return False, f"no ffmpeg: pictures only ({error})"
 
 
-CHECKS: tuple[Callable[[], Check], ...] = (
-    check_path_tracer, check_denoiser, check_graphics, check_window, check_memory, check_film,
+# Name, whether Lambent cannot do without, and the function that looks: whether all is well, and what is there.
+CHECKS: tuple[tuple[str, bool, Callable[[], tuple[bool, str]]], ...] = (
+    ("path tracer", True, _path_tracer), ("denoiser", True, _denoiser), ("graphics", True, _graphics),
+    ("window", False, _window), ("memory", False, _memory), ("film", False, _film),
 )  # fmt: skip
 
 
-def memory_bytes() -> int:
-    """Physical memory of this machine."""
-    if sys.platform == "win32":
-        import ctypes
-
-        kilobytes = ctypes.c_ulonglong()
-        ctypes.windll.kernel32.GetPhysicallyInstalledSystemMemory(ctypes.byref(kilobytes))
-        return kilobytes.value * 1024
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-
-
 def missing_packages(checks: list[Check]) -> list[str]:
-    """System packages for this machine's package manager that the failed checks want."""
-    manager = _manager()
-    failed = [PACKAGES.get(check.name, {}) for check in checks if not check.ok]
-    return [package for packages in failed for package in packages.get(manager or "", [])]
+    """System packages that the failed checks want, for this machine's package manager."""
+    manager, failed = _manager() or "", [check.name for check in checks if not check.ok]
+    return [package for name in failed for package in PACKAGES.get(name, {}).get(manager, [])]
 
 
 def mending_command(packages: list[str]) -> str | None:
-    """The one command that installs `packages`, or None where there is nothing it could install."""
+    """The one command that installs `packages`, or None without packages or a package manager."""
     manager = _manager()
     if not packages or manager is None:
         return None
@@ -190,11 +180,10 @@ def _first_known(manager: str, names: list[str]) -> str:
 
 
 def _ask(program: str) -> tuple[object, str]:
-    """What a small program answers in a process of its own, or (None, one line of why not)."""
+    """The answer of a small program in a process of its own, or (None, the reason in one line)."""
+    command = [sys.executable, "-c", program]
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, timeout=PROBE_SECONDS, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False)
     except subprocess.TimeoutExpired:
         return None, f"no answer within {PROBE_SECONDS} s"
     answer = next((line for line in done.stdout.splitlines() if line.startswith("answer ")), None)
@@ -202,7 +191,3 @@ def _ask(program: str) -> tuple[object, str]:
         return jsonlib.loads(answer.removeprefix("answer ")), ""
     lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
     return None, lines[-1] if lines else f"ended with code {done.returncode}"
-
-
-def _mark(check: Check) -> str:
-    return "ok" if check.ok else "NO" if check.essential else "- "

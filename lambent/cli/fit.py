@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from lambent.cli.console import Json, progress_bar, say, show, table
+from lambent.cli.console import Json, progress_bar, say, show, table, words
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -41,10 +41,10 @@ def command(
     output: Annotated[Path | None, typer.Option("-o", help="Write the material document (.json).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw both: X.png gives X_polar, X_in_plane, X_albedo.")] = None,
     report: Annotated[
-        Path | None, typer.Option(help="Write all there is to know of the fit as one page (.html), previews included.")
+        Path | None, typer.Option(help="Write all that is known of the fit as one page (.html), previews included.")
     ] = None,
     environment: Annotated[
-        Path | None, typer.Option(help="Lat-long picture (.hdr, .exr) the report's previews stand in; else daylight.")
+        Path | None, typer.Option(help="Lat-long image (.hdr, .exr) around the report's previews; else daylight.")
     ] = None,
     json: Json = False,
 ) -> None:
@@ -69,50 +69,32 @@ def command(
     samples = measurement.samples()
     with progress_bar() as progress:
         result = fit(
-            samples,
-            lobes=count,
-            method=method,
-            metric=metric,
-            distribution=distribution,
-            coupled=coupled,
-            gain=gain,
-            schedule=Schedule(grid_n, grid_levels),
-            fix=fixed,
-            ranges=ranges,
-            seed=seed,
-            source=file,
-            progress=progress,
-        )
+            samples, lobes=count, method=method, metric=metric, distribution=distribution, coupled=coupled, gain=gain,
+            schedule=Schedule(grid_n, grid_levels), fix=fixed, ranges=ranges, seed=seed, source=file, progress=progress,
+        )  # fmt: skip
     if output is not None:
         result.material.save(output)
     plots = save_plots(samples, result.material, plot.parent, plot.stem) if plot is not None else []
     if report is not None:
-        from lambent.report.fit_report import write_report
+        from lambent.core.files import write_text
+        from lambent.report import fit_report
         from lambent.scenes.scene import ImageEnvironment
 
-        surroundings = ImageEnvironment(environment) if environment is not None else None
-        with progress_bar() as progress:
-            write_report(report, measurement, samples, result, source=file, environment=surroundings, progress=progress)
+        around = ImageEnvironment(environment) if environment is not None else None
+        with progress_bar() as bar:
+            page = fit_report.report(measurement, samples, result, source=file, environment=around, progress=bar)
+        write_text(report, page)
     for warning in (*samples.info.notes, *result.warnings):
         say(f"note: {warning}")
-    facts = {
-        "material": result.material.model_dump(mode="json"),
-        "errors": result.errors,
-        "lambertian_errors": result.lambertian_errors,
-        "seconds": result.seconds,
-        "partial": result.partial,
-        "warnings": result.warnings,
-        "written": output,
-        "plots": plots,
-        "report": report,
-    }
-    show(facts, describe(result), json)
+    figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
+    facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}
+    show({**facts, "written": output, "plots": plots, "report": report}, describe(result), json)
     if result.partial:
         raise typer.Exit(130)
 
 
 def _check_environment(file: Path, report: Path | None) -> None:
-    """Find out before the fit that the picture cannot be used."""
+    """Find out before the fit that the image cannot be used."""
     from lambent.core.images import read_image
 
     if report is None:
@@ -132,12 +114,10 @@ def describe(result: FitResult) -> str:
     """Parameters with their units, then the error under every metric beside that of a Lambertian surface."""
     from lambent.materials.fitting.metrics import METRICS
 
-    errors = [
-        (name, f"{value:.4g}", f"{result.lambertian_errors[name]:.4g}", METRICS[name].unit)
-        for name, value in result.errors.items()
-    ]
-    head = ("error", "fit", "Lambertian", "unit")
-    return f"{parameters(result.material)}\n\n{table([head, *errors])}\n\n{result.seconds:.1f} s"
+    rows = [("error", "fit", "Lambertian", "unit")]
+    for name, value in result.errors.items():
+        rows.append((name, words(value), words(result.lambertian_errors[name]), METRICS[name].unit))
+    return f"{parameters(result.material)}\n\n{table(rows)}\n\n{result.seconds:.1f} s"
 
 
 def parameters(material: Material) -> str:

@@ -1,4 +1,4 @@
-"""`lambent inspect`: what a file is."""
+"""`lambent inspect`: the kind of a file, and its contents in short."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import Annotated, Any
 
 import typer
 
-from lambent.cli.console import Json, show, table
+from lambent.cli.console import Json, show, table, words
+from lambent.cli.convert import head_of, is_document
 from lambent.core.errors import UserError
 from lambent.core.plain import plain
 
 ALBEDO_AT_DEG = (0, 30, 60)
-HEAD_BYTES = 16
-SCENE_BYTES = 1 << 16  # in which a Mitsuba scene says that it is one
+HEAD_BYTES = 1 << 16  # in which a Mitsuba scene says that it is one
 PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
 Facts = dict[str, Any]
 
 
 def command(
-    file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, picture; or builtin:room.")],
+    file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
     plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
     json: Json = False,
 ) -> None:
-    """Say what a file of ours or theirs is: format, dimensions, symmetry, albedo, faults.
+    """Describe any file of ours or of other tools: format, dimensions, symmetry, albedo, faults.
 
     Example: lambent inspect brushed.bsdf --plot brushed.png
     """
@@ -32,16 +32,19 @@ def command(
         from lambent.core.images import check_writable
 
         check_writable(plot, (".png", ".pdf", ".svg"))
-    facts = plain(inspector_of(file)(file, plot))
-    text = table(list(_rows(facts)))
-    for name, value in facts.items():
-        if _is_prose(value):
-            text += f"\n\n{name}" + "".join(f"\n- {sentence}" for sentence in value)
-    show(facts, text, json)
+    inspect = inspector_of(file)
+    if plot is None:
+        facts = plain(inspect(file))
+    elif inspect in (inspect_table, inspect_material):
+        facts = plain(inspect(file, plot))
+    else:
+        raise UserError("only tables and materials are plotted", file=file, field="--plot")
+    prose = ["\n- ".join([f"\n\n{name}", *value]) for name, value in facts.items() if _is_prose(value)]
+    show(facts, table(_rows(facts)) + "".join(prose), json)
 
 
-def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
-    """The function that understands a file, chosen by its place and its first bytes."""
+def inspector_of(file: str) -> Callable[..., Facts]:
+    """The function that describes a file, chosen by its place and its first bytes."""
     from lambent.scenes.loaders.mitsuba.document import is_scene as is_mitsuba_scene
 
     path = Path(file)
@@ -49,23 +52,16 @@ def inspector_of(file: str) -> Callable[[str, Path | None], Facts]:
         return inspect_scene
     if path.is_dir():
         return inspect_store
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD_BYTES)
-            start = head + stream.read(SCENE_BYTES)
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=file) from error
+    head = head_of(path, HEAD_BYTES)
     if head.startswith(PICTURES):
         return inspect_picture
-    if is_mitsuba_scene(start):
+    if is_mitsuba_scene(head):
         return inspect_scene
-    if head.lstrip().startswith(b"{"):
-        return inspect_material
-    return inspect_table
+    return inspect_material if is_document(head) else inspect_table
 
 
-def inspect_table(file: str, plot: Path | None) -> Facts:
-    """A measured table: what the file says, how much of it is usable, its albedo, its faults."""
+def inspect_table(file: str, plot: Path | None = None) -> Facts:
+    """A measured table: its description, how much of it is usable, its albedo, its faults."""
     from lambent.materials import measured
     from lambent.materials.measured import inspection
 
@@ -78,8 +74,8 @@ def inspect_table(file: str, plot: Path | None) -> Facts:
     return {"is": "measured table", **facts, "findings": facts["findings"] or ["no faults found"]}
 
 
-def inspect_material(file: str, plot: Path | None) -> Facts:
-    """A material document: its numbers, its albedo, where it comes from."""
+def inspect_material(file: str, plot: Path | None = None) -> Facts:
+    """A material document: its numbers, its albedo, its source."""
     import numpy as np
 
     from lambent.core.directions import direction
@@ -89,7 +85,10 @@ def inspect_material(file: str, plot: Path | None) -> Facts:
     material = load_material(Path(file))
     bsdf = MaterialBSDF(material)
     if plot is not None:
-        _plot(plot, material.name, bsdf.eval, Path(file).name, material.transmits)
+        from lambent.materials.plots import plot_plane_of_incidence
+
+        plot_plane_of_incidence(plot, {material.name: bsdf.eval}, title=Path(file).name, transmits=material.transmits)
+    albedo = bsdf.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))
     provenance = material.provenance.model_dump(mode="json") if material.provenance else {}
     return {
         "is": "material",
@@ -97,18 +96,17 @@ def inspect_material(file: str, plot: Path | None) -> Facts:
         "kd": material.kd,
         "kt_d": material.kt_d,
         **{f"lobe {number}": lobe.model_dump() for number, lobe in enumerate(material.lobes, 1)},
-        "albedo": _at_angles(bsdf.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))),
+        "albedo": {f"{angle} deg": float(rgb.mean()) for angle, rgb in zip(ALBEDO_AT_DEG, albedo, strict=True)},
         "source": {key: value for key, value in provenance.items() if value and not isinstance(value, dict | list)},
         "errors": provenance.get("errors"),
         "notes": provenance.get("notes"),
     }
 
 
-def inspect_scene(file: str, plot: Path | None) -> Facts:
-    """A scene: what is in it and what its loader repaired."""
+def inspect_scene(file: str) -> Facts:
+    """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
 
-    _no_plot(file, plot)
     scene = load_scene(file)
     low, high = scene.bounds
     return {
@@ -126,11 +124,10 @@ def inspect_scene(file: str, plot: Path | None) -> Facts:
     }
 
 
-def inspect_store(file: str, plot: Path | None) -> Facts:
-    """A store: which arrays it holds, complete or not, and whether every chunk on disk is sound."""
+def inspect_store(file: str) -> Facts:
+    """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
     from lambent.store.store import Store
 
-    _no_plot(file, plot)
     store = Store.open(Path(file))
     return {
         "is": "store",
@@ -142,25 +139,22 @@ def inspect_store(file: str, plot: Path | None) -> Facts:
 
 
 def _reflectors(store: Any) -> list[str]:
-    """Planar reflectors in words: plane, area, whose they are."""
+    """Planar reflectors in words: area, objects, plane."""
     from lambent.store.contract import SCENE, scene_record
 
-    if SCENE not in store.documents:
-        return []
-    said = []
-    for r in scene_record(store).reflectors:
+    words = []
+    for r in scene_record(store).reflectors if SCENE in store.documents else ():
         *n, d = (round(x, 3) + 0.0 for x in r.plane)
         area = sum(part.area_m2 for part in r.parts)
-        said.append(f"{area:.2f} m2 of {', '.join(part.object for part in r.parts)}: n {n}, d {d}")
-    return said
+        words.append(f"{area:.2f} m2 of {', '.join(part.object for part in r.parts)}: n {n}, d {d}")
+    return words
 
 
-def inspect_picture(file: str, plot: Path | None) -> Facts:
-    """A picture: size and range of its linear values."""
+def inspect_picture(file: str) -> Facts:
+    """An image: size and range of its linear values."""
     from lambent.core.colour import luminance
     from lambent.core.images import read_image
 
-    _no_plot(file, plot)
     image = read_image(Path(file))
     return {
         "is": "picture",
@@ -182,24 +176,8 @@ def _health(store: Any, artefact: Any) -> str:
     return "complete"
 
 
-def _at_angles(values: Any) -> Facts:
-    """{"30 deg": mean over channels} of values (angles, channels)."""
-    return {f"{angle} deg": float(value.mean()) for angle, value in zip(ALBEDO_AT_DEG, values, strict=True)}
-
-
-def _plot(path: Path, name: str, evaluate: Any, title: str, transmits: bool) -> None:
-    from lambent.materials.plots import plot_plane_of_incidence
-
-    plot_plane_of_incidence(path, {name: evaluate}, title=title, transmits=transmits)
-
-
-def _no_plot(file: str, plot: Path | None) -> None:
-    if plot is not None:
-        raise UserError("only tables and materials are plotted", file=file, field="--plot")
-
-
 def _rows(facts: Facts, indent: str = "") -> Iterator[tuple[str, str]]:
-    """(name, words) of every fact that says something; facts within facts are indented."""
+    """(name, words) of every fact that is not empty; facts within facts are indented."""
     for name, value in facts.items():
         label = indent + name
         if isinstance(value, dict) and value:
@@ -215,9 +193,7 @@ def _is_prose(value: Any) -> bool:
 
 
 def _words(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}"
     if not isinstance(value, list):
-        return str(value)
+        return words(value)
     nested = any(isinstance(item, list) for item in value)
     return ("; " if nested else " " if isinstance(value[0], float) else ", ").join(map(_words, value))

@@ -1,4 +1,4 @@
-"""`lambent`: finds the commands and says what went wrong.
+"""`lambent`: finds the commands and reports errors.
 
 Every module of this folder with a function `command` is a command of the module's name; nothing else to register.
 Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part); 2 wrong input; 130 interrupted.
@@ -7,10 +7,8 @@ Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part
 from __future__ import annotations
 
 import errno
-import importlib
 import logging
 import os
-import pkgutil
 import sys
 from typing import Annotated
 
@@ -19,6 +17,7 @@ from typer.exceptions import TyperException
 
 import lambent
 from lambent import cli
+from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 
@@ -40,10 +39,8 @@ def build_app() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     )
     app.callback()(_options)
-    for info in pkgutil.iter_modules(cli.__path__):
-        module = importlib.import_module(f"lambent.cli.{info.name}")
-        if hasattr(module, "command"):
-            app.command(info.name)(module.command)
+    for name, module in modules_in(cli, having="command").items():
+        app.command(name)(module.command)
     return app
 
 
@@ -63,12 +60,12 @@ def run(arguments: list[str]) -> int:
         return _fail(error.format_message())
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
-    except SystemError as error:  # what an interruption becomes while an extension module is imported
+    except SystemError as error:  # raised where an interruption meets the import of an extension module
         if not isinstance(error.__cause__, KeyboardInterrupt):
             raise
         code = INTERRUPTED
     except BrokenPipeError:
-        # Whoever read the output is gone; what is left to flush at exit goes nowhere.
+        # The reader of the output is gone; flushing at exit must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Pinhole cameras: the record, its axes, its projection and its rays. One truth for loaders, bake, renderer and window.
+"""Pinhole cameras for loaders, bake, renderer and window: the record, its axes, its projection and its rays.
 
 Clip space is WebGPU's, depth reversed (1 at the near plane, 0 at infinity). World space is right-handed, y up, metres.
 """
@@ -20,7 +20,7 @@ OVERVIEW_FOV_Y_DEG = 45.0
 
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole. `fov_y_deg` is the full vertical field of view; up is +y unless said."""
+    """Pinhole camera. `fov_y_deg` is the full vertical field of view."""
 
     name: str
     position: Triple
@@ -33,9 +33,9 @@ class Camera:
 
 @dataclass(frozen=True)
 class CameraPath:
-    """Key cameras on a smooth curve, passed at constant speed, or, where `times_s` says so, each key at its time.
+    """Key cameras on a smooth curve, passed at constant speed, or each key at its time in `times_s`.
 
-    `times_s` has one time per key, begins at 0, grows, and ends at `seconds`.
+    `times_s` has one time per key, begins at 0, increases, and ends at `seconds`.
     """
 
     name: str
@@ -44,6 +44,10 @@ class CameraPath:
     times_s: tuple[float, ...] | None = None
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
+
+    def frames(self, fps: float) -> int:
+        """Number of frames of a film along the path, at least two."""
+        return max(2, round(self.seconds * fps))
 
 
 def camera_axes(camera: Camera) -> tuple[Floats, Floats, Floats]:

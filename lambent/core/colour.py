@@ -1,4 +1,4 @@
-"""Colour: linear Rec.709 RGB (the colour space of every array in Lambent), XYZ, L*a*b*, and what a display shows.
+"""Colour: linear Rec.709 RGB (the colour space of every array in Lambent), XYZ, L*a*b*, and display encoding.
 
 All functions take and return arrays (..., 3) and keep the dtype of floating input. White is D65 (Y = 1 at RGB 1, 1, 1).
 """
@@ -17,7 +17,7 @@ RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.01
 XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
 WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
 _LAB_EDGE = 6 / 29
-HALF_MAX = 65504.0  # the largest half float: brighter light is cut there
+HALF_MAX = 65504.0  # the largest half float; brighter light is clipped to it
 
 
 def luminance(rgb: Floats) -> Floats:
@@ -41,14 +41,6 @@ def rgb_to_lab(rgb: Floats) -> Floats:
     f = np.where(t > _LAB_EDGE**3, np.cbrt(t), t / (3 * _LAB_EDGE**2) + 4 / 29)
     x, y, z = f[..., 0], f[..., 1], f[..., 2]
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
-
-
-def lab_to_rgb(lab: Floats) -> Floats:
-    """CIE L*a*b* (D65) to linear RGB."""
-    y = (lab[..., 0] + 16) / 116
-    f = np.stack([y + lab[..., 1] / 500, y, y - lab[..., 2] / 200], axis=-1)
-    t = np.where(f > _LAB_EDGE, f**3, 3 * _LAB_EDGE**2 * (f - 4 / 29))
-    return xyz_to_rgb(t * WHITE_XYZ.astype(t.dtype))
 
 
 def srgb_encode(linear: Floats) -> Floats:
@@ -91,7 +83,7 @@ def neutral(linear: Floats, exposure_ev: float = 0.0) -> Floats:
 
 
 def shown(radiance: Floats, view: str, exposure_ev: float = 0.0) -> Floats:
-    """What a display gets, encoded, of scene radiance by a view transform: filmic, neutral or linear."""
+    """Scene radiance encoded for a display by a view transform: filmic, neutral or linear."""
     if view == "linear":
         return srgb_encode(radiance * np.asarray(2.0**exposure_ev, radiance.dtype))
     return srgb_encode({"filmic": filmic, "neutral": neutral}[view](radiance, exposure_ev))

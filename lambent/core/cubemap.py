@@ -1,4 +1,4 @@
-"""Cube maps: which direction a texel looks in. One truth for the bake, the shaders and the benches.
+"""Cube maps: the direction of each texel, the same for the bake, the shaders and the benches.
 
 Faces in the order +x, -x, +y, -y, +z, -z, rows from the top, exactly as WebGPU samples a cube texture: an array of
 shape (6, N, N, C) uploaded layer by layer is read back by `textureSample(cube, s, direction)` with world directions.
@@ -15,18 +15,19 @@ Floats = NDArray[np.floating]
 def face_directions(n: int) -> Floats:
     """(6, n, n, 3) directions of the texel centres, scaled so that the largest component is 1 (not unit vectors)."""
     c = (np.arange(n) + 0.5) / n * 2 - 1
-    s, t = np.meshgrid(c, c)
-    one = np.ones_like(s)
-    faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
-    return np.stack([np.stack(face, axis=-1) for face in faces])
+    return _on_all_faces(*np.meshgrid(c, c))
 
 
 def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
     """Directions (..., 3) (largest component 1) at face coordinates s, t in [-1, 1], t downwards."""
+    return np.asarray(np.take_along_axis(_on_all_faces(s, t), face[None, ..., None], axis=0)[0])
+
+
+def _on_all_faces(s: Floats, t: Floats) -> Floats:
+    """(6, ..., 3) directions at s, t (...) of every face."""
     one = np.ones_like(s)
-    all_faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
-    stacked = np.stack([np.stack(f, axis=-1) for f in all_faces])
-    return np.asarray(np.take_along_axis(stacked, face[None, ..., None], axis=0)[0])
+    faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
+    return np.stack([np.stack(face, axis=-1) for face in faces])
 
 
 def texel_solid_angles(n: int) -> Floats:

@@ -1,4 +1,4 @@
-"""What is found, not listed: the modules of a package. A new format, bench, artefact or mode is a new file.
+"""Discovery of the modules of a package: a new format, bench, artefact or mode is a new file, and no list is edited.
 
 A package may gain folders (`package.__path__.append`), for instance from a plug-in; their modules are found, too.
 """

@@ -1,4 +1,4 @@
-"""The one exception for what a user can cause; everything else is a bug and keeps its traceback."""
+"""The one exception for faults of a user's input; everything else is a bug and keeps its traceback."""
 
 from __future__ import annotations
 
@@ -8,20 +8,18 @@ from pathlib import Path
 
 
 class UserError(Exception):
-    """Input that cannot be used, said in one line: file, field, found, expected, what to do.
+    """Input that cannot be used, said in one line: file, field, found, expected, hint.
 
     Parameters
     ----------
     message : str
-        What is wrong, without a full stop.
-    file : path-like, optional
-        The file it is wrong in.
-    field : str, optional
-        The field, key, option or line within the file.
+        The fault, without a full stop.
+    file, field : path-like and str, optional
+        Its place: the file, and the field, key, option or line.
     got, expected : object, optional
-        What was found there and what belongs there.
+        The value found there, and the values that belong there.
     hint : str, optional
-        What the user can do about it.
+        A remedy.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Luminance in false colour, with a scale of numbers: for people who plan light."""
+"""Luminance in false colour, with a scale of numbers, for people who plan light."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ STOPS = np.array(
     ]
 )  # fmt: skip
 BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-LEAST, MOST = 1e-4, 1e9  # numbers that a range can name
-DECADES = 3.0  # of a logarithmic range that is chosen by the picture
+LEAST, MOST = 1e-4, 1e9  # numbers that a range can hold
+DECADES = 3.0  # of a logarithmic range fitted to an image
+ROUND = (1, 2, 5, 10)  # digits of round numbers
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Range:
             raise UserError("range of luminance", got=f"{self.low:g}:{self.high:g}", expected=expected)
 
     def share(self, values: Floats) -> Floats:
-        """Where values stand on the scale: 0 at `low`, 1 at `high`."""
+        """Places of values on the scale: 0 at `low`, 1 at `high`."""
         if self.log:
             lowest = math.log(self.low)
             return np.asarray((np.log(np.maximum(values, 1e-12)) - lowest) / (math.log(self.high) - lowest))
@@ -52,21 +53,17 @@ class Range:
         """Round numbers for the scale, the ends among them where they are round: 1, 2 and 5 of each decade."""
         if self.log:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
-            wide = math.log10(self.high / self.low) > 4
-            digits = (1,) if wide else (1, 2, 5)
+            digits = ROUND[:1] if math.log10(self.high / self.low) > 4 else ROUND[:3]
             found = [digit * 10.0**decade for decade in decades for digit in digits]
         else:
-            rough = (self.high - self.low) / 8
-            step = 10.0 ** math.floor(math.log10(rough))
-            step *= next(m for m in (1, 2, 5, 10) if m * step >= rough)
-            first = math.ceil(self.low / step)
-            found = [step * k for k in range(first, math.floor(self.high / step) + 1)]
+            step = _round_up((self.high - self.low) / 8, slack=0.0)
+            found = [step * k for k in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
         inside = [x for x in found if self.low * (1 - 1e-9) <= x <= self.high * (1 + 1e-9)]
         return inside or [self.low, self.high]
 
 
 def fitting_range(values: Floats, *, log: bool = True) -> Range:
-    """A range of round numbers that holds nearly all of a picture's values (the brightest half percent aside).
+    """A range of round numbers that holds nearly all values of an image (but the brightest half percent).
 
     Logarithmic ranges span at most `DECADES` below the high end.
     """
@@ -79,7 +76,7 @@ def fitting_range(values: Floats, *, log: bool = True) -> Range:
         return Range(0.0, high, log=False)
     low = max(float(low), high / 10**DECADES, LEAST)
     down = 10.0 ** math.floor(math.log10(low))
-    low = max(m * down for m in (1, 2, 5) if m * down <= low * (1 + 1e-9))
+    low = max(m * down for m in ROUND[:3] if m * down <= low * (1 + 1e-9))
     return Range(low if low < high else high / 10, high)
 
 
@@ -93,18 +90,14 @@ def false_colour(values: Floats, scale: Range) -> Floats:
 
 
 def number(value: float) -> str:
-    """A number of the scale as people write it: three digits, no exponent."""
-    if value <= 0:
-        return "0"
-    return (
-        f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}".rstrip("0").rstrip(".")
-        if value < 100
-        else f"{value:.0f}"
-    )
+    """A number of the scale as people write it: three digits, no exponent; 0 and less as 0."""
+    digits = max(0, 2 - math.floor(math.log10(value))) if value > 0 else 0
+    text = f"{max(value, 0):.{digits}f}"
+    return text.rstrip("0").rstrip(".") if digits else text
 
 
 def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE.unit) -> NDArray[np.uint8]:
-    """A copy of an encoded picture (H, W, 3) with the scale and its numbers over its right edge."""
+    """A copy of an encoded image (H, W, 3) with the scale and its numbers over its right edge."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width = picture.shape[:2]
@@ -135,6 +128,6 @@ def with_scale(picture: NDArray[np.uint8], scale: Range, unit: str = LUMINANCE.u
     return np.asarray(image, np.uint8)
 
 
-def _round_up(value: float) -> float:
+def _round_up(value: float, slack: float = 1e-9) -> float:
     down = 10.0 ** math.floor(math.log10(value))
-    return next(m * down for m in (1, 2, 5, 10) if m * down >= value * (1 - 1e-9))
+    return next(m * down for m in ROUND if m * down >= value * (1 - slack))

@@ -1,4 +1,4 @@
-"""File safety: whole files or none, hashes, and names that stay inside their folder."""
+"""File safety: whole files or none, hashes, names that stay inside their folder."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def check_place(path: Path) -> None:
-    """`UserError` where no file can be written at `path`: to ask before long work. Makes nothing that stays."""
+    """`UserError` where no file can be written at `path`, before long work begins. Leaves nothing behind."""
     path = Path(path)
     if path.is_dir():
         raise UserError("is a folder", file=path, expected="a name for a file")

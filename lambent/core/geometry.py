@@ -11,7 +11,7 @@ Floats = NDArray[np.floating]
 
 
 def area_vectors(corners: Floats) -> Floats:
-    """Vectors (..., 3) along the normals of triangles (..., 3, 3), counter-clockwise, twice as long as their areas."""
+    """Normals (..., 3) of counter-clockwise triangles (..., 3, 3), with twice the area of each as length."""
     a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
     return np.asarray(np.cross(b - a, c - a))
 

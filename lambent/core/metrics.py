@@ -1,6 +1,6 @@
-"""How far two pictures are apart. A mean hides a hole: the worst 16x16 tile always stands beside it.
+"""Differences of two images. A mean hides a hole, so the worst 16x16 tile always stands beside it.
 
-Pictures are linear RGB (H, W, 3) unless `encoded`, which is what a display gets: sRGB values in [0, 1].
+Images are linear RGB (H, W, 3), unless they are `encoded` for a display: sRGB values in [0, 1].
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TILE = 16  # pixels
 
 @dataclass(frozen=True)
 class Flip:
-    """FLIP error (Andersson et al. 2020): 0 no difference a viewer sees, 1 the largest."""
+    """FLIP error (Andersson et al. 2020): 0 is no visible difference, 1 the largest."""
 
     error: Floats  # (H, W)
     picture: Floats  # (H, W, 3) encoded, in false colour: black no error, yellow-white 1
@@ -42,7 +42,7 @@ class Flip:
 
 
 def psnr(reference: Floats, test: Floats, peak: float = 1.0) -> float:
-    """Peak signal-to-noise ratio in dB over all values; infinite where the pictures are equal."""
+    """Peak signal-to-noise ratio in dB over all values; infinite if the images are equal."""
     mse = float(np.mean((np.asarray(reference, np.float64) - test) ** 2))
     return 10 * float(np.log10(peak**2 / mse)) if mse > 0 else float("inf")
 
@@ -58,7 +58,7 @@ def rmse_lab(reference: Floats, test: Floats) -> Floats:
 
 
 def flip(reference: Floats, test: Floats) -> Flip:
-    """FLIP of two encoded pictures at 67 pixels per degree (a desktop display at arm's length)."""
+    """FLIP of two encoded images at 67 pixels per degree (a desktop display at arm's length)."""
     return Flip(flip_error(reference, test), _flip(reference, test, in_colour=True))
 
 
@@ -77,7 +77,7 @@ def _flip(reference: Floats, test: Floats, in_colour: bool) -> Floats:
 
 
 def compare(reference: Floats, test: Floats, *, radiance: bool) -> tuple[dict[str, Any], Floats]:
-    """All figures for two linear pictures, and the FLIP error in false colour (encoded)."""
+    """All figures for two linear images, and the FLIP error in false colour (encoded)."""
     shown = display_pair(reference, test) if radiance else (srgb_encode(reference), srgb_encode(test))
     seen = flip(*shown)
     return {
@@ -101,13 +101,13 @@ def tile_means(error: Floats, tile: int = TILE) -> Floats:
 
 
 def display_pair(reference: Floats, test: Floats, mean: float = 0.3) -> tuple[Floats, Floats]:
-    """Two pictures of radiance as encoded ones: clip(e L)^(1/2.2), e such that the reference has mean `mean`."""
+    """Two images of radiance encoded as clip(e L)^(1/2.2), with e such that the reference has mean `mean`."""
     exposure_ev = display_exposure(reference, mean)
     return displayed(reference, exposure_ev), displayed(test, exposure_ev)
 
 
 def display_exposure(reference: Floats, mean: float = 0.3) -> float:
-    """log2 of the e under which `displayed` of a picture of radiance has mean `mean`.
+    """log2 of the e at which `displayed` of an image of radiance has mean `mean`.
 
     Found by bisection because clipping makes the mean a monotone, not linear, function of e.
     """

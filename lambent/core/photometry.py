@@ -1,8 +1,8 @@
-"""Photometry: one luminous efficacy, and one meaning of every unit that people plan light in.
+"""Photometry: one luminous efficacy, and one meaning of every photometric unit.
 
 Every array in Lambent is radiometric, linear Rec.709: radiance in W/(sr m^2), irradiance in W/m^2, intensity in W/sr.
-Luminance in cd/m^2 is `LM_PER_W` times the Y of radiance, illuminance in lx the same of irradiance, luminous intensity
-in cd of intensity, luminous flux in lm of flux. Readers of photometric files divide by the same number.
+`LM_PER_W` times Y turns radiance into luminance in cd/m^2, irradiance into illuminance in lx, intensity into luminous
+intensity in cd, flux into luminous flux in lm. Readers of photometric files divide by the same number.
 
 179 lm/W is the efficacy that Radiance (Ward 1994) gives white light over the visible range; spectral radiance weighted
 by V(lambda) would take 683 lm/W, but the three channels each stand for a broad band.
@@ -24,7 +24,7 @@ LM_PER_W = 179.0
 
 @dataclass(frozen=True)
 class Quantity:
-    """The quantity that an image's numbers are shown as: its unit, and how many of it a Y of 1 is."""
+    """A quantity that images are shown as: its unit, and its value where Y is 1."""
 
     unit: str
     per_y: float

@@ -1,4 +1,4 @@
-"""Plain values: results as JSON knows them, words that are numbers, three floats, names that files can have."""
+"""Plain values: results for JSON, words that are numbers, triples of floats, names for files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Triple = tuple[float, float, float]
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON knows it: arrays and tuples as lists, paths as text, what is not finite as null."""
+    """`value` for JSON: arrays and tuples as lists, paths as text, numbers that are not finite as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | set):
@@ -39,5 +39,5 @@ def triple(values: Iterable[Any]) -> Triple:
 
 
 def plain_name(name: str, otherwise: str = "material") -> str:
-    """A file's name for any name that a user or a file gave; `otherwise` where nothing of it is left."""
+    """A file name for any name from a user or a file; `otherwise` if nothing of it is left."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise

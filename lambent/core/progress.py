@@ -37,3 +37,12 @@ def stepper(progress: Progress, total: int) -> Callable[[str], None]:
     """A function that reports the next of `total` steps by its name; the call after the last one reports the end."""
     done = iter(range(total + 1))
     return lambda what: progress(next(done), total, what)
+
+
+def part_of(progress: Progress, begin: float, end: float, step: str) -> Progress:
+    """A `Progress` for one step of longer work, which it moves from the share `begin` to the share `end`."""
+
+    def report(done: float, total: float, what: str) -> None:
+        progress(begin + (end - begin) * done / max(total, 1), 1.0, step)
+
+    return report

@@ -1,6 +1,6 @@
 """The whole flow on the built-in room: measure, fit, place, bake, walk, compare.
 
-Each step writes what it made under one folder and hands the next only that, as the commands do:
+Each step writes its results to one folder, and the next step reads only those, as the commands do:
 
     measured/NAME.txt      gonio tables of four specimens
     materials/NAME.json    the fitted materials, each with its plots NAME_*.png
@@ -19,15 +19,32 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from lambent.bake.bake import bake
+from lambent.bake.goniophotometer import measure
 from lambent.bake.quality import Quality, quality_named
+from lambent.core.camera import Camera
+from lambent.core.colour import srgb_decode
 from lambent.core.files import write_text
+from lambent.core.images import write_image, write_shown
+from lambent.core.metrics import compare
 from lambent.core.plain import plain
 from lambent.core.progress import Progress
-from lambent.materials.document import Material
+from lambent.materials import measured
+from lambent.materials.document import load_material
+from lambent.materials.fitting.fit import fit
+from lambent.materials.fitting.plot import save_plots
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.realtime.device import adapter_info, open_device
+from lambent.realtime.frame import FrameState, Renderer
+from lambent.render import write_frames
+from lambent.scenes import load_scene
+from lambent.scenes.camera_paths import camera_at
 from lambent.scenes.scene import Scene
+from lambent.store.store import Store
 
 SCENE = "builtin:room"
 SPECIMEN_OF = {  # material of the room -> specimen that is measured for it
@@ -41,10 +58,10 @@ STILLS = 8
 
 @dataclass(frozen=True)
 class Effort:
-    """Sizes of one kind of demo: pictures in pixels, film in seconds, samples per pixel of the compared view.
+    """Sizes of a demo: images in pixels, film in seconds, samples per pixel of the compared view.
 
-    `tuples` is how many of a table's tuples are fitted, all where None; `still_frames` how many frames make a still,
-    `moving_frames` how many the view in motion, so that its edges can be compared.
+    `tuples` of each table are fitted, all where None; `still_frames` are averaged to a still, `moving_frames` to the
+    view in motion, so that its edges can be compared.
     """
 
     quality: Quality
@@ -66,7 +83,7 @@ QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 3.0, 10, (420, 262), 32,
 
 
 class Flow:
-    """The steps in order; `report` collects what demo.json holds."""
+    """The steps in order; `report` collects the contents of demo.json."""
 
     def __init__(self, out: Path, effort: Effort, progress: Progress) -> None:
         self.out, self.effort, self.progress = Path(out), effort, progress
@@ -85,7 +102,7 @@ class Flow:
         try:
             scene = self.place(self.fit(tables))
             self.bake(scene)
-            with self._timed("plot"):  # what is left of it
+            with self._timed("plot"):  # the rest of it, after the bake
                 for plotted in self._plotted:
                     plotted.result()
         finally:
@@ -94,9 +111,6 @@ class Flow:
 
     def measure(self) -> dict[str, Path]:
         """Gonio tables of the specimens, by the room's material names."""
-        from lambent.bake.goniophotometer import measure
-        from lambent.materials.measured.gonio_text import write_gonio
-
         paths = {}
         with self._timed("measure"):
             for seed, (name, specimen) in enumerate(SPECIMEN_OF.items()):
@@ -107,12 +121,8 @@ class Flow:
     def fit(self, tables: Mapping[str, Path]) -> dict[str, Path]:
         """Material documents fitted to the table files, with a plot beside each.
 
-        Plots are drawn by a process of their own while the bake goes on: both have times when they use one core.
+        A process of its own draws the plots during the bake: both have times when they use one core.
         """
-        from lambent.materials import measured
-        from lambent.materials.fitting.fit import fit
-        from lambent.materials.fitting.plot import save_plots
-
         paths = {}
         for name, path in tables.items():
             with self._timed("fit"):
@@ -121,31 +131,22 @@ class Flow:
                 paths[name] = self.out / "materials" / f"{name}.json"
                 result.material.model_copy(update={"name": name}).save(paths[name])
             self._plotted.append(self._plots.submit(save_plots, samples, result.material, paths[name].parent, name))
-            self.report["fits"][name] = {
-                "seconds": result.seconds,
-                "errors": result.errors,
-                "lambertian_errors": result.lambertian_errors,
-                "warnings": result.warnings,
-            }
+            told = ("seconds", "errors", "lambertian_errors", "warnings")
+            self.report["fits"][name] = {key: getattr(result, key) for key in told}
         return paths
 
     def place(self, materials: Mapping[str, Path]) -> Scene:
         """The room with the fitted materials in place of its own."""
-        from lambent.materials.document import load_material
-        from lambent.scenes import load_scene
-
         with self._timed("place"):
             scene = load_scene(SCENE)
-            fitted: dict[str, Material] = {name: load_material(path) for name, path in materials.items()}
+            fitted = {name: load_material(path) for name, path in materials.items()}
             scene = replace(scene, materials={**scene.materials, **fitted})
         triangles = sum(len(item.mesh.faces) for item in scene.objects)
         self.report["scene"] = {"name": scene.name, "objects": len(scene.objects), "triangles": triangles}
         return scene
 
     def bake(self, scene: Scene) -> None:
-        """The store, or what is missing of it after an interruption."""
-        from lambent.bake.bake import bake
-
+        """Bake the store; after an interruption, the rest of it."""
         with self._timed("bake"):
             store = bake(scene, self.store_path, quality=self.effort.quality, progress=self.progress)
         self.report["bake"] = {
@@ -156,87 +157,66 @@ class Flow:
 
     def walk(self) -> None:
         """Stills along the walk and the film of it, from the frame code of the window."""
-        from lambent.core.film import film_writer
-        from lambent.core.images import write_shown
-        from lambent.realtime.device import adapter_info
-        from lambent.realtime.frame import FrameState
-        from lambent.scenes.camera_paths import camera_at
+        effort, renderer = self.effort, self._renderer
+        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev
 
-        renderer = self._renderer()
-        path = renderer.scene.record.paths[0]
-        exposure_ev = renderer.scene.record.exposure_ev
+        def cameras(count: int) -> list[Camera]:
+            return [camera_at(path, k / (count - 1) * path.seconds) for k in range(count)]
 
-        def state(share: float, size: tuple[int, int]) -> FrameState:
-            return FrameState(camera_at(path, share * path.seconds), *size, exposure_ev=exposure_ev)
-
-        renderer.display_image(state(0.0, self.effort.still))  # the first frame also builds the pipelines
+        views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(STILLS)]
+        renderer.display_image(views[0])  # the first frame also builds the pipelines
         with self._timed("stills"):
-            for k in range(STILLS):
-                view = state(k / (STILLS - 1), self.effort.still)
+            for number, view in enumerate(views, 1):
                 started = time.perf_counter()
-                picture = renderer.still(view, self.effort.still_frames)
-                frame_ms = (time.perf_counter() - started) * 1e3 / self.effort.still_frames
+                image = renderer.still(view, effort.still_frames)
+                frame_ms = (time.perf_counter() - started) * 1e3 / effort.still_frames
                 self.report.setdefault("frame_ms", []).append(frame_ms)
-                write_shown(self.out / f"walk_{k + 1}.png", picture)
-                self.progress(k + 1, STILLS, "stills")
-        frames = round(self.effort.film_seconds * self.effort.film_fps)
+                write_shown(self.out / f"walk_{number}.png", image)
+                self.progress(number, STILLS, "stills")
         planar = "interleaved" if adapter_info(renderer.device).is_software else "auto"  # half the time, seen in motion
-        with (
-            self._timed("film"),
-            film_writer(self.out / "walk.mp4", *self.effort.film, fps=self.effort.film_fps) as write,
-        ):
-            for k in range(frames):
-                view = replace(state(k / (frames - 1), self.effort.film), planar=planar)
-                write(renderer.display_image(view))
-                self.progress(k + 1, frames, "film")
+        frame = FrameState(views[0].camera, *effort.film, exposure_ev=exposure_ev, planar=planar)
+
+        def draw(camera: Camera) -> Any:
+            return renderer.display_image(replace(frame, camera=camera))
+
+        with self._timed("film"):
+            shown = cameras(round(effort.film_seconds * effort.film_fps))
+            write_frames(self.out / "walk.mp4", shown, draw, effort.film, effort.film_fps, self.progress)
 
     def compare(self, scene: Scene) -> None:
-        """One view three ways: in motion (`rings`), at rest (`qmc`), and path traced."""
-        from lambent.bake.reference import render_reference
-        from lambent.core.colour import srgb_decode
-        from lambent.core.images import write_image
-        from lambent.core.metrics import compare
-        from lambent.realtime.frame import FrameState
+        """One view by three methods: in motion (`rings`), at rest (`qmc`), and path traced."""
+        from lambent.bake.reference import render_reference  # imports Mitsuba, whose variant the bake has set
 
-        renderer, camera = self._renderer(), scene.cameras[0]
-        state = FrameState(
-            next(c for c in renderer.scene.record.cameras if c.name == camera.name), *self.effort.compared
-        )
+        effort, renderer, camera = self.effort, self._renderer, scene.cameras[0]
+        state = FrameState(camera, *effort.compared)
         with self._timed("frame at rest"):
-            rest = renderer.converged(state, self.effort.qmc_spp, self.progress)
+            rest = renderer.converged(state, effort.qmc_spp, self.progress)
         with self._timed("frame in motion"):
-            moving = renderer.still_radiance(state, self.effort.moving_frames)
+            moving = renderer.still_radiance(state, effort.moving_frames)
         with self._timed("path tracing"):
-            truth, _ = render_reference(
-                scene, camera, *self.effort.compared, self.effort.path_spp, progress=self.progress
-            )
+            truth, _ = render_reference(scene, camera, *effort.compared, effort.path_spp, progress=self.progress)
         folder = self.out / "compare"
-        for name, picture in (("moving", moving), ("rest", rest), ("path", truth)):
-            write_image(folder / f"{name}.exr", picture)
-        self.report["compare"] = {"camera": camera.name, "spp": self.effort.path_spp}
+        for name, image in (("moving", moving), ("rest", rest), ("path", truth)):
+            write_image(folder / f"{name}.exr", image)
+        self.report["compare"] = {"camera": camera.name, "spp": effort.path_spp}
         for name, reference, test in (
-            ("sampling", rest, moving),  # what the few filtered samples cost
-            ("total", truth, rest),  # what probes, parallax and light map cost
+            ("sampling", rest, moving),  # the error of few, filtered samples
+            ("total", truth, rest),  # the error of probes, parallax and light map
             ("moving_total", truth, moving),
         ):
-            figures, difference = compare(reference, test, radiance=True)
+            self.report["compare"][name], difference = compare(reference, test, radiance=True)
             write_image(folder / f"{name}.png", srgb_decode(difference))
-            self.report["compare"][name] = figures
 
-    def _renderer(self) -> Any:
-        if not hasattr(self, "_opened"):
-            from lambent.realtime.device import adapter_info, open_device
-            from lambent.realtime.frame import Renderer
-            from lambent.store.store import Store
-
-            with self._timed("open renderer"):
-                device = open_device()
-                self._opened = Renderer(device, Store.open(self.store_path))
-            self.report["adapter"] = str(adapter_info(device).name)
-        return self._opened
+    @cached_property
+    def _renderer(self) -> Renderer:
+        with self._timed("open renderer"):
+            device = open_device()
+            renderer = Renderer(device, Store.open(self.store_path))
+        self.report["adapter"] = adapter_info(device).name
+        return renderer
 
     def finish(self) -> dict[str, Any]:
-        """Write demo.json and return what it holds."""
+        """Write demo.json and return its contents."""
         seconds = self.report["seconds"]
         seconds["in all"] = sum(seconds.values())
         write_text(self.out / "demo.json", json.dumps(plain(self.report), indent=1, allow_nan=False) + "\n")

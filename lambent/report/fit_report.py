@@ -1,4 +1,4 @@
-"""The report of a fit: what was measured, what was found, how far to trust it, how it looks."""
+"""The report of a fit as one HTML page: the measurement, the material, its errors, plots and previews."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.files import sha256_of, write_text
+from lambent.core.files import sha256_of
 from lambent.core.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
@@ -27,7 +27,7 @@ from lambent.scenes.scene import Environment
 
 Floats = NDArray[np.floating]
 
-DPI, DENSITY = 150, 1.5  # plots are drawn finer than they are shown, for print and fine displays
+DPI, DENSITY = 150, 1.5  # plots are finer than their size on the page, for print and fine displays
 STORED = {
     "f": "f, the BSDF without a cosine, 1/sr",
     "f_cos": "f |cos theta_o|, 1/sr",
@@ -46,37 +46,8 @@ MEANINGS = (
     ("r0", "Fresnel reflectance at normal incidence", "1"),
     ("alpha", "exponent of the cosines: how much grazing light gains", "1"),
 )
+DISTRIBUTIONS = {"beckmann": "Beckmann", "ggx": "GGX"}
 EYE_LIKE = ("cuberoot", "log")
-
-
-def write_report(
-    path: Path,
-    table: MeasuredTable,
-    samples: MeasuredSamples,
-    result: FitResult,
-    *,
-    source: Path | None = None,
-    environment: Environment | None = None,
-    progress: Progress = silent,
-) -> None:
-    """Write one self-contained HTML file.
-
-    Parameters
-    ----------
-    table, samples, result
-        What was measured, its tuples, and what `fit` made of them.
-    source : Path, optional
-        The measured file, for its hash.
-    environment : Environment, optional
-        What the previews stand in; daylight by default.
-
-    Raises
-    ------
-    UserError
-        Where the environment cannot be read or the file not be written. A machine without a working path tracer is
-        no error: the report then says that it has no previews, and why.
-    """
-    write_text(path, report(table, samples, result, source=source, environment=environment, progress=progress))
 
 
 def report(
@@ -88,18 +59,35 @@ def report(
     environment: Environment | None = None,
     progress: Progress = silent,
 ) -> str:
-    """The page; see `write_report`."""
-    material = result.material
-    gathered = incidences(samples)
-    body = [page.heading(samples.info.file, 1), page.paragraph(_lead(material, result), "lead")]
-    if result.warnings:
-        body.append(page.note("Before trusting the numbers", result.warnings))
-    body += _previews(table, material, environment, progress)
-    body += _measurement(table, samples, source)
-    body += _parameters(material)
-    body += _errors(samples, result)
-    body += _plots(samples, material, gathered, _metric(material), progress)
-    body.append(page.footer(_colophon(material, result)))
+    """One self-contained HTML page.
+
+    Parameters
+    ----------
+    table, samples, result
+        A measurement, its tuples, and the result of `fit` on them.
+    source : Path, optional
+        The measured file, for its hash.
+    environment : Environment, optional
+        The surroundings of the previews; daylight by default.
+
+    Raises
+    ------
+    UserError
+        Where the environment cannot be read. A machine without a working path tracer is no error: the report then says
+        that it has no previews, and why.
+    """
+    material, metric = result.material, _metric(result.material)
+    body = [
+        page.heading(samples.info.file, 1),
+        page.paragraph(_lead(result, metric), "lead"),
+        *([page.note("Before trusting the numbers", result.warnings)] if result.warnings else []),
+        *_previews(table, material, environment, progress),
+        *_measurement(table, samples, source),
+        *_parameters(material),
+        *_errors(samples, result, metric),
+        *_plots(samples, material, metric, progress),
+        page.footer(_colophon(result)),
+    ]
     return page.page(f"{samples.info.file}: fit", body)
 
 
@@ -108,28 +96,27 @@ def _metric(material: Material) -> Metric:
     return METRICS[chosen] if chosen in METRICS else METRICS["cuberoot"]
 
 
-def _lead(material: Material, result: FitResult) -> str:
-    parts = [_counted(lobes, side) for side, lobes in _by_side(material)]
-    parts += [
-        f"diffuse {side}" for side, rgb in (("reflection", material.kd), ("transmission", material.kt_d)) if any(rgb)
-    ]
-    metric = _metric(material)
-    share = result.errors[metric.name] / max(result.lambertian_errors[metric.name], 1e-300)
-    found = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts) or "nothing that scatters"
-    return (
-        f"Fitted with {found}. Its error under the {metric.name} metric is {share:.2f} of that of the best Lambertian "
-        "surface."
+def _lead(result: FitResult, metric: Metric) -> str:
+    material = result.material
+    sides = (
+        ("reflection", material.reflection_lobes, material.kd),
+        ("transmission", material.transmission_lobes, material.kt_d),
     )
+    parts = [_counted(lobes, side) for side, lobes, _ in sides if lobes]
+    parts += [f"diffuse {side}" for side, _, rgb in sides if any(rgb)]
+    found = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts) or "nothing that scatters"
+    share = f"{_share(result, metric.name):.2f} of that of the best Lambertian surface"
+    return f"Fitted with {found}. Its error under the {metric.name} metric is {share}."
 
 
-def _by_side(material: Material) -> list[tuple[str, tuple[Lobe, ...]]]:
-    sides = (("reflection", material.reflection_lobes), ("transmission", material.transmission_lobes))
-    return [(side, lobes) for side, lobes in sides if lobes]
+def _share(result: FitResult, metric: str) -> float:
+    """The error over that of the best Lambertian surface."""
+    return result.errors[metric] / max(result.lambertian_errors[metric], 1e-300)
 
 
 def _counted(lobes: tuple[Lobe, ...], side: str) -> str:
     kinds = {lobe.distribution for lobe in lobes}
-    kind = {"beckmann": "Beckmann ", "ggx": "GGX "}[kinds.pop()] if len(kinds) == 1 else ""
+    kind = f"{DISTRIBUTIONS[kinds.pop()]} " if len(kinds) == 1 else ""
     return f"one {kind}lobe of {side}" if len(lobes) == 1 else f"{len(lobes)} {kind}lobes of {side}"
 
 
@@ -146,7 +133,9 @@ def _previews(
     from lambent.bake.material_preview import DAYLIGHT, preview
 
     seen = preview(table, material, environment or DAYLIGHT, progress=progress)
-    where = "under a clear sky" if environment is None else f"in {_name_of(environment)}"
+    file = getattr(environment, "file", None)
+    name = "another sky" if file is None else Path(file).name
+    where = "under a clear sky" if environment is None else f"in {name}"
     lamp = ", a lamp behind its front half" if seen.lamp else ""
     brushed = ", brushed along its circles of latitude" if not table.info.isotropic else ""
     figures = seen.figures
@@ -155,14 +144,14 @@ def _previews(
         f"{figures['flip_worst_tile']:.3f} in the worst tile of 16 x 16 pixels (0: no difference a viewer sees, 1: the "
         f"largest)."
     )
+    flip = f"FLIP difference in false colour; mean {figures['flip_mean']:.3f}."
     balls = [
-        page.picture(_cut_out(seen.measured, seen.ball), "A ball that wears the measured table.", "Measured"),
-        page.picture(_cut_out(seen.model, seen.ball), "The same ball with the fitted material.", "Model"),
-        page.picture(
-            _cut_out(seen.difference, seen.ball),
-            f"FLIP difference in false colour; mean {figures['flip_mean']:.3f}.",
-            "Difference: FLIP, black none, yellow-white the largest",
-        ),
+        page.picture(_cut_out(picture, seen.ball), description, caption)
+        for picture, description, caption in (
+            (seen.measured, "A ball that wears the measured table.", "Measured"),
+            (seen.model, "The same ball with the fitted material.", "Model"),
+            (seen.difference, flip, "Difference: FLIP, black none, yellow-white the largest"),
+        )
     ]
     about = (
         f"A ball {where}{lamp}{brushed}; path traced, {seen.spp} samples per pixel, the same in both, not denoised, "
@@ -171,13 +160,8 @@ def _previews(
     return [page.row(balls), page.paragraph(words), page.paragraph(about, "soft")]
 
 
-def _name_of(environment: Environment) -> str:
-    file = getattr(environment, "file", None)
-    return "another sky" if file is None else Path(file).name
-
-
 def _cut_out(picture: Floats, ball: NDArray[np.bool_]) -> bytes:
-    """PNG of an encoded picture, see-through beside the ball."""
+    """PNG of an encoded image, transparent beside the ball."""
     from PIL import Image
 
     rgba = np.concatenate([to_bytes(picture), np.where(ball, 255, 0).astype(np.uint8)[..., None]], axis=-1)
@@ -226,12 +210,7 @@ def _parameters(material: Material) -> list[str]:
         names = [f"lobe {number}" for number in range(1, len(material.lobes) + 1)]
         rows = [
             ("side", "", *(lobe.side for lobe in material.lobes), ""),
-            (
-                "distribution",
-                "",
-                *({"beckmann": "Beckmann", "ggx": "GGX"}[lobe.distribution] for lobe in material.lobes),
-                "",
-            ),
+            ("distribution", "", *(DISTRIBUTIONS[lobe.distribution] for lobe in material.lobes), ""),
         ]
         for name, meaning, unit in MEANINGS:
             values = [getattr(lobe, name) for lobe in material.lobes]
@@ -242,14 +221,9 @@ def _parameters(material: Material) -> list[str]:
 
 
 def _extents(material: Material) -> str:
-    widths = [
-        f"lobe {i}: {_degrees(lobe.mx):.1f}° x {_degrees(lobe.my):.1f}°" for i, lobe in enumerate(material.lobes, 1)
-    ]
+    tilts = [np.degrees(np.arctan([lobe.mx, lobe.my])) for lobe in material.lobes]
+    widths = [f"lobe {number}: {x:.1f}° x {y:.1f}°" for number, (x, y) in enumerate(tilts, 1)]
     return f"A slope m is a facet tilted by atan m, along and across the brushing direction: {'; '.join(widths)}."
-
-
-def _degrees(slope: float) -> float:
-    return float(np.degrees(np.arctan(slope)))
 
 
 def _rgb(values: tuple[float, float, float]) -> str:
@@ -257,68 +231,52 @@ def _rgb(values: tuple[float, float, float]) -> str:
     return words[0] if len(set(words)) == 1 else " ".join(words)
 
 
-def _errors(samples: MeasuredSamples, result: FitResult) -> list[str]:
-    metric = _metric(result.material)
-    rows, chosen = [], None
-    for number, (name, error) in enumerate(result.errors.items()):
-        black = result.lambertian_errors[name]
-        ratio = f"{error / black:.3f}" if black > 0 else "n/a"
-        rows.append((name, f"{error:.4g}", f"{black:.4g}", ratio, METRICS[name].unit, METRICS[name].source))
-        chosen = number if name == metric.name else chosen
+def _errors(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:
+    rows = []
+    for name, error in result.errors.items():
+        lambertian = result.lambertian_errors[name]
+        ratio = f"{error / lambertian:.3f}" if lambertian > 0 else "n/a"
+        rows.append((name, f"{error:.4g}", f"{lambertian:.4g}", ratio, METRICS[name].unit, METRICS[name].source))
     head = ("metric", "this fit", "best Lambertian", "ratio", "unit", "source")
     caption = f"The search minimised {metric.name}; every metric has a Lambertian surface of its own to compare with."
+    chosen = list(result.errors).index(metric.name)
     table = page.table(head, rows, numbers=(1, 2, 3), chosen=chosen, caption=caption)
-    return [page.heading("Errors"), table, *(page.paragraph(line) for line in _judgement(samples, result, metric))]
+    return [page.heading("Errors"), table, *map(page.paragraph, _judgement(samples, result, metric))]
 
 
 def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:
-    """What is known of fits of this kind, and how much of it shows here."""
+    """Known traits of fits of this kind, and their size in this one."""
     peak = peak_share(samples, evaluate(result.material, samples))
-    lines = []
-    if metric.name == "cuberoot":
-        lines.append(
-            f"Fits under the cube root weigh what eyes see and undershoot peaks: here the model reaches {peak:.2f} of "
-            f"the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
-        )
-    else:
-        lines.append(
-            f"The model reaches {peak:.2f} of the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
-        )
+    reached = f"model reaches {peak:.2f} of the measured peak (the brightest {PEAK_SHARE:.1%} of the tuples)."
+    undershoots = "Fits under the cube root weigh what eyes see and undershoot peaks: here"
+    lines = [f"{undershoots} the {reached}" if metric.name == "cuberoot" else f"The {reached}"]
     if metric.name not in EYE_LIKE:
-        shares = [
-            f"{result.errors[name] / max(result.lambertian_errors[name], 1e-300):.2f} under {name}" for name in EYE_LIKE
-        ]
+        shares = " and ".join(f"{_share(result, name):.2f} under {name}" for name in EYE_LIKE)
         lines.append(
             f"A fit that minimises {metric.name} follows the peaks and is often poor by metrics that weigh what eyes "
-            f"see: here it keeps {' and '.join(shares)} of the Lambertian surface's error."
+            f"see: here it keeps {shares} of the Lambertian surface's error."
         )
-    lines.append(
-        "Compare errors, not parameters, between fits: r0, alpha and the coefficient stand in for one another."
-    )
-    return lines
+    compare = "Compare errors, not parameters, between fits: r0, alpha and the coefficient stand in for one another."
+    return [*lines, compare]
 
 
-def _plots(
-    samples: MeasuredSamples, material: Material, gathered: list[Incidence], metric: Metric, progress: Progress
-) -> list[str]:
-    body = []
+def _plots(samples: MeasuredSamples, material: Material, metric: Metric, progress: Progress) -> list[str]:
+    gathered = incidences(samples)
     if gathered:
-        body += [page.heading("By direction"), *_direction_plots(samples, material, gathered)]
+        body = [page.heading("By direction"), *_direction_plots(samples, material, gathered)]
     else:
-        body.append(page.paragraph("No incident direction holds enough tuples for plots by direction."))
+        body = [page.paragraph("No incident direction holds enough tuples for plots by direction.")]
     if material.lobes:
-        body.append(page.heading("How well the parameters are determined"))
-        body.append(
-            page.paragraph(
-                "The error around the fit, over two parameters of a lobe. A round pit: the measurement determines "
-                "both. A valley: it determines a combination of them, and any point along it looks much the same."
-            )
+        words = (
+            "The error around the fit, over two parameters of a lobe. A round pit: the measurement determines both. "
+            "A valley: it determines a combination of them, and any point along it looks much the same."
         )
+        body += [page.heading("How well the parameters are determined"), page.paragraph(words)]
     for index, lobe in enumerate(material.lobes):
         drawn = slices(samples, material, index, metric, progress=progress)
         name = f"lobe {index + 1}, {lobe.side}"
-        words = " and ".join(f"{one.across} and {one.down}" for one in drawn)
-        body.append(_figure(plot.error_slices(drawn, metric, name), f"Contours of the error of {name} over {words}."))
+        planes = " and ".join(f"{one.across} and {one.down}" for one in drawn)
+        body.append(_figure(plot.error_slices(drawn, metric, name), f"Contours of the error of {name} over {planes}."))
     return body
 
 
@@ -349,7 +307,8 @@ def _figure(figure: Any, description: str, caption: str = "") -> str:
     return page.picture(stream.getvalue(), description, caption, density=DENSITY, paper=True)
 
 
-def _colophon(material: Material, result: FitResult) -> str:
-    how = material.provenance.method if material.provenance is not None else None
+def _colophon(result: FitResult) -> str:
+    provenance = result.material.provenance
+    how = provenance.method if provenance is not None else None
     parts = [f"Lambent {version('lambent')}", *([how] if how else []), f"fitted in {result.seconds:.1f} s"]
     return ", ".join([*parts, *(["cancelled before its end"] if result.partial else [])]) + "."

@@ -1,6 +1,6 @@
-"""One HTML page that needs nothing but itself: no scripts, no fonts, no pictures from elsewhere.
+"""A self-contained HTML page: no scripts, fonts or images from elsewhere.
 
-Everything a file or a user wrote is escaped here; whoever builds a page hands over plain text and PNG bytes.
+Callers pass plain text and PNG bytes; everything from a file or a user is escaped here.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from lambent.bench import accumulate
@@ -10,12 +12,11 @@ from lambent.scenes.environments import dusk
 pytestmark = pytest.mark.usefixtures("adapter")
 
 
-def test_frames_add_up_without_bias(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accumulate, "OWN_ENVIRONMENTS", {"dusk": dusk})
-    monkeypatch.setattr(accumulate, "LOBES", accumulate.LOBES[:1])
-    monkeypatch.setattr(accumulate, "FRAMES", (1, 4, 16, 60))
-    monkeypatch.setattr(accumulate, "TRUTH_SPP", {True: 4096})
-    report = accumulate.run(True, [])
+def test_frames_add_up_without_bias() -> None:
+    lobes, frames = accumulate.LOBES[:1], (1, 4, 16, 60)
+    report = accumulate.run(
+        replace(accumulate.QUICK, truth_spp=4096, frames=frames, lobes=lobes, environments={"dusk": dusk})
+    )
     assert {row["case"] for row in report["rows"]} == {"dusk", "planar"}
     assert all(slope < -1 for slope in report["summary"]["slope"].values())
     assert all(abs(row["bias_z"]) < 4 for row in report["rows"])

@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.bench.fit import METRICS, MODELS, run
+from lambent.bench.fit import METRICS, MODELS, QUICK, run
 from lambent.bench.known_answers import KNOWN
 from lambent.core.errors import UserError
-from lambent.core.progress import silent
 from lambent.materials.measured.gonio_text import write_gonio
 from lambent.materials.measured.synthetic import synthesise
 from tests.materials.fitting.known_answers import FEW, PAINT
@@ -17,9 +16,8 @@ WARD = "paint = Aggregate(Lambertian(albedo = [.2, .2, .2]), NganWard(albedo = [
 
 
 @pytest.mark.slow
-def test_known_answers_are_found(monkeypatch):
-    monkeypatch.setattr("lambent.bench.fit.KNOWN", {"white foil": KNOWN["white foil"]})
-    report = run(True, [], silent)
+def test_known_answers_are_found():
+    report = run(replace(QUICK, known=(KNOWN["white foil"],)))
     names = [p["parameter"] for p in report["rows"][0]["parameters"]]
     assert names == ["kd", "ks", "mx", "my", "r0", "alpha", "kt (1 - r0)", "t_mx", "t_my", "t_alpha"]
     assert report["summary"]["largest_deviation"] < 0.05
@@ -32,7 +30,7 @@ def test_callers_file_is_fitted_and_held_against_what_was_published(tmp_path):
     path, published = tmp_path / "paint.txt", tmp_path / "ward.fit"
     write_gonio(path, synthesise(PAINT, replace(FEW, step_deg=10.0, fine_deg=4.0)))
     published.write_text(WARD)
-    report = run(True, [path], silent, against=[published])
+    report = run(QUICK, [path], against=[published])
     ours = [row for row in report["rows"] if row["method"] in ("grid", "gradient")]
     assert len(ours) <= len(METRICS) * (len(MODELS) + 1)
     for row in ours:
@@ -47,4 +45,4 @@ def test_published_fits_need_a_measurement(tmp_path):
     published = tmp_path / "ward.fit"
     published.write_text(WARD)
     with pytest.raises(UserError, match="held against a measurement"):
-        run(True, [], silent, against=[published])
+        run(QUICK, against=[published])

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lambent.bench import planar_quality, planar_scene, walk_planar
+from lambent.bench.planar_scene import floor_state
 from lambent.core import metrics
-from lambent.core.errors import UserError
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
-
-
-def floor_state(lobe, width: int, height: int, **more) -> FrameState:
-    materials = {planar_scene.FLOOR: planar_scene.floor_material(lobe)}
-    return FrameState(planar_scene.CAMERA, width, height, show="specular", antialias=False, materials=materials, **more)
+from lambent.realtime.frame import Renderer
 
 
 def test_ray_casting_and_a_sharp_mirror_agree() -> None:
-    """Two independent ways to the same picture: ray casting on the CPU, the mirror picture on the GPU."""
+    """Two independent methods give the same image: ray casting on the CPU, the reflection buffer on the GPU."""
     lobe = planar_quality.lobe_of(0.001, 0.001)
     exact, floor = planar_scene.exact_reflection(lobe, planar_scene.CAMERA, 160, 120, 16)
     renderer = Renderer(open_device(), planar_scene.planar_scene(lobe))
-    image = renderer.image(floor_state(lobe, 160, 120, n=1))
+    image = renderer.image(replace(floor_state(lobe, 160, 120), n=1))
     assert 0.3 < floor.mean() < 0.7
     assert ((image[..., 1] > 0) != floor).sum() < 12  # edges
     reference, test = metrics.display_pair(exact * floor[..., None], image * floor[..., None])
@@ -33,29 +27,22 @@ def test_ray_casting_and_a_sharp_mirror_agree() -> None:
     assert np.median(np.abs(reference - test)[floor]) < 0.01
 
 
-def test_interleaving_beats_the_thesis_and_the_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At n = 7 it is 8 dB at full size; here a tile of 8 x 8 pixels is much of the picture."""
-    monkeypatch.setattr(planar_quality, "ROUGHNESSES", ((0.05, 0.05), (0.1, 0.1)))
-    monkeypatch.setattr(planar_quality, "NS", (7,))
-    monkeypatch.setattr(planar_quality, "SIZES", {True: (160, 120)})
-    report = planar_quality.run(True, [])
+def test_interleaving_beats_the_thesis_and_the_probe() -> None:
+    """At n = 7 it is 8 dB at full size; here a tile of 8 x 8 pixels is much of the image."""
+    effort = planar_quality.Effort(160, 120, 64, converged=False, ns=(7,), roughnesses=((0.05, 0.05), (0.1, 0.1)))
+    report = planar_quality.run(effort)
     assert len(report["rows"]) == 2 * 4
-    psnr = {way: by_n["7"] for way, by_n in report["summary"]["psnr_path"].items()}
+    psnr = {method: by_n["7"] for method, by_n in report["summary"]["psnr_path"].items()}
     assert psnr["interleaved"] > psnr["thesis"] + 2
     assert min(psnr["marched"], psnr["interleaved"]) > psnr["fixed"] + 1
     assert psnr["fixed"] > psnr["thesis"]
     assert all(0 < row["flip_path"] < row["flip_worst_tile_path"] < 1 for row in report["rows"])
-    with pytest.raises(UserError):
-        planar_quality.run(True, [Path("x.hdr")])
 
 
-def test_the_whole_run_tells_how_far_the_converged_picture_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planar_quality, "ROUGHNESSES", ((0.05, 0.05),))
-    monkeypatch.setattr(planar_quality, "NS", (7,))
-    monkeypatch.setattr(planar_quality, "SIZES", {False: (64, 48)})
-    monkeypatch.setattr(planar_quality, "SPP", {False: 128})
+def test_the_whole_run_tells_how_far_the_converged_image_is_off() -> None:
+    effort = planar_quality.Effort(64, 48, 128, ns=(7,), roughnesses=((0.05, 0.05),))
     steps: list[float] = []
-    report = planar_quality.run(False, [], lambda done, total, what: steps.append(done / total))
+    report = planar_quality.run(effort, lambda done, total, what: steps.append(done / total))
     summary = report["summary"]
     assert (summary["width"], summary["height"], summary["spp"]) == (64, 48, 128)
     assert summary["converged_path"]["psnr"] > summary["psnr_path"]["fixed"]["7"]
@@ -63,14 +50,9 @@ def test_the_whole_run_tells_how_far_the_converged_picture_is_off(monkeypatch: p
     assert len(steps) >= 3 and steps == sorted(steps) and steps[-1] == 1
 
 
-def test_times_of_planes_come_in_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bench import walk_cube
-
-    monkeypatch.setattr(walk_planar, "NS", (3,))
-    monkeypatch.setattr(walk_planar, "SIZES", {True: (40, 25)})
-    monkeypatch.setattr(walk_cube, "ROUNDS", 2)
-    report = walk_planar.run(True, [])
-    assert len(report["rows"]) == 2 * (2 + 3)
+def test_times_of_planes_come_in_rows() -> None:
+    report = walk_planar.run(walk_planar.Effort(40, 25, ns=(3, 5), rounds=2))
+    assert len(report["rows"]) == 2 * (2 + 2 * 3)
     assert {row["integrator"] for row in report["rows"]} == {"diffuse", "split-sum", "rings", "lobe-4.25", "fis"}
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lambent.bench import quality, walk_cube
-from lambent.bench.quality_inputs import read_inputs
-from lambent.bench.specular_scene import CAMERA, baked_scene, dusk, from_lat_long, night, studio
+from lambent.bench import frame_times, quality, walk_cube
+from lambent.bench.quality_inputs import MATERIALS, read_inputs
+from lambent.bench.registry import run_bench
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.unbaked import CAMERA, unbaked_scene
+from lambent.scenes.environments import dusk, from_lat_long, night, studio
 from lambent.scenes.geometry import sphere
 
 pytestmark = pytest.mark.usefixtures("adapter")
@@ -30,16 +33,13 @@ def check_form(report: dict) -> None:
     json.dumps(report, allow_nan=False)
 
 
-def test_rings_stand_above_the_published_estimates(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_rings_stand_above_the_published_estimates(tmp_path: Path) -> None:
     """At n = 7: 3 dB above fis and 4 dB above lobe-4.25 in the mean, as the spec's experiment has it."""
     picture = np.full((16, 32, 3), 0.1, np.float32)
     picture[4:7, 10:14] = 20.0
     write_image(tmp_path / "lamp.hdr", picture)
-    monkeypatch.setattr(quality, "OWN_ENVIRONMENTS", {"studio": studio})
-    monkeypatch.setattr(quality, "MATERIALS", quality.MATERIALS[::2])
-    monkeypatch.setattr(quality, "NS", (7,))
-    monkeypatch.setattr(quality, "REFERENCE_SPP", 1024)
-    report = quality.run(True, [tmp_path / "lamp.hdr"])
+    effort = replace(quality.QUICK, qmc_spp=1024, ns=(7,), materials=MATERIALS[::2], environments={"studio": studio})
+    report = run_bench("quality", effort, inputs=[tmp_path / "lamp.hdr"])
     check_form(report)
     assert len(report["rows"]) == 2 * 5 * 5
     assert report["inputs"][0]["path"] == "lamp.hdr"
@@ -50,7 +50,7 @@ def test_rings_stand_above_the_published_estimates(monkeypatch: pytest.MonkeyPat
     assert all(0 < row["flip_qmc"] < row["flip_qmc_worst_tile"] < 1 for row in report["rows"])
 
 
-def test_the_callers_materials_stand_beside_ours(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_callers_materials_stand_beside_ours(tmp_path: Path) -> None:
     """A document and a measured table are told from environments by their content, and only their lobes are shown."""
     lobe = Lobe(mx=0.2, my=0.2, r0=0.7)
     through = Lobe(mx=0.1, my=0.1, side="transmission")
@@ -62,11 +62,8 @@ def test_the_callers_materials_stand_beside_ours(monkeypatch: pytest.MonkeyPatch
     assert not any(materials[0].kd)
     with pytest.raises(UserError, match="specularly"):
         read_inputs([tmp_path / "chalk.json"])
-    monkeypatch.setattr(quality, "OWN_ENVIRONMENTS", {"dusk": dusk})
-    monkeypatch.setattr(quality, "MATERIALS", quality.MATERIALS[3:4])
-    monkeypatch.setattr(quality, "NS", (7,))
-    monkeypatch.setattr(quality, "REFERENCE_SPP", 256)
-    report = quality.run(True, [tmp_path / "mine.json"])
+    effort = replace(quality.QUICK, qmc_spp=256, ns=(7,), materials=MATERIALS[3:4], environments={"dusk": dusk})
+    report = quality.run(effort, [tmp_path / "mine.json"])
     assert {row["material"] for row in report["rows"]} == {"matte .15", "mine"}
 
 
@@ -77,48 +74,41 @@ def test_a_measured_table_is_fitted_first(shared_data: Path) -> None:
     assert 0.05 < materials[0].lobes[0].mx < 0.5
 
 
-def test_the_path_tracer_sees_the_same_picture() -> None:
+def test_the_path_tracer_sees_the_same_image() -> None:
     """A lone sphere has nothing to reflect but the environment: qmc and path tracing agree, the right way round."""
-    from lambent.bench.path_reference import path_traced
+    from lambent.bench.specular_scene import path_traced
     from lambent.realtime.device import open_device
 
-    material = quality.MATERIALS[8]  # anisotropic: the brushing direction counts
+    material = MATERIALS[8]  # anisotropic: the brushing direction counts
     meshes = {"sphere": sphere(1.0)}
     truth = path_traced(meshes, material, dusk(64), CAMERA, 48, 256)
-    renderer = Renderer(open_device(), baked_scene(meshes, material, dusk(64)))
+    renderer = Renderer(open_device(), unbaked_scene(meshes, material, dusk(64)))
     image = renderer.converged(FrameState(CAMERA, 48, 48, lookup="plain"), 1024)
     assert np.abs(image - truth).mean() < 0.02 * truth.mean()
     assert np.abs(image - truth).mean() < 0.1 * np.abs(image[:, ::-1] - truth).mean()
 
 
-def test_frame_times_come_with_their_spread(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk_cube, "NS", (3, 7))
-    monkeypatch.setattr(walk_cube, "ROUNDS", 2)
-    monkeypatch.setattr(walk_cube, "SIZES", {True: (40, 25), False: (40, 25)})
-    report = walk_cube.run(True, [])
+def test_frame_times_come_with_their_spread() -> None:
+    report = run_bench("walk-cube", walk_cube.Effort(40, 25, ns=(3, 7), rounds=2))
     check_form(report)
     assert len(report["rows"]) == 2 * (2 + 3 * 2)
     for row in report["rows"]:
         assert row["wall_ms_spread"][0] <= row["wall_ms"] <= row["wall_ms_spread"][1]
-    with pytest.raises(UserError):
-        walk_cube.run(True, [Path("x.hdr")])
 
 
 def test_a_line_is_found_in_frame_times() -> None:
-    def measured(n: int | None, factor: float) -> walk_cube.Measured:
-        return walk_cube.Measured("rings", "full", n, None, None, [], [factor * ms for ms in (10.0, 30.0, 20.0)])
+    def row(n: int | None, factor: float) -> frame_times.Row:
+        return frame_times.Row("full", None, FrameState(CAMERA, n=n), [], [factor * ms for ms in (10.0, 30.0, 20.0)])
 
-    floor, rows = measured(None, 1.0), [measured(n, 0.7 + 0.4 * n) for n in (3, 5, 9)]
-    assert walk_cube.linear_fit(rows, floor) == {"per_sample": 0.4, "offset": 0.7, "deviation": 0.0}
+    floor, rows = row(None, 1.0), [row(n, 0.7 + 0.4 * n) for n in (3, 5, 9)]
+    assert frame_times.linear_fit(rows, floor) == {"per_sample": 0.4, "offset": 0.7, "deviation": 0.0}
 
 
 def test_the_bulge_covers_what_it_says() -> None:
-    from lambent.realtime.device import open_device
-
-    rows = walk_cube._measurements(open_device(), 42, 26)
+    scenes = walk_cube.scenes(42, 26)
     for coverage, share in (("full", 1.0), ("half", 0.5)):
-        row = next(r for r in rows if (r.coverage, r.integrator, r.n) == (coverage, "rings", 3))
-        lit = row.renderer.image(row.state.__class__(**{**vars(row.state), "show": "specular"})).max(axis=-1) > 0
+        renderer, state = scenes[coverage]
+        lit = renderer.image(replace(state, n=3, show="specular")).max(axis=-1) > 0
         assert lit.mean() == pytest.approx(share, abs=0.01)
 
 

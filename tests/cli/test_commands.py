@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pkgutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,10 +11,11 @@ import numpy as np
 import pytest
 
 from lambent import __version__, cli
+from lambent.core.discovery import names_in
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
 
-COMMANDS = sorted({info.name for info in pkgutil.iter_modules(cli.__path__)} - {"main", "console"})
+COMMANDS = [name for name in names_in(cli) if name not in ("main", "console")]
 NEEDS_ARGUMENTS = [name for name in COMMANDS if name not in ("doctor", "demo")]
 PICTURE = np.random.default_rng(3).random((32, 48, 3)).astype(np.float32)
 
@@ -45,6 +45,16 @@ def test_help_shows_an_example_and_json(lambent, command):
 def test_no_command_shows_help(lambent):
     outcome = lambent()
     assert outcome.code == 0 and all(name in outcome.out for name in COMMANDS)
+
+
+def test_a_command_is_a_file(lambent, monkeypatch, tmp_path):
+    (tmp_path / "hello.py").write_text(
+        'import typer\n\ndef command() -> None:\n    """Greet."""\n    typer.echo("hello")\n'
+    )
+    monkeypatch.setattr(cli, "__path__", [*cli.__path__, str(tmp_path)])
+    assert "Greet." in lambent("--help").out
+    assert lambent("hello").out == "hello\n"
+    sys.modules.pop("lambent.cli.hello")
 
 
 def test_version(lambent):
@@ -214,10 +224,14 @@ def test_a_place_that_takes_no_file_is_one_line(refused, monkeypatch, pictures, 
     assert "cannot be written" in refused("compare", *pictures, "-o", tmp_path / "d.png")
 
 
-def test_a_byte_order_mark_changes_nothing(lambent, material):
-    plain = lambent("check", material).out
+def test_a_byte_order_mark_changes_nothing(lambent, material, tmp_path):
+    def said():
+        converted = lambent("convert", material, tmp_path / "out.txt", "--as", "gonio_text")
+        return converted, (tmp_path / "out.txt").read_bytes(), lambent("inspect", material)
+
+    plain = said()
     material.write_bytes(b"\xef\xbb\xbf" + material.read_bytes())
-    assert lambent("check", material).out == plain
+    assert said() == plain and plain[0].code == plain[2].code == 0
 
 
 def test_seeds_are_not_negative(refused, material):

@@ -1,9 +1,10 @@
-"""Colour and picture metrics against values computed by hand."""
+"""Colour and image metrics against values computed by hand or by another library."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from colour import XYZ_to_Lab, XYZ_to_xy
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,9 +32,14 @@ unit = st.floats(0, 1)
 @given(st.tuples(unit, unit, unit))
 def test_round_trips(rgb: tuple[float, float, float]) -> None:
     value = np.array(rgb)
-    np.testing.assert_allclose(colour.lab_to_rgb(colour.rgb_to_lab(value)), value, atol=1e-9)
     np.testing.assert_allclose(colour.xyz_to_rgb(colour.rgb_to_xyz(value)), value, atol=1e-9)
     np.testing.assert_allclose(colour.srgb_decode(colour.srgb_encode(value)), value, atol=1e-6)
+
+
+@given(st.tuples(unit, unit, unit))
+def test_lab_is_that_of_colour_science(rgb: tuple[float, float, float]) -> None:
+    xyz, white = colour.rgb_to_xyz(np.array(rgb)), XYZ_to_xy(colour.WHITE_XYZ)
+    np.testing.assert_allclose(colour.rgb_to_lab(np.array(rgb)), XYZ_to_Lab(xyz, white), atol=1e-9)
 
 
 def test_srgb_known_values() -> None:

@@ -1,6 +1,10 @@
-"""Progress of loops and of named steps."""
+"""Progress of loops, of named steps, and of a step within longer work."""
 
-from lambent.core.progress import stepper, tracked
+from __future__ import annotations
+
+import pytest
+
+from lambent.core.progress import part_of, stepper, tracked
 
 
 def record():
@@ -27,3 +31,14 @@ def test_steps_count_up_to_the_total():
     for what in ("first", "second", "done"):
         step(what)
     assert seen == [(0, 2, "first"), (1, 2, "second"), (2, 2, "done")]
+
+
+def test_a_step_moves_the_whole_by_its_share() -> None:
+    seen: list[tuple[float, str]] = []
+    step = part_of(lambda done, total, what: seen.append((done / total, what)), 0.25, 0.75, "step")
+    step(0, 8, "samples")
+    step(4, 8, "samples")
+    step(8, 8, "samples")
+    step(0, 0, "nothing to do")
+    assert [share for share, _ in seen] == pytest.approx([0.25, 0.5, 0.75, 0.25])
+    assert {what for _, what in seen} == {"step"}

@@ -26,8 +26,9 @@ TINY = Effort(
     film_seconds=0.5,
     film_fps=12,
     compared=(96, 60),
-    path_spp=32,
+    path_spp=16,
     qmc_spp=64,
+    moving_frames=4,
 )
 
 

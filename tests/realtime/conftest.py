@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lambent.bench.specular_scene import baked_scene, wall
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.device import open_device
+from lambent.realtime.unbaked import unbaked_scene
+from lambent.scenes.geometry import patch
 
 Floats = NDArray[np.floating]
 OBLIQUE = Camera(name="oblique", position=(1.5, 0.8, 2.0), target=(0.2, 0.1, 0.0), fov_y_deg=30.0)
@@ -37,4 +38,4 @@ def cube_of(light: Any, n: int = 64) -> Floats:
 
 def wall_scene(material: Material, environment: Floats, **more: Any) -> BakedScene:
     """A wide wall at z = 0 that faces +z, brushed along +x."""
-    return baked_scene(wall(20, 20), material, environment, **more)
+    return unbaked_scene({"wall": patch((-10, -10, 0), (20, 0, 0), (0, 20, 0))}, material, environment, **more)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from lambent.bench.specular_scene import baked_scene
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
@@ -14,6 +13,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.patterns import rings_table
+from lambent.realtime.unbaked import unbaked_scene as baked_scene
 from lambent.scenes.geometry import sphere
 
 LIMIT = {0.05: 0.1, 0.1: 0.05, 0.25: 0.15, 0.4: 0.13}  # by m

@@ -9,7 +9,6 @@ import pytest
 import wgpu
 from conftest import wall_scene
 
-from lambent.bench.specular_scene import CAMERA
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
@@ -17,6 +16,7 @@ from lambent.realtime.frame import FrameState, Renderer
 from lambent.realtime.resources import device_needs
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer, Targets
+from lambent.realtime.unbaked import CAMERA
 
 GLOSS = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1), Lobe(mx=0.2, my=0.2, side="transmission")))
 

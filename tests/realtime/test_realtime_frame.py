@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import cube_of, smooth_light, wall_scene
 
-from lambent.bench.specular_scene import CAMERA, baked_scene, sphere_and_torus, studio
+from lambent.bench.specular_scene import sphere_and_torus
 from lambent.core.camera import Camera, clip_from_world, pixel_rays
 from lambent.core.colour import filmic, srgb_decode, srgb_encode
 from lambent.core.errors import UserError
@@ -16,6 +16,9 @@ from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.unbaked import CAMERA
+from lambent.realtime.unbaked import unbaked_scene as baked_scene
+from lambent.scenes.environments import studio
 from lambent.scenes.geometry import patch, sphere
 
 FORWARD = Camera(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)

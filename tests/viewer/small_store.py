@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from lambent.bench.specular_scene import studio
 from lambent.core.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.environments import studio
 from lambent.scenes.geometry import merge, patch, placed, sphere
 from lambent.store.contract import ObjectRecord, SceneRecord, write_scene_record
 from lambent.store.store import Store

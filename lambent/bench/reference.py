@@ -1,0 +1,60 @@
+"""Reference images, and how far images are from them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core import metrics
+
+Floats = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Radiance (H, W, 3), the pixels (H, W) that are compared, and the exposure that gives the reference a mean of .3.
+
+    Images are compared as clip(2^exposure_ev L)^(1/2.2), black where they are not compared.
+    """
+
+    radiance: Floats
+    shown: NDArray[np.bool_]
+    exposure_ev: float
+    encoded: Floats
+
+    @classmethod
+    def of(cls, radiance: Floats, shown: NDArray[np.bool_]) -> Reference:
+        radiance = radiance * shown[..., None]
+        exposure_ev = metrics.display_exposure(radiance)
+        return cls(radiance, shown, exposure_ev, metrics.displayed(radiance, exposure_ev))
+
+    def errors(self, image: Floats) -> dict[str, float]:
+        """psnr of the compared pixels; flip: its mean over the image, over those pixels, and its worst tile."""
+        test = metrics.displayed(image * self.shown[..., None], self.exposure_ev)
+        flip = metrics.flip_error(self.encoded, test)
+        return {
+            "psnr": round(metrics.psnr(self.encoded[self.shown], test[self.shown]), 3),
+            "flip": round(float(flip.mean()), 5),
+            "flip_shown": round(float(flip[self.shown].mean()), 5),
+            "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 5),
+        }
+
+
+def mean(digits: int) -> Callable[[list[float]], float]:
+    """Rounded mean, for `by_n`."""
+    return lambda values: round(float(np.mean(values)), digits)
+
+
+def by_n(
+    rows: Iterable[Mapping[str, Any]], name: str, key: str, of: Callable[[list[float]], float]
+) -> dict[str, dict[str, float]]:
+    """{row[name]: {n: `of` all row[key]}}."""
+    groups: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for row in rows:
+        groups[row[name]][str(row["n"])].append(row[key])
+    return {name: {n: of(values) for n, values in series.items()} for name, series in groups.items()}

@@ -1,0 +1,100 @@
+"""Images of a store, by whatever renderer: their settings, and how radiance is displayed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.camera import Camera
+from lambent.core.colour import shown
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
+from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
+from lambent.core.images import to_bytes
+from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.progress import Progress, silent
+
+Floats = NDArray[np.floating[Any]]
+PATH_TRACER = "path"
+FALSE_COLOUR, NOISE = "false-colour", "noise"
+VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How images are rendered. Errors name the options of `lambent render` that stand for the fields.
+
+    Attributes
+    ----------
+    width, height : int
+        Pixels.
+    integrator : str
+        One of `realtime.integrators.INTEGRATORS`, or "path" for the path tracer.
+    samples : int, optional
+        Per pixel where the integrator converges ("path": 64 by default, "qmc": 256), otherwise per lobe (by default
+        chosen from each material's roughness).
+    exposure_ev : float, optional
+        Stops, -64 to 64, for displayed images; by default the scene's.
+    view : str
+        View transform of displayed images, one of `VIEWS`; "false-colour" shows luminance in cd/m^2.
+    scale : Range, optional
+        Of false colours, in the unit of the shown quantity; by default fitted to the first image and kept for the rest.
+    log : bool
+        Whether a fitted scale has even decades rather than even steps.
+    show : str
+        Part of the light: full, diffuse, specular, light-map (irradiance in lx), or noise, the light map's relative
+        standard error in percent, always in false colours.
+    planar : str
+        How planar reflectors are drawn: auto, off (from their probes), or a method that the integrator knows.
+    """
+
+    width: int = 1280
+    height: int = 720
+    integrator: str = "rings"
+    samples: int | None = None
+    exposure_ev: float | None = None
+    view: str = "filmic"
+    scale: Range | None = None
+    log: bool = True
+    show: str = "full"
+    planar: str = "auto"
+
+    @property
+    def is_false_coloured(self) -> bool:
+        """Whether displayed images are in false colours."""
+        return self.view == FALSE_COLOUR or self.show == NOISE
+
+    def check(self) -> None:
+        """Raise `UserError` for a view transform or an exposure that cannot be; renderers check the rest."""
+        known("view transform", self.view, VIEWS, field="--view")
+        if self.scale is not None:
+            self.scale.check()
+        if self.exposure_ev is not None and not -64 <= self.exposure_ev <= 64:  # also refuses nan
+            got, expected = self.exposure_ev, "-64 to 64 EV"
+            raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
+
+
+class Images(ABC):
+    """Images of a store; `quantity` is measured by their false colours."""
+
+    quantity: Quantity = LUMINANCE
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings, self._scale = settings, settings.scale
+
+    @abstractmethod
+    def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
+        """Linear radiance (height, width, 3) float32, row 0 on top."""
+
+    def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:
+        """(height, width, 3) encoded as a display gets it: after exposure and view transform, or in false colours."""
+        radiance = self.radiance(camera, progress)
+        if not self.settings.is_false_coloured:
+            return to_bytes(shown(radiance, self.settings.view, self.settings.exposure_ev or 0.0))
+        values = photometric(radiance, self.quantity)
+        self._scale = self._scale or fitting_range(values, log=self.settings.log)
+        return with_scale(to_bytes(false_colour(values, self._scale)), self._scale, self.quantity.unit)

@@ -1,0 +1,175 @@
+"""Stills, films and image sequences on disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from numpy.typing import NDArray
+
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
+from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
+from lambent.core.progress import Progress, silent
+from lambent.render.images import PATH_TRACER, Images, Settings
+from lambent.scenes.camera_paths import camera_at
+from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.store import Store
+from lambent.store.views import read_views, with_views
+
+Named = TypeVar("Named", Camera, CameraPath)
+Note = Callable[[str], None]
+DEFAULT = Settings()
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """The written file, its size in pixels, its frames, and the time that it took."""
+
+    file: Path
+    width: int
+    height: int
+    integrator: str
+    frames: int
+    seconds: float
+
+
+def ignore(text: str) -> None:
+    """Drop a note."""
+
+
+def still(
+    store: Store | Path | str,
+    file: Path | str,
+    camera: Camera | str | None = None,
+    settings: Settings = DEFAULT,
+    *,
+    scene: str | None = None,
+    note: Note = ignore,
+    progress: Progress = silent,
+) -> Rendered:
+    """Render one image of a store.
+
+    Parameters
+    ----------
+    store : Store or path
+        A baked store, or its folder.
+    file : path
+        .exr and .hdr hold linear radiance in W/(sr m^2), .png displayed light.
+    camera : Camera or str, optional
+        A camera, or the name of one of the scene or of a saved view; by default the scene's first.
+    settings : Settings
+        Size, integrator, exposure, view transform.
+    scene : str, optional
+        For the path tracer: the scene, where it is no longer where the store says.
+    note : callable
+        Gets a sentence for everything that the store lacks, or that has changed since it was baked.
+
+    Raises
+    ------
+    UserError
+        Where the file cannot be written, the store not be read, or a name or value is unknown.
+    """
+    began, file = time.perf_counter(), Path(file)
+    check_writable(file, WRITABLE)
+    opened, record = _opened(store)
+    view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
+    drawn = images(opened, settings, scene=scene, note=note)
+    if file.suffix.lower() == ".png":
+        write_shown(file, drawn.displayed(view, progress))
+    else:
+        write_image(file, drawn.radiance(view, progress))
+    return Rendered(file, settings.width, settings.height, settings.integrator, 1, time.perf_counter() - began)
+
+
+def film(
+    store: Store | Path | str,
+    file: Path | str,
+    path: CameraPath | str | None = None,
+    settings: Settings = DEFAULT,
+    *,
+    fps: int = 30,
+    scene: str | None = None,
+    note: Note = ignore,
+    progress: Progress = silent,
+) -> Rendered:
+    """Render a film, or an image sequence, along a camera path.
+
+    Parameters
+    ----------
+    file : path
+        .mp4 is a film, its size cut to even numbers; .png and .exr are sequences, numbered where the name has # signs.
+    path : CameraPath or str, optional
+        A path, or the name of one of the scene or of a recorded walk; by default the scene's first.
+    fps : int
+        Frames per second.
+
+    The other parameters and the errors are those of `still`.
+    """
+    began, file = time.perf_counter(), Path(file)
+    check_writable(file, (FILM, *SEQUENCES))
+    opened, record = _opened(store)
+    chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
+    if file.suffix.lower() == FILM:
+        width, height = even_size(settings.width, settings.height)
+        settings = replace(settings, width=width, height=height)
+    drawn = images(opened, settings, moving=True, scene=scene, note=note)
+    draw = drawn.radiance if radiance_wanted(file) else drawn.displayed
+    cameras = [camera_at(chosen, index / fps) for index in range(chosen.frames(fps))]
+    write_frames(file, cameras, draw, (settings.width, settings.height), fps, progress)
+    seconds = time.perf_counter() - began
+    return Rendered(file, settings.width, settings.height, settings.integrator, len(cameras), seconds)
+
+
+def write_frames(
+    file: Path,
+    cameras: Sequence[Camera],
+    draw: Callable[[Camera], NDArray[Any]],
+    size: tuple[int, int],
+    fps: float,
+    progress: Progress = silent,
+) -> None:
+    """Draw each camera into a film or an image sequence: see `core.film.pictures_writer`."""
+    with pictures_writer(file, *size, fps) as write:
+        for index, camera in enumerate(cameras):
+            write(draw(camera))
+            progress(index + 1, len(cameras), "frames")
+
+
+def images(
+    store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
+) -> Images:
+    """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
+    settings.check()
+    if settings.exposure_ev is None:
+        settings = replace(settings, exposure_ev=scene_record(store).exposure_ev)
+        settings.check()
+    if settings.integrator == PATH_TRACER:
+        from lambent.render.path_traced import PathTraced
+
+        return PathTraced(store, settings, scene, note)
+    from lambent.render.real_time import RealTime
+
+    return RealTime(store, settings, moving, note)
+
+
+def _opened(store: Store | Path | str) -> tuple[Store, SceneRecord]:
+    """The store, and its scene record with the saved views."""
+    opened = store if isinstance(store, Store) else Store.open(Path(store))
+    return opened, with_views(scene_record(opened), read_views(opened.folder))
+
+
+def _named(kind: str, choices: Iterable[Named], name: str | None) -> Named:
+    found = {choice.name: choice for choice in choices}
+    if not found:
+        raise UserError(f"scene has no {kind}", hint=f"add one to the scene, [[{kind}s]]")
+    if name is None:
+        return next(iter(found.values()))
+    if name not in found:
+        hint = did_you_mean(name, found)
+        raise UserError(f"no {kind} of this name", field=f"--{kind}", got=name, expected=", ".join(found), hint=hint)
+    return found[name]

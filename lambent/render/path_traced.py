@@ -1,0 +1,39 @@
+"""Images by the path tracer: the reference for the real-time renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lambent.bake.bake import changed_inputs
+from lambent.bake.engine import engine
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
+from lambent.render.images import Floats, Images, Settings
+from lambent.store.source import scene_of
+from lambent.store.store import Store
+
+SPP = 64
+
+
+class PathTraced(Images):
+    """Path traced images of the scene that a store was baked from; `scene` says where it is now."""
+
+    def __init__(self, store: Store, settings: Settings, scene: str | None, note: Callable[[str], None]) -> None:
+        super().__init__(settings)
+        if settings.show != "full":
+            raise UserError("the path tracer shows all light", field="--show", got=settings.show, expected="full")
+        if settings.planar != "auto":
+            got = settings.planar
+            raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
+        self._scene = scene_of(store, scene)
+        for name in changed_inputs(store, self._scene):
+            note(f"{name} has changed since the store was baked")
+        engine()
+
+    def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
+        from lambent.bake.reference import render_reference  # imports Mitsuba, whose variant `engine` has set
+
+        settings = self.settings
+        spp = settings.samples or SPP
+        return render_reference(self._scene, camera, settings.width, settings.height, spp, progress=progress)[0]

@@ -1,0 +1,60 @@
+"""Images by the real-time renderer: the frames that the window draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
+from lambent.realtime.device import open_device
+from lambent.realtime.frame import SUPERSAMPLES, FrameState, Renderer, quantity_of
+from lambent.realtime.integrators import integrator
+from lambent.realtime.mirror_integrators import check_planar
+from lambent.render.images import NOISE, Floats, Images, Settings
+from lambent.store.contract import SIDES, noise_name
+from lambent.store.store import Store
+
+QMC_SPP = 256
+FILM_SUPERSAMPLES = 4  # of the radiance in an image sequence
+
+
+class RealTime(Images):
+    """Images by an integrator of `realtime.integrators`.
+
+    Displayed images of a film (`moving`) are single frames, as the window shows them in motion; a still is the mean of
+    many frames that look at other places of each pixel.
+    """
+
+    def __init__(self, store: Store, settings: Settings, moving: bool, note: Callable[[str], None]) -> None:
+        super().__init__(settings)
+        if settings.show == NOISE and noise_name(SIDES[0]) not in store:
+            hint = "`lambent bake` of the same scene adds it from the samples that the store keeps"
+            raise UserError("the store does not say how exact its light map is", field="--show", got=NOISE, hint=hint)
+        self._progressive, self._moving = integrator(settings.integrator).progressive, moving
+        check_planar(settings.integrator, settings.planar)
+        self.quantity = quantity_of(settings.show)
+        self._frame = partial(
+            FrameState, width=settings.width, height=settings.height, integrator=settings.integrator,
+            n=None if self._progressive else settings.samples, exposure_ev=settings.exposure_ev or 0.0,
+            view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
+            planar=settings.planar,
+        )  # fmt: skip
+        self._renderer = Renderer(open_device(), store)
+        for text in self._renderer.missing:
+            note(text)
+
+    def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
+        if self._progressive:
+            return self._renderer.converged(self._frame(camera), self.settings.samples or QMC_SPP, progress)
+        return self._renderer.still_radiance(self._frame(camera), FILM_SUPERSAMPLES if self._moving else SUPERSAMPLES)
+
+    def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:
+        if self._progressive or self.settings.is_false_coloured:
+            return super().displayed(camera, progress)
+        draw = self._renderer.display_image if self._moving else self._renderer.still
+        return draw(self._frame(camera))

@@ -1,0 +1,113 @@
+"""Stills, films and sequences from Python: what is written, what a note says, what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.camera import CameraPath
+from lambent.core.errors import UserError
+from lambent.core.images import read_encoded, read_image, to_bytes
+from lambent.render import Settings, film, images, still, write_frames
+from lambent.store.store import Store
+from tests.viewer.small_store import FRONT, SIDE, write_small_store
+
+pytestmark = pytest.mark.usefixtures("adapter")
+SMALL = Settings(48, 32)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_small_store(tmp_path_factory.mktemp("render") / "small.store")
+
+
+def test_a_camera_by_name_by_itself_or_the_first(store: Path, tmp_path: Path) -> None:
+    stills = {name: tmp_path / f"{name}.exr" for name in ("first", "front", "side", "itself")}
+    still(store, stills["first"], settings=SMALL)
+    still(str(store), str(stills["front"]), "front", SMALL)
+    still(Store.open(store), stills["side"], "side", SMALL)
+    done = still(store, stills["itself"], replace(SIDE, name="unknown to the scene"), SMALL)
+    assert (done.file, done.width, done.height, done.frames) == (stills["itself"], 48, 32, 1) and done.seconds > 0
+    found = {name: read_image(file) for name, file in stills.items()}
+    np.testing.assert_array_equal(found["first"], found["front"])
+    np.testing.assert_array_equal(found["side"], found["itself"])
+    assert not np.array_equal(found["front"], found["side"])
+
+
+def test_images_are_arrays(store: Path) -> None:
+    drawn = images(Store.open(store), replace(SMALL, view="linear"))
+    radiance, displayed = drawn.radiance(FRONT), drawn.displayed(FRONT)
+    assert radiance.shape == displayed.shape == (32, 48, 3)
+    assert (radiance.dtype, displayed.dtype) == (np.float32, np.uint8) and radiance.mean() > 0.05
+
+
+def test_a_film_along_any_path(store: Path, tmp_path: Path) -> None:
+    steps: list[float] = []
+    path = CameraPath("mine", (FRONT, SIDE), 2.0)
+    done = film(
+        store, tmp_path / "a-#.png", path, SMALL, fps=2, progress=lambda done, total, what: steps.append(done / total)
+    )
+    assert done.frames == path.frames(2) == 4 and steps == [0.25, 0.5, 0.75, 1.0]
+    moving = images(Store.open(store), SMALL, moving=True)
+    first = read_encoded(tmp_path / "a-1.png")
+    np.testing.assert_array_equal(to_bytes(first), moving.displayed(replace(FRONT, name="mine")))
+    with pytest.raises(UserError, match=r"expected \.mp4, \.png, \.exr"):
+        film(store, tmp_path / "a.hdr", path, SMALL)
+
+
+def test_a_fitted_scale_is_kept(store: Path) -> None:
+    """The second camera of a film sees another range of luminances: its colours have to mean the same."""
+    drawn = images(Store.open(store), Settings(96, 64, view="false-colour"))
+    drawn.displayed(FRONT)
+    kept = drawn.displayed(SIDE)
+    own = images(Store.open(store), Settings(96, 64, view="false-colour", scale=drawn._scale)).displayed(SIDE)
+    np.testing.assert_array_equal(kept, own)
+
+
+def test_notes_say_what_is_wrong_with_a_store(tmp_path: Path) -> None:
+    opened, notes = Store.open(write_small_store(tmp_path / "s")), []
+    irradiance = np.full((4, 4, 3), np.nan, np.float16)
+    opened.put("light_map/irradiance", "light_map", irradiance, key="damaged")
+    images(opened, SMALL, note=notes.append)
+    assert notes == ["light_map/irradiance: 48 values are negative or not finite and were set to 0"]
+
+
+@pytest.mark.slow
+def test_the_path_tracer_sees_the_scene_that_was_baked(mi, tmp_path: Path) -> None:
+    from lambent.bake.bake import bake
+    from lambent.scenes import load_scene
+    from lambent.store.source import SOURCE
+
+    made = bake(load_scene("builtin:box"), tmp_path / "box", only=("geometry",))
+    made.set_document(SOURCE, "builtin:box")
+    settings, notes = Settings(24, 16, "path", samples=4), []
+    image = images(made, settings, note=notes.append).radiance(load_scene("builtin:box").cameras[0])
+    assert image.shape == (16, 24, 3) and image.mean() > 0 and notes == []
+    with pytest.raises(UserError, match="shows all light"):
+        images(made, replace(settings, show="diffuse"))
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"view": "filmc"}, "did you mean 'filmic'"),
+        ({"exposure_ev": float("nan")}, "-64 to 64"),
+        ({"integrator": "ring"}, "did you mean 'rings'"),
+        ({"planar": "thesis"}, "does not draw reflectors so"),
+    ],
+)
+def test_nonsense(store: Path, change: dict, word: str) -> None:
+    with pytest.raises(UserError, match=word):
+        images(Store.open(store), replace(SMALL, **change))
+
+
+def test_frames_are_written_as_they_are_drawn(tmp_path: Path) -> None:
+    def draw(camera):
+        return np.full((16, 16, 3), 100 if camera is FRONT else 200, np.uint8)
+
+    write_frames(tmp_path / "a.png", [FRONT, SIDE, FRONT], draw, (16, 16), 30)
+    means = [round(255 * float(read_encoded(tmp_path / f"a-000{k}.png").mean())) for k in (1, 2, 3)]
+    assert means == [100, 200, 100]
