@@ -14,14 +14,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.bench import planar_scene
 from lambent.bench.planar_quality import lobe_of
 from lambent.bench.quality_inputs import MATERIALS, OWN_ENVIRONMENTS
-from lambent.bench.reference import Floats, Reference
+from lambent.bench.reference import Reference
 from lambent.bench.specular_scene import sphere_and_torus
 from lambent.core import metrics
+from lambent.core.arrays import Flags, Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import open_device
@@ -108,7 +108,7 @@ def z_of(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sign(found) * norm.isf(np.clip(t.sf(np.abs(found), freedom), 1e-15, 0.5)))
 
 
-def agreement(aimed: Floats, lobe_alone: Floats, shown: NDArray[np.bool_]) -> dict[str, float]:
+def agreement(aimed: Floats, lobe_alone: Floats, shown: Flags) -> dict[str, float]:
     """Agreement of two sets of replicas (R, H, W, 3): of the shown pixels, of blocks of them, z_whole of their mean.
 
     If both are unbiased, z_rms is 1 and z_above_3 .0027, as far as means are distributed normally. Where rare samples
@@ -127,7 +127,7 @@ def agreement(aimed: Floats, lobe_alone: Floats, shown: NDArray[np.bool_]) -> di
     }
 
 
-def block_means(values: Floats, shown: NDArray[np.bool_]) -> Floats:
+def block_means(values: Floats, shown: Flags) -> Floats:
     """(R, B) means of values (R, P) of the P pixels of shown (H, W), over squares of `BLOCK` pixels."""
     row, column = np.nonzero(shown)
     _, block = np.unique(row // BLOCK * shown.shape[1] + column // BLOCK, return_inverse=True)

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera, pixel_rays
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
@@ -23,7 +23,6 @@ from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 
-Floats = NDArray[np.floating]
 FLOOR, PAINT, REACH = "floor", "paint", 4.0
 SKY: Triple = (0.25, 0.3, 0.4)
 LAMP: Triple = (12.0, 10.0, 8.0)
@@ -96,7 +95,7 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 
 def exact_reflection(
     lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Flags]:
     """Radiance (height, width, 3) of the floor by ray casting, and where the floor is (height, width) bool.
 
     `spp` samples of the lobe at every pixel's centre, as the renderer's `qmc` takes them, each traced to the triangle

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.bench.quality_inputs import MATERIALS, OWN_ENVIRONMENTS, one_lobe, read_inputs
-from lambent.bench.reference import Floats, Reference, by_n, mean
+from lambent.bench.reference import Reference, by_n, mean
 from lambent.bench.specular_scene import path_traced, sphere_and_torus
+from lambent.core.arrays import Flags, Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.realtime.device import open_device
@@ -115,7 +115,7 @@ def _rows(case: Case, ns: Sequence[int]) -> list[dict[str, Any]]:
     ]
 
 
-def eroded(shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def eroded(shown: Flags) -> Flags:
     """Pixels whose four neighbours are shown too."""
     inner = shown.copy()
     for axis in (0, 1):

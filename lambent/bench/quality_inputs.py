@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
 from lambent.core.plain import Triple
@@ -21,7 +19,6 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.measured import registry
 from lambent.scenes.environments import dusk, from_lat_long, night, studio
 
-Floats = NDArray[np.floating]
 OWN_ENVIRONMENTS = {"studio": studio, "night": night, "dusk": dusk}
 
 

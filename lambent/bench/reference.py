@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.core import metrics
-
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Flags, Floats
 
 
 @dataclass(frozen=True)
@@ -23,12 +21,12 @@ class Reference:
     """
 
     radiance: Floats
-    shown: NDArray[np.bool_]
+    shown: Flags
     exposure_ev: float
     encoded: Floats
 
     @classmethod
-    def of(cls, radiance: Floats, shown: NDArray[np.bool_]) -> Reference:
+    def of(cls, radiance: Floats, shown: Flags) -> Reference:
         radiance = radiance * shown[..., None]
         exposure_ev = metrics.display_exposure(radiance)
         return cls(radiance, shown, exposure_ev, metrics.displayed(radiance, exposure_ev))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.bench.reference import Floats
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.cubemap import sample
 from lambent.core.images import write_image
@@ -33,7 +33,7 @@ def sphere_and_torus(detail: int = 96) -> dict[str, Mesh]:
 
 
 def to_lat_long(cube: Floats, height: int = 512) -> Floats:
-    """Lat-long image (height, 2 height, 3) of an environment (6, N, N, 3): top +y, middle column -z."""
+    """Lat-long image (height, 2 height, 3) of an environment (6, N, N, 3)."""
     return sample(cube, lat_long_directions(height, 2 * height))
 
 

@@ -5,12 +5,9 @@ All functions take and return arrays (..., 3) and keep the dtype of floating inp
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.floating[Any]]
+from lambent.core.arrays import Floats
 
 # IEC 61966-2-1. The inverse is computed, not quoted, so that the round trip is exact to rounding.
 RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])

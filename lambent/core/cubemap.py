@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Floats
 
 
 def face_directions(n: int) -> Floats:

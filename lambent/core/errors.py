@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class UserError(Exception):
@@ -42,6 +43,17 @@ class UserError(Exception):
         if hint is not None:
             parts.append(f"; {hint}")
         super().__init__("".join(parts).replace("\n", " "))
+
+
+def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserError:
+    """The first fault of a pydantic `ValidationError`; `known` are the keys that an unknown one may have meant."""
+    first = error.errors()[0]
+    field = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        return UserError("unknown key", file=file, field=field, hint=did_you_mean(str(first["loc"][-1]), known))
+    if first["type"] == "missing":
+        return UserError("is missing", file=file, field=field)
+    return UserError(first["msg"].removeprefix("Value error, "), file=file, field=field, got=first["input"])
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.photometry import LUMINANCE
-
-Floats = NDArray[np.floating[Any]]
 
 # Encoded colours at even steps from the low end to the high one; also in realtime/shaders/false_colour.wgsl.
 STOPS = np.array(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
-
-Floats = NDArray[np.floating]
 
 
 def area_vectors(corners: Floats) -> Floats:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Floats
 
 
 def lat_long_direction(theta_rad: ArrayLike, phi_rad: ArrayLike) -> Floats:

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import rgb_to_lab, srgb_encode
 
-Floats = NDArray[np.floating[Any]]
 TILE = 16  # pixels
 
 

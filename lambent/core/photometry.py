@@ -11,14 +11,12 @@ by V(lambda) would take 683 lm/W, but the three channels each stand for a broad 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
 
-Floats = NDArray[np.floating[Any]]
 LM_PER_W = 179.0
 
 

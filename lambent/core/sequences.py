@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.floating]
+from lambent.core.arrays import Floats
 
 
 def radical_inverse(index: NDArray[np.integer], base: int) -> Floats:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.errors import UserError, invalid
 from lambent.core.files import read_bytes, write_text
 
 FORMAT: Literal["lambent-material"] = "lambent-material"
@@ -121,17 +121,9 @@ def material_from(data: Any, file: Path | str) -> Material:
     try:
         material = Material.model_validate(data)
     except ValidationError as error:
-        raise _one_line(error, file) from error
+        known = [*Lobe.model_fields, *Material.model_fields, *Provenance.model_fields]
+        raise invalid(error, file, known) from error
     if not data.keys() & SCATTERING:
         hint = "a black surface says so: kd = 0"
         raise UserError("has no scattering term", file=file, expected="kd, kt_d or lobes", hint=hint)
     return material
-
-
-def _one_line(error: ValidationError, file: Path | str) -> UserError:
-    first = error.errors()[0]
-    field = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        known = list(Lobe.model_fields) + list(Material.model_fields) + list(Provenance.model_fields)
-        return UserError("unknown key", file=file, field=field, hint=did_you_mean(str(first["loc"][-1]), known))
-    return UserError(first["msg"], file=file, field=field, got=first["input"])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.colour import shown
 from lambent.core.discovery import known
@@ -18,7 +18,6 @@ from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.progress import Progress, silent
 
-Floats = NDArray[np.floating[Any]]
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)

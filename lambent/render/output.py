@@ -14,7 +14,7 @@ from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
-from lambent.core.progress import Progress, silent
+from lambent.core.progress import Progress, silent, tracked
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord, scene_record
@@ -135,9 +135,8 @@ def write_frames(
 ) -> None:
     """Draw each camera into a film or an image sequence: see `core.film.pictures_writer`."""
     with pictures_writer(file, *size, fps) as write:
-        for index, camera in enumerate(cameras):
+        for camera in tracked(cameras, progress, "frames"):
             write(draw(camera))
-            progress(index + 1, len(cameras), "frames")
 
 
 def images(

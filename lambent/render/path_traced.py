@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from lambent.bake.bake import changed_inputs
 from lambent.bake.engine import engine
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
-from lambent.render.images import Floats, Images, Settings
+from lambent.render.images import Images, Settings
 from lambent.store.source import scene_of
 from lambent.store.store import Store
 

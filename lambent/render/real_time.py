@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
@@ -15,7 +16,7 @@ from lambent.realtime.device import open_device
 from lambent.realtime.frame import SUPERSAMPLES, FrameState, Renderer, quantity_of
 from lambent.realtime.integrators import integrator
 from lambent.realtime.mirror_integrators import check_planar
-from lambent.render.images import NOISE, Floats, Images, Settings
+from lambent.render.images import NOISE, Images, Settings
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 

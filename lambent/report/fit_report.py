@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
 from lambent.core.files import sha256_of
 from lambent.core.images import to_bytes
@@ -24,8 +24,6 @@ from lambent.materials.fitting.slices import slices
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.report import page
 from lambent.scenes.scene import Environment
-
-Floats = NDArray[np.floating]
 
 DPI, DENSITY = 150, 1.5  # plots are finer than their size on the page, for print and fine displays
 STORED = {
@@ -160,7 +158,7 @@ def _previews(
     return [page.row(balls), page.paragraph(words), page.paragraph(about, "soft")]
 
 
-def _cut_out(picture: Floats, ball: NDArray[np.bool_]) -> bytes:
+def _cut_out(picture: Floats, ball: Flags) -> bytes:
     """PNG of an encoded image, transparent beside the ball."""
     from PIL import Image
 

@@ -50,7 +50,7 @@ def test_a_film_along_any_path(store: Path, tmp_path: Path) -> None:
     done = film(
         store, tmp_path / "a-#.png", path, SMALL, fps=2, progress=lambda done, total, what: steps.append(done / total)
     )
-    assert done.frames == path.frames(2) == 4 and steps == [0.25, 0.5, 0.75, 1.0]
+    assert done.frames == path.frames(2) == 4 and steps == [0.0, 0.25, 0.5, 0.75, 1.0]
     moving = images(Store.open(store), SMALL, moving=True)
     first = read_encoded(tmp_path / "a-1.png")
     np.testing.assert_array_equal(to_bytes(first), moving.displayed(replace(FRONT, name="mine")))

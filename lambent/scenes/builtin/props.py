@@ -5,17 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.scenes.builtin.placing import POLISHED_SCALE, block, thing
-from lambent.scenes.geometry import (
-    box,
-    cylinder,
-    lathe,
-    merge,
-    placed,
-    sphere,
-    teapot,
-    tube,
-    turn,
-)  # fmt: skip
+from lambent.scenes.geometry import box, cylinder, lathe, merge, placed, sphere, teapot, tube, turn
 from lambent.scenes.scene import Mesh, SceneObject
 
 

@@ -1,27 +1,8 @@
 """Mesh building blocks: shapes with analytic normals, uv and a brushing direction."""
 
 from lambent.scenes.geometry.curves import catmull_rom, smooth_curve
-from lambent.scenes.geometry.grid import (
-    build,
-    grid,
-    merge,
-    placed,
-    signed_volume,
-    tangents_along,
-    transformed,
-    turn,
-)  # fmt: skip
-from lambent.scenes.geometry.shapes import (
-    box,
-    cushion,
-    cylinder,
-    extrusion,
-    fan,
-    lathe,
-    patch,
-    sphere,
-    tube,
-)  # fmt: skip
+from lambent.scenes.geometry.grid import build, grid, merge, placed, signed_volume, tangents_along, transformed, turn
+from lambent.scenes.geometry.shapes import box, cushion, cylinder, extrusion, fan, lathe, patch, sphere, tube
 from lambent.scenes.geometry.teapot import teapot
 
 __all__ = [

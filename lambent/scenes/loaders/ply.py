@@ -37,6 +37,10 @@ class _Element:
     count: int
     properties: list[tuple[str, str, str | None]]  # name, type, type of the count if it is a list
 
+    @property
+    def lists(self) -> int:
+        return sum(count is not None for _, _, count in self.properties)
+
     def row(self, corners: int) -> np.dtype[Any]:
         """The type of a row whose list, if it has one, has so many corners."""
         fields: list[tuple[Any, ...]] = []
@@ -69,29 +73,25 @@ def read(path: Path) -> MeshArrays:
     vertex: dict[str, Floats] = {}
     corners, sizes = np.zeros(0, np.int64), np.zeros(0, np.int64)
     for element in elements:
-        lists = [p for p in element.properties if p[2] is not None]
-        element.properties = [(name, _typed(order, kind), count and _typed(order, count))
-                              for name, kind, count in element.properties]  # fmt: skip
-        if element.name == "vertex" and not lists:
+        if element.name == "vertex" and not element.lists:
             table = rows.take(element.row(0), element.count)
             vertex = {p[0]: table[f"{i}"].astype(float) for i, p in enumerate(element.properties)}
-        elif element.name == "face" and len(lists) == 1:
+        elif element.name == "face" and element.lists == 1:
             corners, sizes = rows.faces(element)
         elif element.name in ("vertex", "face"):
             raise UserError("holds lists that are not read", file=path, field=f"element {element.name}")
         else:
             break  # what follows the faces cannot be seen
-    if not all(c in vertex for c in "xyz"):
+    positions = _columns(vertex, ("x", "y", "z"))
+    if positions is None:
         raise UserError("has no vertices", file=path, expected="properties x, y, z")
-    count = len(vertex["x"])
-    if corners.size and (int(corners.max()) >= count or int(corners.min()) < 0):
-        bad = int(corners.max()) if int(corners.max()) >= count else int(corners.min())
-        raise UserError("face index out of range", file=path, got=bad, expected=f"below {count}")
-    positions = np.stack([vertex[c] for c in "xyz"], axis=-1)
+    outside = corners[(corners < 0) | (corners >= len(positions))]
+    if len(outside):
+        got, expected = int(outside.max()), f"below {len(positions)}"
+        raise UserError("face index out of range", file=path, got=got, expected=expected)
     places, _ = triangulate(positions, corners, sizes)
     check_triangles(len(places), path)
-    normals, uv = (_columns(vertex, names) for names in ((("nx", "ny", "nz"),), UV_NAMES))
-    return MeshArrays(positions, corners[places], normals, uv)
+    return MeshArrays(positions, corners[places], _columns(vertex, ("nx", "ny", "nz")), _columns(vertex, *UV_NAMES))
 
 
 def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
@@ -110,15 +110,23 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
                 if elements[-1].count < 0:
                     raise ValueError
             elif words[:2] == ["property", "list"]:
-                elements[-1].properties.append((words[4], TYPES[words[3]], TYPES[words[2]]))
+                elements[-1].properties.append((words[4], _type(words[3], order), _type(words[2], order)))
             elif words[:1] == ["property"]:
-                elements[-1].properties.append((words[2], TYPES[words[1]], None))
+                elements[-1].properties.append((words[2], _type(words[1], order), None))
         except (KeyError, IndexError, ValueError) as error:
             raise UserError("header cannot be read", file=path, field=f"line {number}", got=line) from error
     line_end = data.find(b"\n", end)
     if not order or line_end < 0:
         raise UserError("header cannot be read", file=path, expected="a format")
     return order, elements, line_end + 1
+
+
+def _type(word: str, order: str) -> str:
+    """numpy's name of a type; text is read as doubles."""
+    if not order:
+        raise ValueError
+    kind = TYPES[word]
+    return "f8" if order == "ascii" else order + kind
 
 
 class _Rows:
@@ -138,37 +146,36 @@ class _Rows:
         """Corners of all faces, one face after the other, and the number (F,) of each."""
         if element.count == 0:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        head, item = element.row(0), np.dtype(next(p[1] for p in element.properties if p[2]))
+        head, item = element.row(0), np.dtype(next(kind for _, kind, count in element.properties if count))
         count, size_at = head.fields["size"]  # type: ignore[index, misc]
-        size_of = struct.Struct(("<" if count.str[0] == "|" else count.str[0]) + count.char)
-        size = self._size(size_of, self._at, size_at, head.itemsize)
-        kind = element.row(size)
-        if self._at + kind.itemsize * element.count <= len(self._data):  # mostly all have as many as the first
-            rows = np.frombuffer(self._data, kind, element.count, self._at)
-            if (rows["size"] == size).all():
-                self._at += rows.nbytes
-                return _integers(rows["list"].reshape(-1)), np.full(len(rows), size)
-        sizes: list[int] = []
-        at = self._at
+        size_of = struct.Struct(count.str[0].replace("|", "<") + count.char)
+        end, sizes = self._at, []
         for _ in range(element.count):
-            sizes.append(self._size(size_of, at, size_at, head.itemsize))
-            at += head.itemsize + sizes[-1] * item.itemsize
-        self._check(at)
+            self._check(end + head.itemsize)
+            (size,) = size_of.unpack_from(self._data, end + size_at)
+            if not 0 <= size < CORNERS_MAX:
+                raise UserError("face that cannot be read", file=self._path, got=size)
+            sizes.append(int(size))
+            end += head.itemsize + sizes[-1] * item.itemsize
+            if len(sizes) == 1 and (rows := self._alike(element.row(sizes[0]), element.count)) is not None:
+                return _integers(rows["list"].reshape(-1)), np.full(len(rows), sizes[0])
+        self._check(end)
         counts = np.array(sizes)
         before = np.arange(len(counts)) * head.itemsize + (np.cumsum(counts) - counts) * item.itemsize
-        lists = self._at + before + size_at + count.itemsize
-        first = np.repeat(lists, counts) + ranges(counts) * item.itemsize
-        self._at = at
+        first = np.repeat(self._at + before + size_at + count.itemsize, counts) + ranges(counts) * item.itemsize
+        self._at = end
         corners = np.frombuffer(self._data, np.uint8)[first[:, None] + np.arange(item.itemsize)].view(item)
         return _integers(corners.reshape(-1)), counts
 
-    def _size(self, size_of: struct.Struct, at: int, size_at: int, least: int) -> int:
-        """Corners of the face that begins at a place."""
-        self._check(at + least)
-        (size,) = size_of.unpack_from(self._data, at + size_at)
-        if not 0 <= size < CORNERS_MAX:
-            raise UserError("face that cannot be read", file=self._path, got=size)
-        return int(size)
+    def _alike(self, kind: np.dtype[Any], count: int) -> np.ndarray[Any, Any] | None:
+        """The next rows if all lists have the length of the first one, as in most files."""
+        if self._at + kind.itemsize * count > len(self._data):
+            return None
+        rows = np.frombuffer(self._data, kind, count, self._at)
+        if not (rows["size"] == rows["size"][0]).all():
+            return None
+        self._at += rows.nbytes
+        return rows
 
     def _check(self, end: int) -> None:
         if end > len(self._data):
@@ -184,12 +191,7 @@ def _doubles(text: bytes, path: Path) -> memoryview:
     return values.view(np.uint8).data
 
 
-def _typed(order: str, kind: str) -> str:
-    """A type as it stands in the data."""
-    return "f8" if order == "ascii" else order + kind
-
-
-def _columns(vertex: dict[str, Floats], choices: tuple[tuple[str, ...], ...]) -> Floats | None:
+def _columns(vertex: dict[str, Floats], *choices: tuple[str, ...]) -> Floats | None:
     """The first of several groups of properties that is there, (V, n)."""
     names = next((group for group in choices if all(n in vertex for n in group)), None)
     return None if names is None else np.stack([vertex[n] for n in names], axis=-1)

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.directions import Floats
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, invalid
 from lambent.core.files import read_bytes
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, GltfDocument
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -142,9 +142,7 @@ def read(path: Path, root: Path | None = None) -> Gltf:
     try:
         document = GltfDocument.model_validate(raw)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise UserError(first["msg"], file=path, field=field, got=first["input"]) from error
+        raise invalid(error, path) from error
     if not document.asset.version.startswith("2."):
         version = document.asset.version
         raise UserError("unknown glTF version", file=path, field="asset.version", got=version, expected=2)

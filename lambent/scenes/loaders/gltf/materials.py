@@ -12,18 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lambent.core.plain import Triple
+from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, SpecularGlossiness, TextureReference
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
 from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import (
-    ROUGHNESS_MIN,
-    SpecularLobe,
-    Surface,
-    coated,
-    normal_reflectance,
-    rgb,
-    seen_through,
-)
+from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, coated, rgb, seen_through
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture
@@ -56,7 +49,7 @@ class _Reading:
         roughness = _times([pbr.roughnessFactor], packed and packed.channel(1))
         across = combined(lambda r: r**2, roughness, notes=notes)
         # ior = 0 is specified to mean no Fresnel effect: r0 = 1, which the specular colour scales.
-        plain = normal_reflectance(document.ior) * np.asarray(specular.specularColorFactor)
+        plain = r0_of(document.ior) * np.asarray(specular.specularColorFactor)
         if specular.specularTexture is not None or specular.specularColorTexture is not None:
             notes.append("the textures of its specular extension are not read")
         strength, direction = self._anisotropy()

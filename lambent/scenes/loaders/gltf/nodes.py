@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -21,27 +20,10 @@ from lambent.scenes.loaders.gltf.materials import surface_of
 from lambent.scenes.loaders.gltf.schema import MaterialDocument, Node, Primitive
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
 from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
-from lambent.scenes.loaders.surfaces.surface import MadeMaterials
+from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
 FAR = 1e9  # metres
-
-
-@dataclass
-class _Reading:
-    """What has been read so far of one file."""
-
-    gltf: Gltf
-    materials: _Materials
-    variants: dict[str, dict[str, tuple[str, Triple]]] = field(default_factory=dict)
-    objects: list[SceneObject] = field(default_factory=list)
-    lights: list[Light] = field(default_factory=list)
-    cameras: list[Camera] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    names: set[str] = field(default_factory=set)
-    camera_names: set[str] = field(default_factory=set)
-    meshes: dict[tuple[int, int, int], Mesh | None] = field(default_factory=dict)
-    triangles: int = 0
 
 
 def load(path: Path, root: Path | None = None) -> Contents:
@@ -55,22 +37,9 @@ def load(path: Path, root: Path | None = None) -> Contents:
     UserError
         Where the file is damaged or holds no triangles.
     """
-    gltf = read(path, root)
-    reading = _Reading(gltf, _Materials(gltf))
-    _walk(reading)
-    if not reading.objects:
-        raise UserError("holds no triangles", file=path, hint="; ".join(reading.warnings) or None)
-    made, images = reading.materials.made, reading.materials.textures.images
-    return Contents(
-        tuple(reading.objects),
-        made.materials,
-        tuple(reading.lights),
-        tuple(reading.cameras),
-        tuple(gltf.files.sources),
-        (*reading.warnings, *made.notes, *images.notes),
-        made.textures,
-        variants=reading.variants,
-    )
+    reading = _Reading(read(path, root))
+    reading.walk()
+    return reading.contents()
 
 
 class _Materials:
@@ -93,27 +62,129 @@ class _Materials:
         return main_uv_set(self._documents[number])
 
 
-def _walk(reading: _Reading) -> None:
-    """Visit every node of the scene once, parents first."""
-    gltf = reading.gltf
-    document = gltf.document
-    if document.scenes:
-        roots = gltf.pick(document.scenes, document.scene, "scene").nodes
-    else:
-        roots = sorted(set(range(len(document.nodes))) - {c for n in document.nodes for c in n.children})
-    stack = [(index, np.eye(4)) for index in reversed(roots)]
-    seen: set[int] = set()
-    while stack:
-        index, parent = stack.pop()
-        if index in seen:
-            raise UserError("node is reached twice", file=gltf.path, field=f"nodes.{index}", expected="a tree")
-        seen.add(index)
-        node = gltf.pick(document.nodes, index, "nodes")
-        world = parent @ _local(node)
-        if not (np.abs(world) < FAR).all():
-            raise UserError("transform is not finite, or leads absurdly far", file=gltf.path, field=f"nodes.{index}")
-        _visit(reading, node, index, world)
-        stack += [(child, world) for child in reversed(node.children)]
+class _Reading:
+    """One file, and what has been read of it."""
+
+    def __init__(self, gltf: Gltf) -> None:
+        self._gltf, self._materials = gltf, _Materials(gltf)
+        self._variants: dict[str, dict[str, tuple[str, Triple]]] = {}
+        self._objects: list[SceneObject] = []
+        self._lights: list[Light] = []
+        self._cameras: list[Camera] = []
+        self._warnings: list[str] = []
+        self._names: set[str] = set()
+        self._camera_names: set[str] = set()
+        self._meshes: dict[tuple[int, int, int], Mesh | None] = {}
+        self._triangles = 0
+
+    def contents(self) -> Contents:
+        if not self._objects:
+            raise UserError("holds no triangles", file=self._gltf.path, hint="; ".join(self._warnings) or None)
+        made, images = self._materials.made, self._materials.textures.images
+        return Contents(
+            tuple(self._objects),
+            made.materials,
+            tuple(self._lights),
+            tuple(self._cameras),
+            tuple(self._gltf.files.sources),
+            (*self._warnings, *made.notes, *images.notes),
+            made.textures,
+            variants=self._variants,
+        )
+
+    def walk(self) -> None:
+        """Visit every node of the scene once, parents first."""
+        gltf, document = self._gltf, self._gltf.document
+        if document.scenes:
+            roots = gltf.pick(document.scenes, document.scene, "scene").nodes
+        else:
+            roots = sorted(set(range(len(document.nodes))) - {c for n in document.nodes for c in n.children})
+        stack = [(index, np.eye(4)) for index in reversed(roots)]
+        seen: set[int] = set()
+        while stack:
+            index, parent = stack.pop()
+            field = f"nodes.{index}"
+            if index in seen:
+                raise UserError("node is reached twice", file=gltf.path, field=field, expected="a tree")
+            seen.add(index)
+            node = gltf.pick(document.nodes, index, "nodes")
+            world = parent @ _local(node)
+            if not (np.abs(world) < FAR).all():
+                raise UserError("transform is not finite, or leads absurdly far", file=gltf.path, field=field)
+            self._visit(node, world)
+            stack += [(child, world) for child in reversed(node.children)]
+
+    def _visit(self, node: Node, world: Floats) -> None:
+        if node.mesh is not None:
+            self._add_mesh(node.mesh, node.name, world)
+        if node.camera is not None:
+            self._add_camera(node.camera, node.name, world)
+        if node.light is not None:
+            self._add_light(node.light, world)
+
+    def _add_mesh(self, index: int, node_name: str | None, world: Floats) -> None:
+        gltf = self._gltf
+        mesh = gltf.pick(gltf.document.meshes, index, "meshes")
+        wanted = node_name or mesh.name or f"mesh_{index}"
+        if abs(np.linalg.det(world[:3, :3])) < 1e-18:
+            self._warnings.append(f"{wanted}: left out, its node's scale is zero")
+            return
+        for k, primitive in enumerate(mesh.primitives):
+            number = -1 if primitive.material is None else self._checked(primitive.material)
+            uv_set = self._materials.uv_set(number)
+            key = (index, k, uv_set)
+            if key not in self._meshes:
+                self._meshes[key], notes = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
+                self._warnings += notes
+            local = self._meshes[key]
+            if local is None:
+                continue
+            self._triangles += len(local.faces)
+            check_triangles(self._triangles, gltf.path)
+            material, emission = self._materials.use(number)
+            single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
+            name = unique_name(single, self._names)
+            if name != single:
+                self._warnings.append(f"{single}: the name is used twice, one is now {name}")
+            self._objects.append(SceneObject(name, transformed(local, world), material, emission))
+            self._note_variants(primitive, name)
+
+    def _note_variants(self, primitive: Primitive, name: str) -> None:
+        """Note an object's material in each of the file's material sets that has one for it."""
+        listed = self._gltf.document.variants
+        for variant in listed:
+            self._variants.setdefault(variant.name, {})
+        for mapping in primitive.variants:
+            material = self._materials.use(self._checked(mapping.material))
+            for number in mapping.variants:
+                self._variants[self._gltf.pick(listed, number, "variants").name][name] = material
+
+    def _checked(self, material: int) -> int:
+        self._gltf.pick(self._gltf.document.materials, material, "material")
+        return material
+
+    def _add_camera(self, index: int, node_name: str | None, world: Floats) -> None:
+        camera = self._gltf.pick(self._gltf.document.cameras, index, "cameras")
+        wanted = node_name or camera.name or f"camera_{index}"
+        if camera.perspective is None:
+            self._warnings.append(f"{wanted}: left out, a camera without perspective")
+            return
+        name = unique_name(wanted, self._camera_names)
+        position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
+        fov_y_deg = math.degrees(camera.perspective.yfov)
+        self._cameras.append(Camera(name, triple(position), triple(position + forward), triple(up), fov_y_deg))
+
+    def _add_light(self, index: int, world: Floats) -> None:
+        light = self._gltf.pick(self._gltf.document.lights, index, "lights")
+        power = triple(radiometric(np.asarray(light.color) * light.intensity))
+        position, direction = triple(world[:3, 3]), triple(-normalize(world[:3, 2]))
+        if light.type == "directional":
+            self._lights.append(DirectionalLight(direction, power))
+        elif light.type == "point":
+            self._lights.append(PointLight(position, power))
+        else:
+            inner, outer = math.degrees(light.spot.innerConeAngle), math.degrees(light.spot.outerConeAngle)
+            self._lights.append(PointLight(position, power, direction, min(inner, outer), outer))
 
 
 def _local(node: Node) -> Floats:
@@ -128,61 +199,6 @@ def _local(node: Node) -> Floats:
     ] @ np.diag(node.scale)
     matrix[:3, 3] = node.translation
     return matrix
-
-
-def _visit(reading: _Reading, node: Node, index: int, world: Floats) -> None:
-    if node.mesh is not None:
-        _add_mesh(reading, node, world)
-    if node.camera is not None:
-        _add_camera(reading, node, world)
-    if node.light is not None:
-        _add_light(reading, node.light, world)
-
-
-def _add_mesh(reading: _Reading, node: Node, world: Floats) -> None:
-    gltf = reading.gltf
-    assert node.mesh is not None
-    mesh = gltf.pick(gltf.document.meshes, node.mesh, "meshes")
-    wanted = node.name or mesh.name or f"mesh_{node.mesh}"
-    if abs(np.linalg.det(world[:3, :3])) < 1e-18:
-        reading.warnings.append(f"{wanted}: left out, its node's scale is zero")
-        return
-    for k, primitive in enumerate(mesh.primitives):
-        number = -1 if primitive.material is None else _index(gltf, primitive.material)
-        uv_set = reading.materials.uv_set(number)
-        key = (node.mesh, k, uv_set)
-        if key not in reading.meshes:
-            reading.meshes[key], notes = _primitive(gltf, primitive, f"{wanted} ({k})" if k else wanted, uv_set)
-            reading.warnings += notes
-        local = reading.meshes[key]
-        if local is None:
-            continue
-        reading.triangles += len(local.faces)
-        check_triangles(reading.triangles, gltf.path)
-        material, emission = reading.materials.use(number)
-        single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
-        name = unique_name(single, reading.names)
-        if name != single:
-            reading.warnings.append(f"{single}: the name is used twice, one is now {name}")
-        reading.objects.append(SceneObject(name, transformed(local, world), material, emission))
-        _note_variants(reading, primitive, name)
-
-
-def _note_variants(reading: _Reading, primitive: Primitive, name: str) -> None:
-    """Note an object's material in each of the file's material sets that has one for it."""
-    listed = reading.gltf.document.variants
-    for variant in listed:
-        reading.variants.setdefault(variant.name, {})
-    for mapping in primitive.variants:
-        material = reading.materials.use(_index(reading.gltf, mapping.material))
-        for number in mapping.variants:
-            variant = reading.gltf.pick(listed, number, "variants")
-            reading.variants[variant.name][name] = material
-
-
-def _index(gltf: Gltf, material: int) -> int:
-    gltf.pick(gltf.document.materials, material, "material")
-    return material
 
 
 def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tuple[Mesh | None, list[str]]:
@@ -233,31 +249,3 @@ def _faces(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     faces = np.stack([order[:-2], order[1:-1], order[2:]], axis=-1)
     faces[1::2] = faces[1::2][:, [1, 0, 2]]
     return faces
-
-
-def _add_camera(reading: _Reading, node: Node, world: Floats) -> None:
-    gltf = reading.gltf
-    assert node.camera is not None
-    camera = gltf.pick(gltf.document.cameras, node.camera, "cameras")
-    wanted = node.name or camera.name or f"camera_{node.camera}"
-    if camera.perspective is None:
-        reading.warnings.append(f"{wanted}: left out, a camera without perspective")
-        return
-    name = unique_name(wanted, reading.camera_names)
-    position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
-    fov_y_deg = math.degrees(camera.perspective.yfov)
-    reading.cameras.append(Camera(name, triple(position), triple(position + forward), triple(up), fov_y_deg))
-
-
-def _add_light(reading: _Reading, index: int, world: Floats) -> None:
-    gltf = reading.gltf
-    light = gltf.pick(gltf.document.lights, index, "lights")
-    power = triple(radiometric(np.asarray(light.color) * light.intensity))
-    direction = triple(-normalize(world[:3, 2]))
-    if light.type == "directional":
-        reading.lights.append(DirectionalLight(direction, power))
-    elif light.type == "point":
-        reading.lights.append(PointLight(triple(world[:3, 3]), power))
-    else:
-        inner, outer = math.degrees(light.spot.innerConeAngle), math.degrees(light.spot.outerConeAngle)
-        reading.lights.append(PointLight(triple(world[:3, 3]), power, direction, min(inner, outer), outer))

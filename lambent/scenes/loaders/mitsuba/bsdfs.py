@@ -19,15 +19,8 @@ import numpy as np
 from lambent.core.directions import Floats
 from lambent.core.errors import did_you_mean
 from lambent.core.plain import is_number
-from lambent.scenes.loaders.mitsuba.fresnel import (
-    COS,
-    fresnel,
-    mean_reflectance,
-    mean_transmittance,
-    nearest_fresnel,
-    nearest_passage,
-    transmittance,
-)
+from lambent.scenes.loaders.mitsuba import fresnel
+from lambent.scenes.loaders.mitsuba.fresnel import COS, nearest_fresnel, nearest_passage
 from lambent.scenes.loaders.mitsuba.metals import IOR, METALS
 from lambent.scenes.loaders.mitsuba.principled import principled
 from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_values
@@ -35,7 +28,6 @@ from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.surface import (
     BLACK,
     ROUGHNESS_MIN,
-    Distribution,
     SpecularLobe,
     Surface,
     blended,
@@ -96,16 +88,9 @@ def grey() -> Surface:
     return Surface(kd=constant(np.full(3, GREY)))
 
 
-def is_nothing(plugin: Plugin) -> bool:
-    """Whether a shape of this BSDF has no surface."""
-    return plugin.type == "null"
-
-
 def _diffuse(plugin: Plugin) -> Surface:
-    name = (
-        "reflectance" if plugin.has("reflectance") or not plugin.has("diffuse_reflectance") else "diffuse_reflectance"
-    )
-    return Surface(kd=colour(plugin, name, GREY))
+    old = plugin.has("diffuse_reflectance") and not plugin.has("reflectance")
+    return Surface(kd=colour(plugin, "diffuse_reflectance" if old else "reflectance", GREY))
 
 
 def _rough_diffuse(plugin: Plugin) -> Surface:
@@ -124,53 +109,48 @@ def _diffuse_transmitter(plugin: Plugin) -> Surface:
 
 def _plastic(plugin: Plugin, rough: bool = True) -> Surface:
     eta = _eta(plugin, "polypropylene")
-    distribution, m, aspect = _facets(plugin, rough)
-    slope = float(np.clip(m.mean[0], 1e-3, 1)) if rough else 0.0
-    inside = mean_reflectance(1 / eta, slope, distribution)
-    through = mean_transmittance(eta, slope, distribution) / eta**2
-    through *= float(transmittance(np.ones(1), eta, slope, distribution)[0])
+    facets = _facets(plugin, rough)
+    slope = float(np.clip(facets.m.mean[0], 1e-3, 1)) if rough else 0.0
+    inside = fresnel.mean_reflectance(1 / eta, slope, facets.distribution)
+    through = fresnel.mean_transmittance(eta, slope, facets.distribution) / eta**2
+    through *= float(fresnel.transmittance(np.ones(1), eta, slope, facets.distribution)[0])
     nonlinear = plugin.flag("nonlinear", False)
 
     def below(rho: Floats) -> Floats:
         rho = np.clip(rho, 0, 1)
-        albedo: Floats = through * rho / (1 - (rho if nonlinear else 1.0) * inside)
-        return albedo
+        return np.asarray(through * rho / (1 - (rho if nonlinear else 1.0) * inside))
 
     kd = combined(below, colour(plugin, "diffuse_reflectance", GREY), notes=[])
-    r0, rise = nearest_fresnel(fresnel(COS, eta))
-    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return Surface(kd=kd, coupled=True, lobes=(SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution),))
+    return Surface(kd=kd, coupled=True, lobes=(_specular(plugin, facets, eta),))
 
 
 def _conductor(plugin: Plugin, rough: bool = False) -> Surface:
-    distribution, m, aspect = _facets(plugin, rough)
+    facets = _facets(plugin, rough)
     r0, rise = _metal(plugin)
-    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return Surface(lobes=(SpecularLobe(m, k, r0, aspect, distribution=distribution),))
+    return Surface(lobes=(replace(facets, k=scaled(colour(plugin, "specular_reflectance", 1.0), rise), r0=r0),))
 
 
 def _dielectric(plugin: Plugin, rough: bool = False) -> Surface:
     eta = _eta(plugin, "bk7")
     plugin.note(f"is a thin sheet here: light is {'spread, ' if rough else ''}not bent")
-    return _sheet(plugin, fresnel(COS, eta), (eta - 1) / 2, rough)
+    return _sheet(plugin, fresnel.reflectance(COS, eta), (eta - 1) / 2, rough)
 
 
 def _thin_dielectric(plugin: Plugin) -> Surface:
-    once = fresnel(COS, _eta(plugin, "bk7"))
+    once = fresnel.reflectance(COS, _eta(plugin, "bk7"))
     return _sheet(plugin, 2 * once / (1 + once), 1.0, rough=False)  # light that goes to and fro inside counts
 
 
 def _sheet(plugin: Plugin, reflected: Floats, bend: float, rough: bool) -> Surface:
     """A sheet of a reflectance (at `COS`); transmitted light is spread by `bend` times the facets' slopes."""
-    distribution, m, aspect = _facets(plugin, rough)
+    facets = _facets(plugin, rough)
     r0, rise = nearest_fresnel(reflected)
     drawn = rise * (r0 + (1 - r0) * (1 - COS) ** 5)
     share, falloff = nearest_passage(1 - np.maximum(reflected, drawn))  # both together never return more than arrives
-    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    back = SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution)
+    back = replace(facets, k=scaled(colour(plugin, "specular_reflectance", 1.0), rise), r0=np.full(3, r0))
     k = scaled(colour(plugin, "specular_transmittance", 1.0), share)
-    spread = scaled(m, bend) if rough else m
-    through = replace(back, m=spread, k=k, r0=BLACK, side="transmission", falloff=falloff)
+    spread = scaled(facets.m, bend) if rough else facets.m
+    through = replace(facets, m=spread, k=k, r0=BLACK, side="transmission", falloff=falloff)
     return Surface(lobes=(back, through))
 
 
@@ -186,10 +166,9 @@ def _ward(plugin: Plugin) -> Surface:
     """Ward's form falls off with the cosine at grazing incidence; Duer's and the balanced one do not."""
     variant = plugin.text("variant", "balanced").lower()
     kd, ks = colour(plugin, "diffuse_reflectance", GREY), colour(plugin, "specular_reflectance", 0.2)
-    _, m, aspect = _roughness(plugin)
     falloff = 1.0 if variant == "ward" else 0.0
-    gloss = SpecularLobe(m, ks, WHITE, aspect, distribution="beckmann", masked=False, falloff=falloff)
-    return Surface(kd=kd, lobes=(gloss,))
+    lobe = replace(_facets(plugin, True), k=ks, distribution="beckmann", masked=False, falloff=falloff)
+    return Surface(kd=kd, lobes=(lobe,))
 
 
 def _nested(plugin: Plugin) -> Surface:
@@ -206,11 +185,7 @@ def _coating(plugin: Plugin) -> Surface:
     """A clear coat; its absorption is not read."""
     below = _nested(plugin)
     eta = _eta(plugin, "bk7")
-    r0, rise = nearest_fresnel(fresnel(COS, eta))
-    rough = plugin.type == "roughcoating"
-    distribution, m, aspect = _facets(plugin, rough)
-    k = scaled(colour(plugin, "specular_reflectance", 1.0), rise)
-    return coated(below, SpecularLobe(m, k, np.full(3, r0), aspect, distribution=distribution))
+    return coated(below, _specular(plugin, _facets(plugin, plugin.type == "roughcoating"), eta))
 
 
 def _mask(plugin: Plugin) -> Surface:
@@ -287,17 +262,18 @@ KINDS: dict[str, Callable[[Plugin], Surface]] = {
 }  # fmt: skip
 
 
-def _smooth(plugin: Plugin) -> Textured:
-    plugin.reading.note(f"mirrors and clear glass have the roughness {ROUGHNESS_MIN}, the smallest there is")
-    return constant(ROUGHNESS_MIN)
+def _specular(plugin: Plugin, facets: SpecularLobe, eta: float) -> SpecularLobe:
+    """The reflection of a dielectric's facets."""
+    r0, rise = nearest_fresnel(fresnel.reflectance(COS, eta))
+    return replace(facets, k=scaled(colour(plugin, "specular_reflectance", 1.0), rise), r0=np.full(3, r0))
 
 
-def _facets(plugin: Plugin, rough: bool) -> tuple[Distribution, Textured, float]:
-    return _roughness(plugin) if rough else ("ggx", _smooth(plugin), 1.0)
-
-
-def _roughness(plugin: Plugin) -> tuple[Distribution, Textured, float]:
-    """Distribution, roughness along t, and the ratio of that across t to it."""
+def _facets(plugin: Plugin, rough: bool) -> SpecularLobe:
+    """A lobe of the plugin's distribution and roughness that reflects everything."""
+    white = constant(WHITE)
+    if not rough:
+        plugin.reading.note(f"mirrors and clear glass have the roughness {ROUGHNESS_MIN}, the smallest there is")
+        return SpecularLobe(constant(ROUGHNESS_MIN), white, WHITE)
     distribution = plugin.text("distribution", "beckmann").lower()
     if distribution not in ("beckmann", "ggx", "phong", "as"):
         plugin.note(f"unknown distribution {distribution}: beckmann")
@@ -308,7 +284,7 @@ def _roughness(plugin: Plugin) -> tuple[Distribution, Textured, float]:
     if plugin.has("alpha_v"):
         across = number(plugin, "alpha_v", 0.1)
         aspect = float(across.mean[0] / max(m.mean[0], 1e-6))
-    return ("ggx" if distribution == "ggx" else "beckmann"), m, aspect
+    return SpecularLobe(m, white, WHITE, aspect, distribution="ggx" if distribution == "ggx" else "beckmann")
 
 
 def _eta(plugin: Plugin, inside: str) -> float:
@@ -341,7 +317,7 @@ def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
     if plugin.has("eta", "k"):
         plugin.ignore("material")
         eta, k = colour(plugin, "eta", 0.0).mean / around, colour(plugin, "k", 1.0).mean / around
-        fits = [nearest_fresnel(fresnel(COS, complex(n, -x))) for n, x in zip(eta, k, strict=True)]
+        fits = [nearest_fresnel(fresnel.fresnel(COS, complex(n, -x))) for n, x in zip(eta, k, strict=True)]
         r0, rise = np.array(fits).T
         return r0, rise
     name = plugin.text("material", "Cu")
@@ -349,12 +325,8 @@ def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
         return WHITE, WHITE
     known = {**METALS, **{f"{n}_palik": metal for n, metal in METALS.items()}}
     if name not in known:
-        plugin.note(f"unknown metal {name}, it is aluminium{_guess(name)}")
+        hint = did_you_mean(name, METALS)
+        plugin.note(f"unknown metal {name}, it is aluminium{f' ({hint})' if hint else ''}")
         name = "Al"
     straight, grazing = (np.array(v) for v in known[name])
     return straight / grazing, grazing
-
-
-def _guess(name: str) -> str:
-    hint = did_you_mean(name, METALS)
-    return f" ({hint})" if hint else ""

@@ -15,7 +15,6 @@ from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.scenes.loaders.mitsuba.document import Document, Element
-from lambent.scenes.loaders.mitsuba.numbers import floats_of
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
 LIMIT_BYTES = 1 << 20
@@ -43,7 +42,7 @@ def colour_of(element: Element, document: Document, *, emitted: bool = False) ->
         return _spectrum(element, text, [pair.split(":") for pair in text.replace(",", " ").split()], emitted)
     if "filename" in element.attributes:
         return _file(element, document, emitted)
-    values = floats_of(element)
+    values = element.floats()
     if len(values) not in (1, 3):
         raise element.error("wrong count of numbers", got=len(values), expected="1 or 3")
     rgb = np.maximum(np.array(values * 3 if len(values) == 1 else values), 0.0)
@@ -57,10 +56,10 @@ def _plugin(element: Element, document: Document, emitted: bool) -> Floats:
     inner = {child.name: child for child in element.children}
 
     def number(name: str, default: float) -> float:
-        return floats_of(inner[name], 1)[0] if name in inner else default
+        return inner[name].floats(1)[0] if name in inner else default
 
     def numbers(name: str) -> list[float]:
-        return floats_of(inner[name]) if name in inner else []
+        return inner[name].floats() if name in inner else []
 
     if element.type in ("uniform", "d65"):
         tint = colour_of(inner["color"], document) if "color" in inner else np.ones(3)

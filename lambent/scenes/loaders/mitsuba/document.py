@@ -11,11 +11,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
+import numpy as np
+
+from lambent.core.directions import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.scenes.loaders.scene_files import SceneFiles
 
 LIMIT_BYTES = 256 << 20
 ELEMENTS_MAX, DEPTH_MAX, FILES_MAX, TEXT_MAX = 1_000_000, 64, 64, 1 << 20
+ABSURD = 1e30
 OLD_TAGS = {"camera": "sensor", "luminaire": "emitter", "lookAt": "lookat"}
 _PARAMETER = re.compile(r"\$(\w+)")
 _SCENE = re.compile(rb"(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<scene[\s>/]", re.DOTALL)
@@ -43,6 +47,28 @@ class Element:
     @property
     def type(self) -> str:
         return self.attributes.get("type", "").lower()
+
+    def floats(self, count: int | None = None, attribute: str = "value") -> list[float]:
+        """Finite numbers of an attribute, separated by blanks or commas; as many as `count`, if given."""
+        text = self.attributes.get(attribute, "")
+        try:
+            values = [float(word) for word in text.replace(",", " ").split()]
+        except ValueError as error:
+            raise self.error("not a number", got=text) from error
+        if not all(abs(v) < ABSURD for v in values):
+            raise self.error("not a finite number", got=text)
+        if count is not None and len(values) != count:
+            raise self.error("wrong count of numbers", got=text or "nothing", expected=count)
+        return values
+
+    def vector(self, default: float = 0.0) -> Floats:
+        """(3,) of the attributes x, y, z or of a value, in which one number stands for all three."""
+        if "value" not in self.attributes:
+            return np.array([self.floats(1, c)[0] if c in self.attributes else default for c in "xyz"])
+        values = self.floats()
+        if len(values) not in (1, 3):
+            raise self.error("wrong count of numbers", got=len(values), expected="1 or 3")
+        return np.array(values * 3 if len(values) == 1 else values)
 
     def error(self, message: str, *, got: object = None, expected: object = None, hint: str | None = None) -> UserError:
         what = self.attributes.get("name") or self.attributes.get("id") or self.attributes.get("type") or ""

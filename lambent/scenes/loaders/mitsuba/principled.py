@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.directions import Floats
+from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.mitsuba.textures import LUMINANCE, colour, number
 from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import SpecularLobe, Surface, normal_reflectance
+from lambent.scenes.loaders.surfaces.surface import SpecularLobe, Surface
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, scaled
 
 GREY = 0.5
@@ -31,7 +32,7 @@ def principled(plugin: Plugin, thin: bool = False) -> Surface:
     m = combined(lambda r: np.clip(r, 0, 1) ** 2 / aspect, roughness, notes=notes)
     eta = plugin.number("eta", 0.0)
     specular = plugin.number("specular", 0.5)
-    r0 = normal_reflectance(eta) if eta > 0 else 0.08 * min(max(specular, 0.0), 1.0)
+    r0 = r0_of(eta) if eta > 0 else 0.08 * min(max(specular, 0.0), 1.0)
     plain = np.minimum(r0 * _tint(plugin, base), 1.0)
     through = _share(plugin, "spec_trans")
     surface = metallic_roughness(base, metallic, m, plain, notes, aspect=aspect**2, through=through)

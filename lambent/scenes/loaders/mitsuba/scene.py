@@ -19,13 +19,12 @@ from lambent.core.errors import UserError
 from lambent.scenes.loaders.contents import Contents, unique_name
 from lambent.scenes.loaders.meshes.repair import check_triangles
 from lambent.scenes.loaders.mitsuba import lights
-from lambent.scenes.loaders.mitsuba.bsdfs import grey, is_nothing, surface_of
+from lambent.scenes.loaders.mitsuba.bsdfs import grey, surface_of
 from lambent.scenes.loaders.mitsuba.document import read
-from lambent.scenes.loaders.mitsuba.numbers import floats_of
 from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.loaders.surfaces.surface import MadeMaterials
+from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import Environment, Light, SceneObject
 
 GROUPS = ("shapegroup", "instance", "merge")
@@ -102,7 +101,7 @@ class _Scene:
         for what, words in UNREAD.items():
             if shape.objects(what):
                 self._reading.note(words)
-        if bsdf is not None and is_nothing(bsdf) and not any(emission):
+        if bsdf is not None and bsdf.type == "null" and not any(emission):
             shape.note("left out, it has no surface (null)")
             return
         wanted = stem_of(shape)
@@ -198,7 +197,7 @@ def _up_axis(sensor: Plugin) -> tuple[int, int] | None:
     if element is None:
         return None
     if len(element.children) == 1 and element.children[0].tag == "lookat" and "up" in element.children[0].attributes:
-        up = np.array(floats_of(element.children[0], 3, "up"))
+        up = np.array(element.children[0].floats(3, "up"))
         index = int(np.argmax(np.abs(up)))
         return index, 1 if up[index] >= 0 else -1
     matrix = sensor.transform()

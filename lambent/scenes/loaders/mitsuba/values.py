@@ -14,7 +14,6 @@ from lambent.core.errors import did_you_mean
 from lambent.core.plain import triple
 from lambent.scenes.loaders.mitsuba.colours import colour_of
 from lambent.scenes.loaders.mitsuba.document import Document, Element
-from lambent.scenes.loaders.mitsuba.numbers import floats_of, triple_of
 from lambent.scenes.loaders.surfaces.surface import Surface
 from lambent.scenes.loaders.surfaces.texture_images import TextureImages
 
@@ -125,9 +124,7 @@ class Plugin:
 
     def number(self, name: str, default: float) -> float:
         element = self._take(name)
-        if element is None:
-            return default
-        return floats_of(element, 1)[0]
+        return default if element is None else element.floats(1)[0]
 
     def flag(self, name: str, default: bool) -> bool:
         element = self._take(name)
@@ -141,7 +138,7 @@ class Plugin:
     def vector(self, name: str) -> Floats | None:
         """(3,) of a point or vector, or None."""
         element = self._take(name)
-        return None if element is None else triple_of(element)
+        return None if element is None else element.vector()
 
     def transform(self, name: str = "to_world") -> Floats:
         """(4, 4); the identity if it is not given."""
@@ -188,16 +185,16 @@ def transform_of(element: Element) -> Floats:
 def _part(part: Element) -> Floats:
     matrix: Floats = np.eye(4)
     if part.tag == "translate":
-        matrix[:3, 3] = triple_of(part)
+        matrix[:3, 3] = part.vector()
     elif part.tag == "scale":
-        matrix[:3, :3] = np.diag(triple_of(part, 1.0))
+        matrix[:3, :3] = np.diag(part.vector(1.0))
     elif part.tag == "rotate":
-        axis = triple_of(part)
+        axis = part.vector()
         if not axis.any():
             raise part.error("axis is zero")
-        matrix[:3, :3] = rotation_about(normalize(axis), math.radians(floats_of(part, 1, "angle")[0]))
+        matrix[:3, :3] = rotation_about(normalize(axis), math.radians(part.floats(1, "angle")[0]))
     elif part.tag == "matrix":
-        values = floats_of(part)
+        values = part.floats()
         if len(values) not in (9, 16):
             raise part.error("wrong count of numbers", got=len(values), expected="9 or 16")
         size = 3 if len(values) == 9 else 4
@@ -213,10 +210,10 @@ def _part(part: Element) -> Floats:
 
 def look_at(part: Element) -> Floats:
     """(4, 4) of a camera or object: x to the left, y up, z forward."""
-    origin, target = (triple(floats_of(part, 3, a)) for a in ("origin", "target"))
+    origin, target = (triple(part.floats(3, a)) for a in ("origin", "target"))
     if origin == target:
         raise part.error("origin and target are the same point")
-    up = triple(floats_of(part, 3, "up")) if "up" in part.attributes else (0.0, 1.0, 0.0)
+    up = triple(part.floats(3, "up")) if "up" in part.attributes else (0.0, 1.0, 0.0)
     right, upwards, forward = camera_axes(Camera("", origin, target, up))
     matrix = np.eye(4)
     matrix[:3] = np.stack([-right, upwards, forward, origin], axis=-1)

@@ -18,18 +18,11 @@ from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.core.plain import Triple, is_number
+from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
+from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import (
-    ROUGHNESS_MIN,
-    MadeMaterials,
-    SpecularLobe,
-    Surface,
-    coated,
-    normal_reflectance,
-    rgb,
-    seen_through,
-)
+from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, coated, rgb, seen_through
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, UvTransform
@@ -60,7 +53,6 @@ class Entry:
     """The statements of one material."""
 
     file: Path
-    line: int
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     maps: dict[str, tuple[str, UvTransform, int]] = field(default_factory=dict)  # name, uv transform, line
 
@@ -121,15 +113,14 @@ def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
                 notes.append(f"material {name} is described twice in {path.name}: the last holds")
             if len(entries) > MATERIALS_MAX:
                 raise UserError("too many materials", file=path, got=f"over {MATERIALS_MAX}")
-            entry = entries[name] = Entry(path, number)
+            entry = entries[name] = Entry(path)
         elif entry is None:
             if key in NUMBERS | MAPS:
                 raise UserError("stands before any newmtl", file=path, field=f"line {number}", got=words[0])
         elif key in NUMBERS:
             entry.numbers[key] = _numbers(words, path, number, notes)
         elif key in MAPS:
-            name, layout = _map(line.strip()[len(words[0]) :].strip(), path, number)
-            entry.maps[key] = (name, layout, number)
+            entry.maps[key] = (*_map(line.strip()[len(words[0]) :].strip(), path, number), number)
         elif words[0].lower() not in SILENT and f"statement {words[0]} is not read" not in notes:
             notes.append(f"statement {words[0]} is not read")
     return entries
@@ -209,7 +200,7 @@ class _Reading:
         mirror = int(self._number("illum", 2)) in MIRRORS or not kd.highest.any()
         r0 = np.clip(ks.highest, 0, 1) * (1.0 if mirror else PLASTIC_R0_MAX)
         if not r0.any() or int(self._number("illum", 2)) in (0, 1):
-            return Surface(kd=_at_most_one(kd))
+            return Surface(kd=combined(lambda k: np.clip(k, 0, 1), kd, notes=[]))
         shade = combined(lambda k: k / np.maximum(ks.highest, 1e-6), ks, notes=self._notes)
         m = math.sqrt(2 / (max(self._number("Ns", 10.0), 0.0) + 2))
         below = combined(lambda k: np.clip(k, 0, 1) * (1 - r0), kd, notes=self._notes)
@@ -224,7 +215,7 @@ class _Reading:
 
     def _r0(self) -> float:
         ior = self._number("Ni", 1.5)
-        return normal_reflectance(ior) if ior > 1 else 0.04
+        return r0_of(ior) if ior > 1 else 0.04
 
     def _emission(self) -> Triple:
         ke = np.maximum(self._colour("Ke", 0.0), 0)
@@ -306,10 +297,6 @@ class _Reading:
 
 def _first_channel(image: TextureImage) -> Textured:
     return image.rgb(srgb=False).channel(0)
-
-
-def _at_most_one(kd: Textured) -> Textured:
-    return combined(lambda k: np.clip(k, 0, 1), kd, notes=[])
 
 
 def _looks_like_normals(texels: Floats) -> bool:

@@ -1,4 +1,4 @@
-"""The text of an OBJ file as arrays: whole blocks of lines at a time, never line by line."""
+"""The text of an OBJ file as arrays, parsed in whole blocks of lines."""
 
 from __future__ import annotations
 
@@ -15,29 +15,30 @@ from numpy.typing import NDArray
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.scenes.loaders.meshes.polygons import Ints, ranges
+from lambent.scenes.loaders.meshes.polygons import Ints
 
 LIMIT_BYTES = 4 << 30
 BLOCK_BYTES = 8 << 20
 INDICES_MAX = 240_000_000
 Bytes = NDArray[np.uint8]
 WIDTHS = {"v": 3, "vt": 2, "vn": 3}
-# Slashes per corner, and how many of its pairs are double: which of v, vt, vn the corner names.
-FORMS = {(0, 0): (0,), (1, 0): (0, 1), (2, 1): (0, 2), (2, 0): (0, 1, 2)}
+# Slashes and double slashes of a corner of the form v, v/vt, v//vn, v/vt/vn; the place of each index, -1 for none.
+FORMS = ((0, 0), (1, 0), (2, 1), (2, 0))
+PLACES = np.array([(0, -1, -1), (0, 1, -1), (0, -1, 1), (0, 1, 2)])
 
 
 @dataclass(frozen=True)
 class ObjText:
-    """What an OBJ file says.
+    """The content of an OBJ file.
 
     Attributes
     ----------
     v, vt, vn : (N, 3), (N, 2), (N, 3)
-        As written; absent numbers of vt are 0.
+        As written; missing numbers of vt are 0.
     corners : (C, 3) int64
-        Places in v, vt and vn of every corner of every face, -1 where it names none.
+        Indices from 0 into v, vt and vn of every corner of every face, -1 for none.
     sizes, lines : (F,) int64
-        Corners of each face, and the line of the file it stands on.
+        Number of corners of each face, and its line in the file.
     words : list of (line, keyword, rest)
         Every other line.
     """
@@ -52,7 +53,7 @@ class ObjText:
 
 
 def read(file: Path) -> ObjText:
-    """The text of a file: see `parse`."""
+    """The content of a file: see `parse`."""
     return parse(read_bytes(file, LIMIT_BYTES), file)
 
 
@@ -66,36 +67,31 @@ def parse(data: bytes, file: Path) -> ObjText:
     """
     values: dict[str, list[Floats]] = {kind: [np.zeros((0, width))] for kind, width in WIDTHS.items()}
     counts = dict.fromkeys(WIDTHS, 0)
-    corners, sizes, lines = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    faces = [(np.zeros((0, 3), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64))]
     words: list[tuple[int, str, str]] = []
     total = 0
     for first_line, block in _blocks(data):
         text = _Block(block, first_line, file)
-        seen = {}
+        before = {}
         for kind, width in WIDTHS.items():
             at = text.lines_of(kind)
             values[kind].append(text.numbers(at, kind, width))
-            seen[kind] = counts[kind] + np.searchsorted(at, np.arange(len(text.starts)))
+            before[kind] = counts[kind] + np.searchsorted(at, np.arange(len(text.starts)))
             counts[kind] += len(at)
-        for part in text.faces(seen):
-            corners.append(part[0])
-            sizes.append(part[1])
-            lines.append(part[2])
-            total += len(part[0])
+        faces += text.faces(before)
+        total += len(faces[-1][0])
         if total > INDICES_MAX:
             raise UserError("scene is too large", file=file, got=f"over {INDICES_MAX} corners")
         words += text.words()
-    all_corners = np.concatenate(corners)
-    all_sizes, all_lines = np.concatenate(sizes), np.concatenate(lines)
+    corners, sizes, lines = (np.concatenate(part) for part in zip(*faces, strict=True))
     for column, kind in enumerate(WIDTHS):
-        over = np.flatnonzero(all_corners[:, column] >= counts[kind])
+        over = np.flatnonzero(corners[:, column] >= counts[kind])
         if len(over):
-            line = np.repeat(all_lines, all_sizes)[over[0]]
-            got, most = int(all_corners[over[0], column]) + 1, f"at most {counts[kind]}"
-            raise UserError(f"corner names a {kind} that is not there", file=file, field=f"line {line}", got=got,
-                            expected=most)  # fmt: skip
+            field = f"line {np.repeat(lines, sizes)[over[0]]}"
+            got, most = int(corners[over[0], column]) + 1, f"at most {counts[kind]}"
+            raise UserError(f"corner names a {kind} that is not there", file=file, field=field, got=got, expected=most)
     v, vt, vn = (np.concatenate(values[kind]) for kind in WIDTHS)
-    return ObjText(v, vt, vn, all_corners, all_sizes, all_lines, words)
+    return ObjText(v, vt, vn, corners, sizes, lines, words)
 
 
 def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -116,10 +112,10 @@ def _blocks(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _Block:
-    """A block of lines, and where its lines begin and end."""
+    """A block of lines, and the places where its lines begin and end."""
 
     def __init__(self, block: bytes, first_line: int, file: Path) -> None:
-        if b"\\\n" in block:  # the line numbers stay: an empty line for each that went on
+        if b"\\\n" in block:  # empty lines in place of continued ones keep the line numbers
             block = re.sub(rb"(?:[^\n]*\\\n)+[^\n]*\n?", _joined, block)
         block = block.translate(_BLANKS)
         if block.startswith(b" ") or b"\n " in block:
@@ -142,7 +138,7 @@ class _Block:
         return self._kinds[kind]
 
     def _text(self, lines: Ints, kind: str) -> bytes:
-        """The lines without their keyword and without comments, each ended."""
+        """The lines without keyword and comments, each with its line end."""
         breaks = np.flatnonzero(np.diff(lines) > 1) + 1  # lines of one kind mostly stand together
         first, last = lines[np.concatenate([[0], breaks])], lines[np.concatenate([breaks, [len(lines)]]) - 1]
         whole = self.bytes.data
@@ -151,83 +147,63 @@ class _Block:
         return re.sub(rb"#[^\n]*", b"", text) if b"#" in text else text
 
     def numbers(self, lines: Ints, kind: str, width: int) -> Floats:
-        """(N, width) numbers of lines of one kind; more than `width` on a line are passed over."""
+        """(N, width) numbers of lines of one kind; more than `width` on a line are ignored."""
         if not len(lines):
             return np.zeros((0, width))
         text = self._text(lines, kind)
         per_line = _tokens(text)
-        least = 1 if kind == "vt" else width
-        if (per_line < least).any():
-            raise self._error(f"{kind} with too few numbers", lines[int(np.argmax(per_line < least))])
+        few = per_line < (1 if kind == "vt" else width)
+        if few.any():
+            raise self._error(f"{kind} with too few numbers", lines[int(np.argmax(few))])
         values = self._parsed(text, float, lines)
         if (per_line == width).all():
             return values.reshape(-1, width)
-        starts = np.cumsum(per_line) - per_line
-        held = np.minimum(per_line, width)
-        array = np.zeros((len(lines), width))
-        for i in range(width):
-            with_it = held > i
-            array[with_it, i] = values[starts[with_it] + i]
-        return array
+        index = (np.cumsum(per_line) - per_line)[:, None] + np.arange(width)
+        given = np.arange(width) < per_line[:, None]
+        return np.where(given, values[np.minimum(index, len(values) - 1)], 0.0)
 
-    def faces(self, seen: dict[str, Ints]) -> Iterator[tuple[Ints, Ints, Ints]]:
-        """Corners, sizes and lines of the faces, in the file's order; `seen` counts v, vt and vn before each line."""
+    def faces(self, before: dict[str, Ints]) -> Iterator[tuple[Ints, Ints, Ints]]:
+        """Corners, sizes and lines of the faces; `before` counts v, vt and vn before each line."""
         lines = self.lines_of("f")
         if not len(lines):
             return
         text = self._text(lines, "f")
-        sizes = _tokens(text)
-        form = np.full(len(lines), -1)
-        some = sizes > 0
-        codes = _forms(text)
-        first = (np.cumsum(sizes) - sizes)[some]
-        form[some] = np.minimum.reduceat(codes, first) if some.any() else -1
-        form[some] = np.where(np.maximum.reduceat(codes, first) == form[some], form[some], -1) if some.any() else -1
-        if (form < 0).any():
-            raise self._error("face that cannot be read", lines[int(np.argmax(form < 0))])
-        made = [self._of_form(lines[form == code], FORMS[key], sizes[form == code], seen)
-                for code, key in enumerate(FORMS) if (form == code).any()]  # fmt: skip
-        corners, count, where = (np.concatenate(parts) for parts in zip(*made, strict=True))
-        if len(made) > 1:
-            order = np.argsort(where, kind="stable")
-            starts = (np.cumsum(count) - count)[order]
-            picked = np.repeat(starts, count[order]) + ranges(count[order])
-            corners, count, where = corners[picked], count[order], where[order]
-        yield corners, count, where + self.first_line
-
-    def _of_form(
-        self, lines: Ints, columns: tuple[int, ...], sizes: Ints, seen: dict[str, Ints]
-    ) -> tuple[Ints, Ints, Ints]:
-        text = self._text(lines, "f").replace(b"/", b" ")
+        sizes, form = _tokens(text), _forms(text)
+        face = np.repeat(np.arange(len(lines)), sizes)
+        first = np.minimum(np.cumsum(sizes) - sizes, max(len(form) - 1, 0))
+        bad = sizes == 0
+        bad[face[(form < 0) | (form != form[first[face]])]] = True
+        width = (PLACES[form] >= 0).sum(axis=1)
+        text = text.replace(b"/", b" ")
+        bad |= _tokens(text) != np.bincount(face, width, minlength=len(lines))
+        if bad.any():
+            raise self._error("face that cannot be read", lines[int(np.argmax(bad))])
         values = self._parsed(text, np.int64, lines)
-        if len(values) != len(columns) * int(sizes.sum()):
-            raise self._error("face that cannot be read", lines[0])
-        corners = np.full((int(sizes.sum()), 3), -1, np.int64)
-        kinds = list(WIDTHS)
-        for i, column in enumerate(columns):
-            index = values[i :: len(columns)]
-            before = np.repeat(seen[kinds[column]][lines], sizes)
-            place = np.where(index > 0, index - 1, before + index)
-            bad = (index == 0) | (place < 0)
-            if bad.any():
-                at = int(np.argmax(bad))
-                raise self._error(f"corner names a {kinds[column]} that is not there", np.repeat(lines, sizes)[at],
-                                  int(index[at]))  # fmt: skip
-            corners[:, column] = place
-        return corners, sizes, lines
+        corners = np.full((len(form), 3), -1, np.int64)
+        for column, kind in enumerate(WIDTHS):
+            named = PLACES[form, column] >= 0
+            index = values[(np.cumsum(width) - width + PLACES[form, column])[named]]
+            line = lines[face[named]]
+            place = np.where(index > 0, index - 1, before[kind][line] + index)
+            wrong = (index == 0) | (place < 0)
+            if wrong.any():
+                at = int(np.argmax(wrong))
+                raise self._error(f"corner names a {kind} that is not there", line[at], int(index[at]))
+            corners[named, column] = place
+        yield corners, sizes, lines + self.first_line
 
     def words(self) -> list[tuple[int, str, str]]:
-        """(line, keyword, rest) of every line that is none of these and no comment."""
+        """(line, keyword, rest) of every other line that is no comment."""
         other = np.ones(len(self._head[0]), bool)
         for lines in self._kinds.values():
             other[lines] = False
         other &= (self._head[0] != ord("#")) & (self._head[0] != 10)
-        notes = []
+        found = []
         for i in np.flatnonzero(other):
             line = self.bytes[self.starts[i] : self.ends[i]].tobytes().decode("utf-8", "replace")
             word, _, rest = line.partition(" ")
-            notes.append((int(i) + self.first_line, word, rest.strip()))
-        return notes
+            found.append((int(i) + self.first_line, word, rest.strip()))
+        return found
 
     def _parsed(self, text: bytes, kind: type, lines: Ints) -> np.ndarray[Any, Any]:
         with suppress(ValueError):  # the line is found below
@@ -248,12 +224,12 @@ _BLANKS = bytes(32 if c in b"\t\v\f\0" else c for c in range(256))
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
-    """Lines that go on as one, and as many empty ones as keep the count."""
+    """Continued lines as one, and empty ones that keep the count."""
     return match[0].replace(b"\\\n", b" ").rstrip(b"\n") + b"\n" * match[0].count(b"\n")
 
 
 def _per_line(marks: NDArray[np.bool_], ends: Ints) -> Ints:
-    """How many marks lie on each line, whose ends are given."""
+    """Number of marks on each line; `ends` are the lines' ends."""
     return np.diff(np.searchsorted(np.flatnonzero(marks), ends), prepend=0)
 
 
@@ -270,7 +246,7 @@ def _tokens(text: bytes) -> Ints:
 
 
 def _forms(text: bytes) -> Ints:
-    """The form of each corner, as a place in `FORMS`; -1 where it has none."""
+    """The form of each corner as an index of `FORMS`, -1 if it has none."""
     flat = np.frombuffer(text, np.uint8)
     starts = np.flatnonzero(_begins(flat))
     slash = flat == 47

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.errors import UserError, invalid
 from lambent.core.files import read_bytes
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
@@ -78,17 +78,7 @@ def _parse(path: Path) -> SceneDocument:
     try:
         return SceneDocument.model_validate(data)
     except ValidationError as error:
-        raise _one_line(error, path) from error
-
-
-def _one_line(error: ValidationError, path: Path) -> UserError:
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        return UserError("unknown key", file=path, field=where, hint=did_you_mean(str(first["loc"][-1]), known_keys()))
-    if first["type"] == "missing":
-        return UserError("is missing", file=path, field=where)
-    return UserError(first["msg"].removeprefix("Value error, "), file=path, field=where, got=first["input"])
+        raise invalid(error, path, known_keys()) from error
 
 
 def _geometry(entry: str | GeometrySection, path: Path, files: SceneFiles, read_geometry: ReadGeometry) -> Contents:
