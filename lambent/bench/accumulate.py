@@ -25,7 +25,8 @@ from lambent.core.arrays import Flags, Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import QMC_N, FrameState, Renderer
+from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import CAMERA, unbaked_scene
 
 NAME = "accumulate"

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from lambent.core.progress import Progress
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 
 BY_N = ("rings", "lobe-4.25", "fis")  # split-sum and diffuse do not know n
 

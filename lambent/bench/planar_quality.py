@@ -15,7 +15,8 @@ from lambent.bench.reference import Reference, by_n, mean
 from lambent.core.progress import Progress, part_of, silent
 from lambent.materials.document import Lobe
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 
 NAME = "planar-quality"
 METHODS = {

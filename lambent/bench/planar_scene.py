@@ -17,7 +17,7 @@ from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.frame import FrameState
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
 from lambent.scenes.scene import Mesh, Scene, SceneObject

@@ -15,7 +15,8 @@ from lambent.core.directions import normalize
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.environments import studio
 from lambent.scenes.geometry import grid

@@ -14,7 +14,8 @@ from lambent.bench.planar_quality import lobe_of
 from lambent.core.camera import Camera
 from lambent.core.progress import Progress, silent
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 
 __all__ = ["FULL", "NAME", "QUICK", "run"]
 

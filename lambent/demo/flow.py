@@ -39,7 +39,8 @@ from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.plot import save_plots
 from lambent.materials.measured.gonio_text import write_gonio
 from lambent.realtime.device import adapter_info, open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.render import write_frames
 from lambent.scenes import load_scene
 from lambent.scenes.camera_paths import camera_at

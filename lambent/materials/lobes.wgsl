@@ -19,7 +19,7 @@ const LAMBENT_TRANSMISSION: u32 = 1u;
 const LAMBENT_BECKMANN: u32 = 0u;
 const LAMBENT_GGX: u32 = 1u;
 
-// 48 bytes in a buffer; packed by lambent.materials.shader_layout.
+// Written from LOBE_DTYPE of lambent.materials.shader_layout.
 struct LambentLobe {
     k: vec3f,           // RGB coefficient
     mx: f32,            // slope roughness along t
@@ -63,6 +63,16 @@ fn lambent_distribution(h: vec3f, lobe: LambentLobe) -> f32 {
     return peak * exp(-slope2);
 }
 
+// The unit half vector of slopes along t and b.
+fn lambent_from_slopes(slope: vec2f) -> vec3f {
+    return vec3f(slope, 1.0) * inverseSqrt(dot(slope, slope) + 1.0);
+}
+
+// w mirrored about the unit vector `about`: 2 (w.a) a - w (4.8).
+fn lambent_mirrored(w: vec3f, about: vec3f) -> vec3f {
+    return 2.0 * dot(w, about) * about - w;
+}
+
 // h with density D(h) h.z from u in [0, 1)^2 (4.5, 4.6), in slopes.
 fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
     let u1 = min(u.x, 1.0 - 1e-7);
@@ -72,7 +82,7 @@ fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
     }
     let phi = 2.0 * LAMBENT_PI * u.y;
     let slope = r * vec2f(lobe.mx * cos(phi), lobe.my * sin(phi));
-    return vec3f(slope, 1.0) * inverseSqrt(dot(slope, slope) + 1.0);
+    return lambent_from_slopes(slope);
 }
 
 // Whether the lobe sees this pair: on one side for reflection, on both for transmission, not at the horizon.
@@ -110,10 +120,9 @@ fn lambent_evaluate(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
     return shape.x * lambent_tint(shape.y, lobe);
 }
 
-// wi = 2 (wo.h) h - wo (4.8) for a given half vector on the upper side, mirrored to the far side for transmission.
+// wo mirrored about a half vector of the upper side; for transmission on the far side.
 fn lambent_scattered(wo: vec3f, h: vec3f, lobe: LambentLobe) -> vec3f {
-    let up = lambent_up(wo);
-    let wi = 2.0 * dot(up, h) * h - up;
+    let wi = lambent_mirrored(lambent_up(wo), h);
     let below = (wo.z > 0.0) == (lobe.side == LAMBENT_TRANSMISSION);
     return vec3f(wi.xy, select(wi.z, -wi.z, below));
 }

@@ -1,8 +1,8 @@
-"""Where the progressive mode aims samples: a table of a probe's lamps, which shaders/aim.wgsl draws directions from.
+"""The table of a probe's lamps that the progressive mode aims samples by; shaders/aim.wgsl draws directions from it.
 
-Lamps are what is brighter than the mean of all directions: the rest is left to samples of the lobe, which find it at
-least as well (the density that is best beside another technique; Karlik et al. 2019, "MIS compensation"). Over a
-texel the density is constant in the face's own coordinates, so its solid angle enters exactly.
+Lamps are all texels brighter than the mean of all directions. Samples of the lobe find the rest at least as well: this
+is the best density beside another technique (Karlik et al. 2019, "MIS compensation"). Over a texel the density is
+constant in the face's own coordinates, so its solid angle enters exactly.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lambent.core.cubemap import texel_solid_angles
 from lambent.materials.document import Material
-from lambent.realtime.cube_mips import blurred
+from lambent.realtime.cube_mips import blurred, overlaps
 
 Floats = NDArray[np.floating]
 LEVELS = 6  # at most: 64 texels along a face
@@ -21,7 +21,7 @@ INTERPOLATED = (1 / 8, 6 / 8, 1 / 8)  # mean over a texel of what bilinear look-
 
 
 def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
-    """Probabilities (6, m, m) of a cube map's texels, and the variance of its light that is the lamps'.
+    """Probabilities (6, m, m) of a cube map's texels, and the variance of its light that comes from lamps.
 
     Parameters
     ----------
@@ -37,10 +37,9 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
     m = 1 << min(LEVELS, max(1, n.bit_length() - 1))
     omega = texel_solid_angles(n)
     light = blurred(cube.mean(axis=-1, keepdims=True), INTERPOLATED)[..., 0] * omega
-    edges, texel = np.linspace(0, n, m + 1), np.arange(n)
-    part = np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1)
-    coarse = part @ light @ part.T
-    solid = part @ omega @ part.T
+    share = overlaps(n, m)
+    coarse = share @ light @ share.T
+    solid = share @ omega @ share.T
     total = coarse.sum()
     lamps = np.maximum(coarse - solid * (total / (4 * np.pi)), 0)
     if lamps.sum() <= 1e-6 * total:
@@ -49,21 +48,22 @@ def lamp_probabilities(cube: Floats) -> tuple[Floats, float]:
 
 
 def prominence(variance: float) -> float:
-    """How far samples are worth aiming, 0 to 1: not below a variance of 1, as far as the lobe says above 4."""
+    """How much aiming pays, 0 to 1: not at all up to a variance of 1, as much as the lobe allows from 4 on."""
     return float(np.clip(np.log2(max(variance, 1e-9)) / 2, 0, 1))
 
 
 def aimed_share(roughness: float, prominent: float) -> float:
-    """Share of a lobe's samples that aims, before it is rounded (aimed_share of qmc.wgsl): 0 to 12/16.
+    """Share of a lobe's samples that aim, before rounding (wanted_sixteenths of aim.wgsl): 0 to 12/16.
 
-    `roughness` is sqrt(mx my): at .1 it is a half, 2.5/16 more for each doubling.
+    `roughness` is sqrt(mx my). At .1 and a `prominent` of 1 half of the samples aim, 2.5/16 more for each doubling of
+    the roughness; by experiment (docs/performance.md).
     """
     return float(np.clip(prominent * (8 + 2.5 * np.log2(roughness / 0.1)), 0, 12)) / 16
 
 
-def widest_lobe(material: Material, pictured: bool) -> float:
-    """The largest sqrt(mx my) of a material's lobes; 1 where pictures change them."""
-    return 1.0 if pictured else max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in material.lobes), default=1e-3)
+def widest_lobe(material: Material, textured: bool) -> float:
+    """The largest sqrt(mx my) of a material's lobes; 1 where textures change them."""
+    return 1.0 if textured else max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in material.lobes), default=1e-3)
 
 
 def aim_table(cube: Floats) -> NDArray[np.float32]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
-from lambent.store.contract import LEAN, SIDES, ObjectRecord, SceneRecord, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -53,7 +53,7 @@ class BakedScene:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     noise: Array | None = None  # (H, W), relative standard error of the light map
     noise_back: Array | None = None
-    lean: Array | None = None  # (H, W, 3), where light comes from; may be absent
+    dominant_direction: Array | None = None  # (H, W, 3), that light comes from; may be absent
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -100,23 +100,19 @@ def read_baked(store: Store) -> BakedScene:
         radiance = light(name, "the nearest probe or the environment stands in" if wanted else None)
         if radiance is not None:
             probes[obj.name] = _probe(store, obj.name, radiance)
+    back = "light through two-sided sheets is black" if two_sided else None
     return BakedScene(
         record,
-        store.read("geometry/positions"),
-        store.read("geometry/normals"),
-        store.read("geometry/tangents"),
-        store.read("geometry/uv2"),
-        store.read("geometry/faces"),
-        light("light_map/irradiance", "diffuse light is black"),
-        light("light_map/irradiance_back", "light through two-sided sheets is black" if two_sided else None),
-        light("environment/radiance", None),
-        probes,
-        tuple(missing),
-        uv=store.read("geometry/uv"),
+        **{name: store.read(f"geometry/{name}") for name in ("positions", "normals", "tangents", "uv", "uv2", "faces")},
+        irradiance=light("light_map/irradiance", "diffuse light is black"),
+        irradiance_back=light("light_map/irradiance_back", back),
+        environment=light("environment/radiance", None),
+        probes=probes,
+        missing=tuple(missing),
         textures=read_textures(store, record),
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
-        lean=store.read(LEAN) if LEAN in store else None,
+        dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
     )
 
 

@@ -6,7 +6,7 @@ as much again for each pass; what is outside of the view, or of the band, is lef
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,13 +32,7 @@ class Seen:
         """(first, count) of the runs in a range of faces that begins and ends with objects."""
         low, high = np.searchsorted(self.begin, [first_face, first_face + face_count])
         begin, end = self.begin[low:high].tolist(), self.end[low:high].tolist()
-        runs: list[tuple[int, int]] = []
-        for a, b in zip(begin, end, strict=True):
-            if runs and a - sum(runs[-1]) < MERGED_GAP:
-                runs[-1] = (runs[-1][0], b - runs[-1][0])
-            else:
-                runs.append((a, b - a))
-        return runs
+        return merged(zip(begin, end, strict=True), MERGED_GAP)
 
 
 class Clusters:
@@ -46,19 +40,20 @@ class Clusters:
 
     def __init__(self, positions: Floats, faces: NDArray[np.unsignedinteger], objects: Sequence[ObjectRecord]) -> None:
         """`positions` (V, 3), `faces` (F, 3)."""
-        starts = [np.arange(o.first_face, o.first_face + o.face_count, CLUSTER_FACES) for o in objects]
-        ends = [
-            np.minimum(s + CLUSTER_FACES, o.first_face + o.face_count) for s, o in zip(starts, objects, strict=True)
-        ]
-        self._owner = np.repeat(np.arange(len(objects)), [len(s) for s in starts])
-        self._begin, self._end = (np.concatenate([np.zeros(0, np.int64), *parts]) for parts in (starts, ends))
-        order = np.argsort(self._begin, kind="stable")
-        self._begin, self._end, self._owner = self._begin[order], self._end[order], self._owner[order]
-        corners = np.asarray(positions, np.float64)[faces]
-        low, high = corners.min(axis=1), corners.max(axis=1)  # of the faces
-        # Clusters lie one behind the other, but a record may leave faces out between two objects.
-        self._low = _reduced(np.minimum, low, self._begin, self._end)
-        self._high = _reduced(np.maximum, high, self._begin, self._end)
+        ordered = sorted(objects, key=lambda record: record.first_face)
+        limits = [(o.first_face, o.first_face + o.face_count) for o in ordered]
+        starts = [np.arange(first, end, CLUSTER_FACES) for first, end in limits]
+        ends = [np.minimum(s + CLUSTER_FACES, end) for s, (_, end) in zip(starts, limits, strict=True)]
+        self._owner = np.repeat(np.arange(len(ordered)), [len(s) for s in starts])
+        none = np.zeros(0, np.int64)
+        self._begin, self._end = (np.concatenate([none, *parts]) for parts in (starts, ends))
+        # A record may leave faces out between two objects.
+        owned = np.concatenate([none, *(np.arange(first, end) for first, end in limits)])
+        corners, at = np.asarray(positions, np.float64)[faces[owned]], np.searchsorted(owned, self._begin)
+        self._low, self._high = (
+            reduce.reduceat(extreme, at, axis=0) if len(at) else np.zeros((0, 3))
+            for reduce, extreme in ((np.minimum, corners.min(axis=1)), (np.maximum, corners.max(axis=1)))
+        )
 
     def seen(self, clip_from_world: Floats, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
         """What a camera may see of the scene.
@@ -68,7 +63,7 @@ class Clusters:
         clip_from_world : (4, 4)
             Column vectors, WebGPU's clip space: |x|, |y| <= w, 0 <= z <= w.
         rows : (top, bottom)
-            The band of the picture that is wanted, as shares of its height.
+            The band of the image that is drawn, as shares of its height.
         """
         x, y, z, w = np.asarray(clip_from_world, np.float64)
         top, bottom = (1 - 2 * share for share in rows)
@@ -89,11 +84,12 @@ class Clusters:
         return Seen(self._begin[first], self._end[last])
 
 
-def _reduced(how: np.ufunc, values: Floats, begin: Ints, end: Ints) -> Floats:
-    """`how` over values[begin:end] for each cluster; every cluster has a face."""
-    if not len(begin):
-        return np.zeros((0, 3))
-    limits = np.minimum(np.column_stack([begin, end]).ravel(), len(values) - 1)  # reduceat takes no end
-    found = how.reduceat(values, limits, axis=0)[::2]
-    final = end == len(values)  # there the last face was left to nobody
-    return how(found, np.where(final[:, None], values[-1], found))
+def merged(runs: Iterable[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    """(first, count) of runs [begin, end) in order, those together that are less than `gap` apart."""
+    found: list[tuple[int, int]] = []
+    for begin, end in runs:
+        if found and 0 <= begin - sum(found[-1]) < gap:
+            found[-1] = (found[-1][0], end - found[-1][0])
+        else:
+            found.append((begin, end - begin))
+    return found

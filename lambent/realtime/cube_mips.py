@@ -10,6 +10,8 @@ as much finer: the blur is the same and nearly round. By experiment (docs/perfor
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,12 +32,15 @@ def halved(cube: Floats) -> Floats:
         omega = texel_solid_angles(n)[:, :, None].astype(cube.dtype)
         light = (cube * omega).reshape(6, m, 2, m, 2, -1).sum(axis=(2, 4))
         return np.asarray(light / omega.reshape(m, 2, m, 2, 1).sum(axis=(1, 3)))
-    edges = np.linspace(0, n, m + 1)
-    texel = np.arange(n)
-    share = np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1)
-    omega = texel_solid_angles(n)
+    share, omega = overlaps(n, m), texel_solid_angles(n)
     light = np.einsum("ij,fjkc,lk->filc", share, cube * omega[..., None], share, optimize=True)
     return np.asarray(light / (share @ omega @ share.T)[..., None], dtype=cube.dtype)
+
+
+def overlaps(n: int, m: int) -> Floats:
+    """(m, n) share of each of n texels along a row that lies in each of m."""
+    edges, texel = np.linspace(0, n, m + 1), np.arange(n)
+    return np.asarray(np.clip(np.minimum(edges[1:, None], texel + 1) - np.maximum(edges[:-1, None], texel), 0, 1))
 
 
 def mip_chain(cube: Floats) -> list[Floats]:
@@ -55,8 +60,8 @@ def smooth_chain(cube: Floats) -> list[Floats]:
 def blurred(cube: Floats, kernel: tuple[float, ...] = BLUR) -> Floats:
     """(6, n, n, C) convolved with `kernel` along rows and columns."""
     n, reach = cube.shape[1], len(kernel) // 2
-    wide = _with_border(cube, reach)
-    rows = sum(weight * wide[:, k : k + n] for k, weight in enumerate(kernel))
+    wide: Any = _with_border(cube, reach)
+    rows: Any = sum(weight * wide[:, k : k + n] for k, weight in enumerate(kernel))
     return np.asarray(sum(weight * rows[:, :, k : k + n] for k, weight in enumerate(kernel)), np.float32)
 
 

@@ -1,4 +1,4 @@
-"""The GPU: which adapter, with which limits, and waiting for it."""
+"""The GPU: which adapter, with which limits."""
 
 from __future__ import annotations
 
@@ -115,8 +115,3 @@ def open_device(needs: Mapping[str, int] | None = None, adapter: Any = None) -> 
         limits[name] = max(limits.get(name, 0), value)
     features = [name for name in OPTIONAL_FEATURES if name in adapter.features]
     return adapter.request_device_sync(required_limits=limits, required_features=features)
-
-
-def wait(device: Any, buffer: Any) -> None:
-    """Return when the GPU has done all that was submitted; `buffer` is any readable one of at least 4 bytes."""
-    device.queue.read_buffer(buffer, size=4)

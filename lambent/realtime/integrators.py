@@ -12,11 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.discovery import known
 from lambent.materials.document import Lobe
 from lambent.realtime import patterns
-from lambent.realtime.normalised import normalised_rings_table
-from lambent.realtime.split_sum import TABLE_ROWS, albedo_table
+from lambent.realtime.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
 
 Floats = NDArray[np.floating]
 
@@ -29,18 +28,18 @@ def _no_table(lobe: Lobe, n: int) -> Floats:
 Cube = Literal["smooth", "box", "prefiltered"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Integrator:
     """`table(lobe, n)` gives (rows, 4) float32; `rows` fixes their number where it is not the sample count n."""
 
     shader: str
     table: Callable[[Lobe, int], Floats] = _no_table
-    constants: Mapping[str, int] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
     rows: int | None = None
     cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered
     specular: bool = True
     progressive: bool = False  # unbiased: frames may be averaged, all of the same few samples
-    aimed: bool = False  # part of its samples aims at a probe's lamps where they stand out (constant AIM)
+    aimed: str | None = None  # shader for a probe whose lamps stand out: part of the samples aims at them
 
 
 INTEGRATORS: dict[str, Integrator] = {
@@ -49,7 +48,7 @@ INTEGRATORS: dict[str, Integrator] = {
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
     "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
-    "qmc": Integrator("qmc.wgsl", progressive=True, aimed=True),
+    "qmc": Integrator("qmc.wgsl", progressive=True, aimed="qmc_aimed.wgsl"),
     "qmc-lobe": Integrator("qmc.wgsl", progressive=True),  # no sample aims at lamps
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }
@@ -57,7 +56,4 @@ INTEGRATORS: dict[str, Integrator] = {
 
 def integrator(name: str) -> Integrator:
     """The integrator of that name; `UserError` for an unknown one."""
-    if name not in INTEGRATORS:
-        hint = did_you_mean(name, INTEGRATORS)
-        raise UserError("unknown integrator", got=name, expected=", ".join(INTEGRATORS), hint=hint)
-    return INTEGRATORS[name]
+    return INTEGRATORS[known("integrator", name, INTEGRATORS)]

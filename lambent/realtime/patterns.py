@@ -1,4 +1,4 @@
-"""Where the few samples of a lobe lie: the table that each integrator's shader reads.
+"""The few samples of a lobe: the table that each integrator's shader reads.
 
 A table has one row (x, y, z, w) per sample:
     x, y   slopes of the half vector, h = normalize(x, y, 1)
@@ -24,18 +24,9 @@ from lambent.materials.document import Lobe, Material
 Floats = NDArray[np.floating]
 
 RINGS: dict[int, tuple[int, ...]] = {
-    1: (1,),
-    3: (3,),
-    5: (1, 4),
-    7: (1, 6),
-    9: (2, 7),
-    11: (1, 5, 5),
-    13: (1, 6, 6),
-    15: (1, 7, 7),
-    17: (1, 8, 8),
-    19: (1, 6, 6, 6),
-    40: (1, 13, 13, 13),
-}
+    1: (1,), 3: (3,), 5: (1, 4), 7: (1, 6), 9: (2, 7), 11: (1, 5, 5), 13: (1, 6, 6), 15: (1, 7, 7), 17: (1, 8, 8),
+    19: (1, 6, 6, 6), 40: (1, 13, 13, 13),
+}  # fmt: skip
 N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # of the roughnesses, at n = 7: where rings turn into a line, and how softly
 CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, against 1 on the mean; below 7 samples the latter
@@ -48,7 +39,7 @@ RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
 
 def ring_counts(n: int) -> tuple[int, ...]:
-    """Samples per ring, from the centre: the tested splits, and for other n rings of about seven and a centre."""
+    """Samples per ring, from the centre: tested splits, and for other n a centre and rings of about seven."""
     if n in RINGS:
         return RINGS[n]
     rings = max(1, round((n - 1) / 7))
@@ -58,7 +49,7 @@ def ring_counts(n: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where n samples of a lobe lie.
+    """n samples of a lobe.
 
     slopes (n, 2) in units of (mx, my); factor (n) S of the filters, see `table`; weight (n), of mean 1.
     """
@@ -95,12 +86,12 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
 
 
 def ring_bias(n: int) -> float:
-    """The filters of n samples on rings against filters that cover the lobe; found by looking, per n."""
+    """Factor on the filters of n samples on rings, 1 where they cover the lobe; chosen by eye, per n."""
     return BIAS.get(n, 0.9 if n < MANY else 1.0)
 
 
 def ring_stretch(n: int) -> float:
-    """The radii of n samples' rings against those that have half of a ring's mass inside."""
+    """Factor on the radii of n samples' rings, 1 where half of a ring's mass lies inside."""
     return STRETCH.get(n, 0.93 if n < MANY else 0.97)
 
 
@@ -189,20 +180,23 @@ def rings_table(lobe: Lobe, n: int) -> Floats:
     return table(blended(rings.slopes, line.slopes, lobe), factor, lobe, weight)
 
 
+def lobe_points(n: int, ggx: bool = False) -> Floats:
+    """(n, 2) slopes in units of (mx, my) that follow the lobe: Hammersley's points."""
+    u1, u2 = hammersley(n).T
+    r = radius(u1, ggx)
+    return np.stack([r * np.cos(2 * np.pi * u2), r * np.sin(2 * np.pi * u2)], axis=-1)
+
+
 def fis_table(lobe: Lobe, n: int) -> Floats:
     """Filtered importance sampling (Colbert & Krivanek 2007): Hammersley points, filter 1/(n pdf), no bias."""
     ggx = lobe.distribution == "ggx"
-    u1, u2 = hammersley(n).T
-    r = radius(u1, ggx)
-    slopes = np.stack([r * np.cos(2 * np.pi * u2), r * np.sin(2 * np.pi * u2)], axis=-1)
+    slopes = lobe_points(n, ggx)
     return table(slopes, 1 / relative_density(slopes, ggx), lobe)
 
 
 def lobe_table(lobe: Lobe, n: int) -> Floats:
     """The thesis's pattern: a centre and a ring (or a line) equally spaced in angle within the lobe's border."""
-    return lobe_table_at(
-        lobe, np.concatenate([[[0.0, 0.0]], (1 - RING_XI1) * _circle(n - 1)]) if n > 1 else np.zeros((1, 2))
-    )
+    return lobe_table_at(lobe, np.concatenate([np.zeros((1, 2)), (1 - RING_XI1) * _circle(n - 1)]))
 
 
 def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
@@ -214,9 +208,8 @@ def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
     at_border = np.divide(of_border, share[:, None], out=np.zeros_like(of_border), where=share[:, None] > 0)
     limit = at_border * border(lobe)
     length = np.hypot(limit[:, 0], limit[:, 1])
-    scale = np.divide(
-        np.tan(share * np.arctan(length)), length, out=np.zeros_like(length), where=length > 0
-    )  # slope = tan(theta_h)
+    tangent = np.tan(share * np.arctan(length))  # slope = tan(theta_h)
+    scale = np.divide(tangent, length, out=np.zeros_like(length), where=length > 0)
     slopes = limit * scale[:, None] / [lobe.mx, lobe.my]
     return table(slopes, np.ones(n), lobe, relative_density(slopes, lobe.distribution == "ggx"))
 
@@ -232,7 +225,7 @@ def border(lobe: Lobe) -> Floats:
 
 
 def automatic_n(material: Material, roughness: float = 1.0) -> int:
-    """Samples that a material needs: few for mirrors, more the wider its widest lobe, `roughness` times as wide."""
+    """Samples per lobe that a material needs: the more, the wider its widest lobe; `roughness` is a factor on it."""
     m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
     return next((n for limit, n in steps if m <= limit), 19)

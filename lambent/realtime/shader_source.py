@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 FOLDERS = (Path(__file__).parent / "shaders", Path(__file__).parents[1] / "materials")
 _INCLUDE = re.compile(r'^#include "([\w.-]+)"$', re.MULTILINE)
 
 
-def assemble(*names: str) -> str:
-    """WGSL of the named files and all they include, in order of need.
+def assemble(*names: str, given: Mapping[str, str] | None = None) -> str:
+    """WGSL of the named files and all they include, in order of need; `given` has the text of includes without a file.
 
     Raises
     ------
@@ -19,17 +20,19 @@ def assemble(*names: str) -> str:
     """
     done: dict[str, str] = {}
     for name in names:
-        _add(name, done)
+        _add(name, given or {}, done)
     return "\n".join(done.values())
 
 
-def _add(name: str, done: dict[str, str]) -> None:
+def _add(name: str, given: Mapping[str, str], done: dict[str, str]) -> None:
     if name in done:
         return
-    path = next((folder / name for folder in FOLDERS if (folder / name).is_file()), None)
-    if path is None:
-        raise FileNotFoundError(f"shader {name} is in none of {[str(folder) for folder in FOLDERS]}")
-    text = path.read_text(encoding="utf-8")
+    text = given.get(name)
+    if text is None:
+        path = next((folder / name for folder in FOLDERS if (folder / name).is_file()), None)
+        if path is None:
+            raise FileNotFoundError(f"shader {name} is in none of {[str(folder) for folder in FOLDERS]}")
+        text = path.read_text(encoding="utf-8")
     for inner in _INCLUDE.findall(text):
-        _add(inner, done)
+        _add(inner, given, done)
     done[name] = _INCLUDE.sub("", text)

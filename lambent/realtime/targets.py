@@ -1,23 +1,41 @@
-"""What frames are drawn into, and how long each pass took."""
+"""Textures that frames are drawn into, and the time that each pass took."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
-from lambent.realtime.passes.depth import DEPTH_FORMAT
-from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
+DEPTH_FORMAT, DISPLAY_FORMAT = "depth32float", "rgba8unorm"
 
-_READ = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
-_DRAW = wgpu.TextureUsage.RENDER_ATTACHMENT
+
+def target_texture(device: Any, size: tuple[int, ...], format: str, levels: int = 1) -> Any:
+    """Texture of a size (width, height) or (width, height, layers) that passes draw into and read."""
+    usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
+    return device.create_texture(size=size, format=format, mip_level_count=levels, usage=usage)
+
+
+def pixels(device: Any, texture: Any) -> NDArray[Any]:
+    """(height, width, 3) texels of a texture of four channels, row 0 on top; waits for the GPU."""
+    width, height, _ = texture.size
+    dtype = np.dtype({"rgba8unorm": np.uint8, "rgba16float": np.float16, "rgba32float": np.float32}[texture.format])
+    rows = {"bytes_per_row": 4 * width * dtype.itemsize}
+    data = device.queue.read_texture({"texture": texture}, rows, (width, height, 1))
+    return np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3]
+
+
+def stored(views: Iterable[Any], load_op: str = "clear") -> list[dict[str, Any]]:
+    """Colour attachments of a render pass that keeps what it draws."""
+    return [{"view": view, "load_op": load_op, "store_op": "store"} for view in views]
 
 
 @dataclass(frozen=True)
 class Target:
-    """Depth and radiance of one size."""
+    """Depth (reversed: 0 is infinity) and radiance of one size."""
 
     depth: Any
     radiance: Any
@@ -31,27 +49,26 @@ class Targets:
         self._size: tuple[int, int] = (0, 0)
         self._made: dict[str, Any] = {}
 
-    def fit(self, width: int, height: int, format: str) -> Target:
+    def fit(self, size: tuple[int, int], format: str) -> Target:
         """What light is drawn into; `format` is that of the radiance."""
-        depth = self._texture("depth", width, height, DEPTH_FORMAT, _DRAW)
-        return Target(depth, self._texture(format, width, height, format))
+        return Target(self._texture("depth", size, DEPTH_FORMAT), self._texture(format, size, format))
 
-    def picture(self, name: str, width: int, height: int) -> Any:
-        """An encoded picture that stays here."""
-        return self._texture(name, width, height, DISPLAY_FORMAT)
+    def display(self, name: str, size: tuple[int, int]) -> Any:
+        """A display image that stays here."""
+        return self._texture(name, size, DISPLAY_FORMAT)
 
-    def _texture(self, name: str, width: int, height: int, format: str, usage: int = _DRAW | _READ) -> Any:
-        if self._size != (width, height):
-            self._size, self._made = (width, height), {}
+    def _texture(self, name: str, size: tuple[int, int], format: str) -> Any:
+        if self._size != size:
+            self._size, self._made = size, {}
         if name not in self._made:
-            self._made[name] = self._device.create_texture(size=(width, height, 1), format=format, usage=usage)
+            self._made[name] = target_texture(self._device, size, format)
         return self._made[name]
 
 
 class PassTimer:
     """GPU time per pass by timestamp queries; measures nothing where the adapter has none."""
 
-    PASSES = 512  # timed in one go: mirror pictures have one for each of their levels
+    PASSES = 512  # timed in one go: planar reflection buffers have one for each of their levels
 
     def __init__(self, device: Any) -> None:
         self._device, self._names = device, []  # type: Any, list[str]
@@ -68,13 +85,8 @@ class PassTimer:
             return {}
         at = 2 * len(self._names)
         self._names.append(name)
-        return {
-            "timestamp_writes": {
-                "query_set": self._queries,
-                "beginning_of_pass_write_index": at,
-                "end_of_pass_write_index": at + 1,
-            }
-        }
+        indices = {"beginning_of_pass_write_index": at, "end_of_pass_write_index": at + 1}
+        return {"timestamp_writes": {"query_set": self._queries, **indices}}
 
     def resolve(self, encoder: Any) -> None:
         """Encode the copy of this frame's times, after its last pass."""

@@ -1,9 +1,9 @@
-"""Pictures of materials on the GPU: all MIP levels, made once, of what may be averaged.
+"""Textures of materials on the GPU. MIP levels are means of quantities that may be averaged:
 
 diffuse, specular   bytes, sRGB encoded, times a scale per channel: half a step is less than the eye sees
 roughness           the mean of squares: slopes' variances add
 normal              mean slopes, and twice the variance of the slopes within a texel (0 on level 0), which widens
-                    the lobes: what a texel of bumps reflects is as wide as its bumps lean apart (Olano & Baker
+                    the lobes: a texel of bumps reflects as widely as their slopes differ (Olano & Baker
                     2010, "LEAN mapping", without the covariance)
 direction           cosine and sine of the doubled angle
 opacity             every level has the share of surface that level 0 has (Castano 2010), so that leaves keep
@@ -17,17 +17,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 
-from lambent.core.colour import HALF_MAX, srgb_encode
+from lambent.core.colour import srgb_encode
+from lambent.realtime.uploads import half, upload
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.scenes.textures import CHANNELS, doubled_angle, halved, parts, slopes
 
 Floats = NDArray[np.floating]
-PARTS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
-BITS = {part: 1 << i for i, part in enumerate(PARTS)}
-ROUGH_SHARE = 0.9  # of a picture's texels are at most as rough as what chooses the number of samples
+KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
+BITS = {kind: 1 << i for i, kind in enumerate(KINDS)}
+WIDENING = BITS["roughness"] | BITS["normal"]  # textures that make lobes wider
+ROUGH_SHARE = 0.9  # of a texture's texels are at most as rough as what chooses the number of samples
 ANISOTROPY = 8
 _ALL_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
 
@@ -86,112 +87,86 @@ def encoded(texels: Floats) -> tuple[list[NDArray[np.uint8]], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class Picture:
+class BoundTexture:
     """A texture's view; decoded texels count times `scale`."""
 
     view: Any
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
-class Pictures:
-    """The pictures of a scene, each on the GPU once."""
-
-    def __init__(self, device: Any) -> None:
-        self._device = device
-        self._made: dict[tuple[str, int, float], Picture] = {}
-        self._kept: list[Any] = []  # arrays, so that no other comes to stand at a made one's address
-        white = np.full((1, 1, 4), 255, np.uint8)
-        self.none = Picture(self._uploaded([white], "rgba8unorm"))
-        self.sampler = device.create_sampler(
-            mag_filter="linear", min_filter="linear", mipmap_filter="linear", max_anisotropy=ANISOTROPY,
-            address_mode_u="repeat", address_mode_v="repeat",
-        )  # fmt: skip
-
-    def picture(self, part: str, texture: Texture, cutoff: float) -> Picture:
-        key = (part, id(texture.texels), cutoff if part == "opacity" else 0.0)
-        if key not in self._made:
-            self._kept.append(texture.texels)
-            self._made[key] = self._new(part, texture.texels, cutoff)
-        return self._made[key]
-
-    def _new(self, part: str, texels: Floats, cutoff: float) -> Picture:
-        if part in ("diffuse", "specular"):
-            levels, scale = encoded(texels)
-            return Picture(self._uploaded(levels, "rgba8unorm-srgb"), scale)
-        if part == "normal":
-            return Picture(self._uploaded(_halves(normal_levels(texels)), "rgba16float"))
-        if part == "direction":
-            return Picture(self._uploaded(_halves(chain(doubled_angle(texels))), "rg16float"))
-        if part == "opacity":
-            covered = chain((np.asarray(texels) >= cutoff).astype(np.float32))
-            made = [np.concatenate(both, axis=-1) for both in zip(opacity_levels(texels, cutoff), covered, strict=True)]
-            return Picture(self._uploaded(_halves(made), "rg16float"))
-        return Picture(self._uploaded(_halves(roughness_levels(texels)), "r16float"))
-
-    def _uploaded(self, levels: list[Any], format: str) -> Any:
-        height, width = levels[0].shape[:2]
-        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
-        texture = (
-            self._device.create_texture(
-                size=(width, height, 1), format=format, mip_level_count=max(width, height).bit_length(), usage=usage
-            )
-            if len(levels) > 1
-            else self._device.create_texture(size=(width, height, 1), format=format, usage=usage)
-        )
-        for level, values in enumerate(levels):
-            rows, columns, channels = values.shape
-            self._device.queue.write_texture(
-                {"texture": texture, "mip_level": level},
-                np.ascontiguousarray(values),
-                {"bytes_per_row": columns * channels * values.itemsize, "rows_per_image": rows},
-                (columns, rows, 1),
-            )
-        return texture.create_view()
-
-
-def _halves(levels: list[Floats]) -> list[NDArray[np.float16]]:
-    return [np.clip(level, -HALF_MAX, HALF_MAX).astype(np.float16) for level in levels]
-
-
 @dataclass(frozen=True)
-class MaterialPictures:
-    """What a material's bind group holds, in the order of PARTS, and which of it is more than a stand-in."""
+class BoundTextures:
+    """Textures in a material's bind group, in the order of KINDS; `bits` says which are no stand-ins."""
 
-    pictures: tuple[Picture, ...]
+    textures: tuple[BoundTexture, ...]
     bits: int = 0
     cutoff: float = 0.5
-    lie: NDArray[np.float32] = field(default_factory=lambda: np.zeros((2 * len(PARTS), 4), np.float32))
+    lie: NDArray[np.float32] = field(default_factory=lambda: np.zeros((2 * len(KINDS), 4), np.float32))
     rough: float = 1.0  # factor on the roughness that most of the surface stays below
 
     @property
     def masked(self) -> bool:
         return bool(self.bits & BITS["opacity"])
 
-    def scale(self, part: str) -> tuple[float, ...]:
-        return self.pictures[PARTS.index(part)].scale
+    def scale(self, kind: str) -> tuple[float, ...]:
+        return self.textures[KINDS.index(kind)].scale
 
 
-def material_pictures(pictures: Pictures, textures: MaterialTextures | None) -> MaterialPictures:
-    """The pictures of one material; stand-ins of one texel where it has none."""
-    there = parts(textures) if textures is not None else {}
-    if textures is None or not there:
-        return MaterialPictures((pictures.none,) * len(PARTS))
-    lie = np.zeros((2 * len(PARTS), 4), np.float32)
-    for i, part in enumerate(PARTS):
-        if part in there:
-            lie[2 * i : 2 * i + 2, :3] = there[part].uv_transform
-    rough = float(np.quantile(there["roughness"].texels, ROUGH_SHARE)) if "roughness" in there else 1.0
-    return MaterialPictures(
-        tuple(pictures.picture(p, there[p], textures.cutoff) if p in there else pictures.none for p in PARTS),
-        sum(BITS[part] for part in there),
-        textures.cutoff,
-        lie,
-        rough,
-    )
+class TextureCache:
+    """The textures of a scene, each on the GPU once."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+        self._made: dict[tuple[str, int, float], BoundTexture] = {}
+        self._kept: list[Any] = []  # arrays, so that no other comes to stand at a made one's address
+        self._none = BoundTexture(self._uploaded([np.full((1, 1, 4), 255, np.uint8)], "rgba8unorm"))
+        self.sampler = device.create_sampler(
+            mag_filter="linear", min_filter="linear", mipmap_filter="linear", max_anisotropy=ANISOTROPY,
+            address_mode_u="repeat", address_mode_v="repeat",
+        )  # fmt: skip
+
+    def of_material(self, textures: MaterialTextures | None) -> BoundTextures:
+        """The textures of one material; stand-ins of one texel where it has none."""
+        there = parts(textures) if textures is not None else {}
+        if textures is None or not there:
+            return BoundTextures((self._none,) * len(KINDS))
+        lie = np.zeros((2 * len(KINDS), 4), np.float32)
+        for i, kind in enumerate(KINDS):
+            if kind in there:
+                lie[2 * i : 2 * i + 2, :3] = there[kind].uv_transform
+        rough = float(np.quantile(there["roughness"].texels, ROUGH_SHARE)) if "roughness" in there else 1.0
+        bound = tuple(self._texture(k, there[k], textures.cutoff) if k in there else self._none for k in KINDS)
+        return BoundTextures(bound, sum(BITS[kind] for kind in there), textures.cutoff, lie, rough)
+
+    def _texture(self, kind: str, texture: Texture, cutoff: float) -> BoundTexture:
+        key = (kind, id(texture.texels), cutoff if kind == "opacity" else 0.0)
+        if key not in self._made:
+            self._kept.append(texture.texels)
+            self._made[key] = self._new(kind, texture.texels, cutoff)
+        return self._made[key]
+
+    def _new(self, kind: str, texels: Floats, cutoff: float) -> BoundTexture:
+        if kind in ("diffuse", "specular"):
+            levels, scale = encoded(texels)
+            return BoundTexture(self._uploaded(levels, "rgba8unorm-srgb"), scale)
+        if kind == "normal":
+            made, format = normal_levels(texels), "rgba16float"
+        elif kind == "direction":
+            made, format = chain(doubled_angle(texels)), "rg16float"
+        elif kind == "opacity":
+            covered = chain((np.asarray(texels) >= cutoff).astype(np.float32))
+            made = [np.concatenate(both, axis=-1) for both in zip(opacity_levels(texels, cutoff), covered, strict=True)]
+            format = "rg16float"
+        else:
+            made, format = roughness_levels(texels), "r16float"
+        return BoundTexture(self._uploaded([half(level) for level in made], format))
+
+    def _uploaded(self, levels: list[Any], format: str) -> Any:
+        return upload(self._device, [level[None] for level in levels], format).create_view()
 
 
 def bits_that_show(bits: int, lobes: int, anisotropic: bool) -> int:
-    """The pictures that shading reads: opacity is tested before, and lobes alone read roughness and more."""
+    """Bits of the textures that shading reads: opacity is tested before, and only lobes read roughness and the like."""
     shown = bits & ~BITS["opacity"]
     if not lobes:
         return shown & (BITS["diffuse"] | BITS["normal"])

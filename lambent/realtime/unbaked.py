@@ -1,7 +1,7 @@
-"""Shapes under an environment that are drawn without a bake: for the benches and the preview of a material.
+"""Shapes under an environment, drawn without a bake: for the benches and the preview of a material.
 
-Light comes from afar alone, so one probe serves every shape, and what a point receives depends on its normal alone.
-What the shapes throw at each other, and their shadows, are left out.
+All light comes from afar, so one probe serves every shape, and the irradiance of a point depends on its normal alone.
+Shapes neither shadow nor light each other.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera
-from lambent.core.cubemap import texel_solid_angles
+from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
-from lambent.core.plain import triple
+from lambent.core.plain import Triple, triple
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
-from lambent.store.contract import ObjectRecord, SceneRecord, Triple
+from lambent.store.contract import ObjectRecord, SceneRecord
 
 Floats = NDArray[np.floating]
 
@@ -67,7 +67,7 @@ def unbaked_scene(
 
 
 def with_diffuse_light(scene: BakedScene) -> BakedScene:
-    """The scene with light maps that hold, at every vertex and on both sides, what its environment sends there.
+    """The scene with light maps that hold the irradiance from its environment at every vertex, on both sides.
 
     Triangles no longer share vertices: each has a block of 2 x 2 texels, whose three corners are its vertices and whose
     fourth continues their plane, so that the bilinear look-up is linear over the triangle.
@@ -102,8 +102,6 @@ def with_diffuse_light(scene: BakedScene) -> BakedScene:
 
 def irradiance(environment: Floats, normals: Floats) -> Floats:
     """(V, 3) in W/m^2 at unit normals (V, 3) under an environment (6, N, N, 3); summed over a coarser cube."""
-    from lambent.core.cubemap import face_directions
-
     cube = next(level for level in mip_chain(finite(environment)[0]) if level.shape[1] <= COARSE)
     n = cube.shape[1]
     light = (cube * texel_solid_angles(n)[..., None]).reshape(-1, 3)

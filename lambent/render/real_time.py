@@ -13,9 +13,10 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import SUPERSAMPLES, FrameState, Renderer, quantity_of
+from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.integrators import integrator
-from lambent.realtime.mirror_integrators import check_planar
+from lambent.realtime.planar_integrators import check_planar
+from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.render.images import NOISE, Images, Settings
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store

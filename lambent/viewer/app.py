@@ -14,7 +14,7 @@ import wgpu
 from lambent.core.errors import UserError
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import Renderer
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.store.store import Store
 from lambent.viewer.comparison import Comparison

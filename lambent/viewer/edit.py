@@ -10,7 +10,7 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.materials.document import Material, load_material
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import LIGHT_MAP_NOISE
+from lambent.realtime.frame_state import LIGHT_MAP_NOISE
 from lambent.scenes.geometry import sphere
 from lambent.viewer.app import Window, check_display
 from lambent.viewer.editor.documents import kind_of

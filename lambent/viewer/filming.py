@@ -12,7 +12,8 @@ from lambent.core.camera import CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import check_place
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted, sequence_file
-from lambent.realtime.frame import QMC_N, FrameState, Renderer
+from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.scenes.camera_paths import camera_at
 from lambent.viewer.picture import scaled
 

@@ -19,14 +19,15 @@ from lambent.core.false_colour import Range, with_scale
 from lambent.core.images import write_image
 from lambent.materials.document import Material
 from lambent.realtime.device import adapter_info
-from lambent.realtime.frame import QMC_N, SHOW, FrameState, Renderer, quantity_of
+from lambent.realtime.frame_state import QMC_N, SHOW, VIEW_TRANSFORMS, FrameState, quantity_of
+from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.mirror_integrators import CHOICES as PLANAR_WAYS
-from lambent.realtime.mirror_integrators import OFF
-from lambent.realtime.parts import PART_S, Cut
-from lambent.realtime.passes.tonemap import DISPLAY_FORMAT, VIEW_TRANSFORMS
 from lambent.realtime.patterns import RINGS
-from lambent.realtime.resources import LOOKUPS
+from lambent.realtime.planar_integrators import CHOICES as PLANAR_WAYS
+from lambent.realtime.planar_integrators import OFF
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.slices import SLICE_S, Cut
+from lambent.realtime.targets import DISPLAY_FORMAT
 from lambent.viewer.input import Rect
 from lambent.viewer.pacing import Pacer, Plan, prior_share
 from lambent.viewer.quantity import is_false_coloured, shown_scale
@@ -36,7 +37,7 @@ CHOICES = Choices(
     integrators=tuple(name for name, how in INTEGRATORS.items() if how.specular),
     view_transforms=tuple(reversed(VIEW_TRANSFORMS)),
     shows=tuple(SHOW),
-    lookups=("auto", *LOOKUPS),
+    lookups=(AUTO, *look_ups()),
     sample_counts=tuple(n for n in RINGS if n <= 19),
     planars=PLANAR_WAYS,
 )
@@ -124,8 +125,8 @@ class Picture:
             return
         frame = self._planned(wanted, plan)
         view = self._view_of(frame.width, frame.height)
-        if rests and self._whole_s > PART_S:
-            self._under_way = Job(frame, plan, view, self._renderer.parts(frame, view, self._cut))
+        if rests and self._whole_s > SLICE_S:
+            self._under_way = Job(frame, plan, view, self._renderer.slices(frame, view, self._cut))
             return
         started = time.perf_counter()
         radiance = self._renderer.draw(frame, view)
@@ -150,7 +151,7 @@ class Picture:
     def work(self, state: ViewerState) -> bool:
         """Draw a part of the frame under way; whether there is a new picture to show.
 
-        Parts take about `parts.PART_S`, so that events are answered in between. What was drawn before stays in `view`
+        Slices take about `slices.SLICE_S`, so that events are answered in between. The last frame stays in `view`
         until the frame is whole.
         """
         job = self._under_way

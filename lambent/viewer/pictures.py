@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.core.images import write_shown
-from lambent.realtime.frame import Renderer
-from lambent.realtime.passes.tonemap import FALSE_COLOUR
+from lambent.realtime.frame_state import FALSE_COLOUR
+from lambent.realtime.renderer import Renderer
 from lambent.viewer.comparison import REFERENCE, Errors
 from lambent.viewer.filming import QUALITIES, SIZES, Filming, FilmOptions, film_file
 from lambent.viewer.input import Rect

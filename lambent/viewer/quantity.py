@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from lambent.core.false_colour import Range
 from lambent.core.photometry import Quantity
-from lambent.realtime.frame import LIGHT_MAP_NOISE, quantity_of
-from lambent.realtime.passes.tonemap import FALSE_COLOUR
+from lambent.realtime.frame_state import FALSE_COLOUR, LIGHT_MAP_NOISE, quantity_of
 
 if TYPE_CHECKING:
     from lambent.viewer.state import ViewerState

@@ -181,7 +181,8 @@ def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> No
     from lambent.bake.bake import bake
     from lambent.bake.reference import render_reference
     from lambent.realtime.device import open_device
-    from lambent.realtime.frame import FrameState, Renderer
+    from lambent.realtime.frame_state import FrameState
+    from lambent.realtime.renderer import Renderer
 
     bumps = np.zeros((2, 2, 3), np.float16)
     bumps[..., 2], bumps[:, 0, 0], bumps[:, 1, 0] = 1, -0.5, 0.5

@@ -11,7 +11,7 @@ from lambent.bench import planar_quality, planar_scene, walk_planar
 from lambent.bench.planar_scene import floor_state
 from lambent.core import metrics
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import Renderer
+from lambent.realtime.renderer import Renderer
 
 
 def test_ray_casting_and_a_sharp_mirror_agree() -> None:

@@ -17,7 +17,8 @@ from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import CAMERA, unbaked_scene
 from lambent.scenes.environments import dusk, from_lat_long, night, studio
 from lambent.scenes.geometry import sphere

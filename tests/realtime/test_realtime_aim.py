@@ -15,9 +15,12 @@ from lambent.core.cubemap import sample as sample_cube
 from lambent.core.directions import normalize
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.aim import aim_table, lamp_probabilities, prominence
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.aim import aim_table, aimed_share, lamp_probabilities, prominence
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.incident import look_ups, shader_of
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.shader_source import assemble
+from lambent.realtime.targets import pixels
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
 N = 8  # texels of the table that the shader's functions are tried with
@@ -42,13 +45,19 @@ def spotted(seed: int = 5) -> np.ndarray:
 def evaluate(
     expression: str, cube: np.ndarray, planes: np.ndarray, components: int = 1, **inputs: np.ndarray
 ) -> np.ndarray:
-    """Of aim.wgsl, with a table and planes of its own."""
-    source = assemble("aim.wgsl").replace("@group(2) @binding(4) var<storage, read> aim: array<vec4f>;", "")
+    """Of aim.wgsl and the look-up by planes, with tables of their own."""
+    given = {"look_up.wgsl": shader_of(look_ups()["planes"])}
+    source = assemble("aim.wgsl", "incident.wgsl", "look_up.wgsl", given=given)
+    for binding in (
+        "@group(2) @binding(2) var<storage, read> aim: array<vec4f>;",
+        "@group(2) @binding(3) var<storage, read> planes: array<vec4f>;",
+    ):
+        assert binding in source
+        source = source.replace(binding, "")
+    source = source.replace("override PLANES: u32 = 0u;", f"const PLANES = {len(planes)}u;")
     declarations = (
-        f"const PLANES = {len(planes)}u;\nconst LOOKUP = 1u;\nconst PLANE_ACTIVE_M = 1e-6;\n"
-        "fn max_norm(v: vec3f) -> f32 { let a = abs(v); return max(a.x, max(a.y, a.z)); }\n"
         "fn density_at(x: vec3f, w: vec3f) -> f32 {\n"
-        "    let found = aimed_lookup(x, w);\n    return aim_probability(found.direction) * found.density;\n}\n"
+        "    let found = aimed_look_up(x, w);\n    return aim_probability(found.direction) * found.density;\n}\n"
     )
     # both tables are named, so that an expression which needs one only has the bindings of both
     used = f"{expression} + 0.0 * (aim[0] + planes[0])" + (".x" if components == 1 else ".xyz")
@@ -139,7 +148,7 @@ def test_directions_are_drawn_with_that_probability() -> None:
 def test_a_direction_that_aims_leads_back_to_what_it_aims_at() -> None:
     q = normalize(np.random.default_rng(4).normal(size=(5000, 3)))
     x = np.random.default_rng(5).uniform(0.98 * BOX[0], 0.98 * BOX[1], q.shape)
-    back = evaluate("aimed_lookup(x, aim_towards(x, q).w).direction", spotted(), PLANES, 3, x=x, q=q)
+    back = evaluate("aimed_look_up(x, aim_towards(x, q).w).direction", spotted(), PLANES, 3, x=x, q=q)
     np.testing.assert_allclose(normalize(back), q, atol=2e-5)
 
 
@@ -147,6 +156,14 @@ def test_nothing_aims_where_the_probe_stands_behind_a_plane() -> None:
     outside = np.array([[0.0, 0.0, 1.0, -0.5]])  # z > .5
     x = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.2]])
     np.testing.assert_array_equal(evaluate("f32(aim_maps(x))", spotted(), outside, x=x), [0, 1])
+
+
+def test_numpy_and_the_shader_aim_as_many_samples() -> None:
+    p, roughness = np.meshgrid(np.linspace(0, 1, 9), np.geomspace(0.005, 1.0, 25))
+    got = evaluate("wanted_sixteenths(p, m * m)", spotted(), PLANES[:0], p=p.ravel(), m=roughness.ravel())
+    expected = [16 * aimed_share(m, prominent) for prominent, m in zip(p.ravel(), roughness.ravel(), strict=True)]
+    np.testing.assert_allclose(got, expected, atol=1e-4)
+    assert min(expected) == 0 and max(expected) == 12
 
 
 def one_lamp(face: int) -> np.ndarray:
@@ -208,7 +225,7 @@ def test_one_small_lamp_in_the_dark(device, lobe: Lobe, boxed: bool) -> None:
     alone = replace(state, integrator="qmc-lobe")
     for index in range(64):
         left = renderer.draw(replace(alone, accumulate=index))
-    blind = renderer._read(left, alone)
+    blind = pixels(device, left)
     assert np.abs(blind / expected - 1).mean() > 10 * np.abs(error).mean()
 
 

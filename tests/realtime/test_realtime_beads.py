@@ -10,9 +10,10 @@ from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.integrators import INTEGRATORS, Integrator
 from lambent.realtime.patterns import rings_table
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import unbaked_scene as baked_scene
 from lambent.scenes.geometry import sphere
 

@@ -12,7 +12,8 @@ from conftest import wall_scene
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.device import WEBGPU_LIMITS, adapter_info, choose_adapter, open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer, Targets
@@ -78,12 +79,12 @@ def test_includes_come_once_and_in_order(tmp_path, monkeypatch: pytest.MonkeyPat
 
 
 def test_more_passes_than_the_timer_holds_are_drawn_untimed(device) -> None:
-    """A frame with many mirror pictures has hundreds of passes."""
+    """A frame with many planar reflection buffers has hundreds of passes."""
     timer = PassTimer(device)
-    picture = Targets(device).picture("display", 4, 4)
+    image = Targets(device).display("display", (4, 4))
     encoder = device.create_command_encoder()
     for _ in range(PassTimer.PASSES + 3):
-        target = {"view": picture.create_view(), "load_op": "clear", "store_op": "store"}
+        target = {"view": image.create_view(), "load_op": "clear", "store_op": "store"}
         encoder.begin_render_pass(color_attachments=[target], **timer.writes("many")).end()
     timer.resolve(encoder)
     device.queue.submit([encoder.finish()])

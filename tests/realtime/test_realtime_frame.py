@@ -1,4 +1,4 @@
-"""Pictures: the right way round, the right side, the right colour."""
+"""Frames: the right way round, the right side, the right colour."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from lambent.core.errors import UserError
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import CAMERA
 from lambent.realtime.unbaked import unbaked_scene as baked_scene
 from lambent.scenes.environments import studio
@@ -47,7 +48,7 @@ def test_plus_x_is_right_and_plus_y_is_up(device) -> None:
 
 
 def test_field_of_view_is_vertical_and_whole(device) -> None:
-    """A square of half size tan(fov/2) times the distance fills the height, and half of a picture twice as wide."""
+    """A square of half size tan(fov/2) times the distance fills the height, and half of an image twice as wide."""
     half = 2 * np.tan(np.radians(30))
     mesh = patch((-half, -half, 0), (2 * half, 0, 0), (0, 2 * half, 0))
     scene = baked_scene({"m": mesh}, PAPER, np.zeros((6, 2, 2, 3)), irradiance=(1, 1, 1))
@@ -309,7 +310,7 @@ def test_impossible_frames_are_refused(device, change: dict[str, object]) -> Non
         renderer.image(replace(FrameState(FORWARD, 8, 8), **change))
 
 
-def test_a_series_begins_from_the_picture_of_few_samples(device) -> None:
+def test_a_series_begins_from_the_frame_of_few_samples(device) -> None:
     """Shown is the mean of the progressive series beside what was shown before, by the share that the state says."""
     gloss = Material(name="m", lobes=(Lobe(mx=0.25, my=0.25, r0=1.0),))
     renderer = Renderer(device, baked_scene(sphere_and_torus(), gloss, studio(32)))

@@ -12,8 +12,9 @@ from lambent.core.camera import Camera, pixel_rays
 from lambent.core.cubemap import sample as sample_cube
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.frame import FrameState, Renderer
-from lambent.realtime.split_sum import albedo_table
+from lambent.realtime.albedo import albedo_table
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 
 STATE = FrameState(OBLIQUE, 8, 8, antialias=False, show="specular", lookup="plain")
 # m -> mean white-furnace error of rings, n = 7, relative

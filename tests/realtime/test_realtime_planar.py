@@ -1,4 +1,4 @@
-"""Planar reflectors: the mirror picture is the scene from the mirrored camera, and what is made of it is right."""
+"""Planar reflectors: the buffer holds the scene from the mirrored camera, and its light is right."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.frame import FrameState, Renderer
-from lambent.realtime.frame_data import FRAME_DTYPE
-from lambent.realtime.mirror import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, mirror_views
-from lambent.realtime.mirror_integrators import interleaved_table, multi_ring_table
-from lambent.realtime.passes.near import FIRST_PX
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.patterns import radius
-from lambent.realtime.shader_source import assemble
+from lambent.realtime.planar_integrators import interleaved_table, multi_ring_table
+from lambent.realtime.planar_view import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, planar_views
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.structs import FRAME_DTYPE
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.floor_plan import floor_plan
 from lambent.scenes.geometry import box, patch, placed, sphere
@@ -33,7 +32,7 @@ FLOOR = ReflectorRecord(
     parts=(ReflectorPart(object="floor", faces=(0, 1), area_m2=36),),
 )
 WIDTH, HEIGHT = 96, 64
-WAYS = (("rings", "interleaved"), ("rings", "marched"), ("rings", "fixed"), ("lobe-4.25", "thesis"))
+METHODS = (("rings", "interleaved"), ("rings", "marched"), ("rings", "fixed"), ("lobe-4.25", "thesis"))
 
 
 def mirror(m: float, **more: Any) -> Material:
@@ -87,11 +86,13 @@ def seen_below(device: Any) -> np.ndarray:
     return Renderer(device, scene_of(mirror(0.001), floor=False)).image(replace(state(), camera=below))[:, ::-1]
 
 
-@pytest.mark.parametrize("way", ["interleaved", "fixed", "thesis"])
-def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(device: Any, seen_below: np.ndarray, way: str) -> None:
+@pytest.mark.parametrize("method", ["interleaved", "fixed", "thesis"])
+def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(
+    device: Any, seen_below: np.ndarray, method: str
+) -> None:
     renderer = Renderer(device, scene_of(mirror(0.001)))
-    integrator = "lobe-4.25" if way == "thesis" else "rings"
-    image = renderer.image(state(n=3, integrator=integrator, planar=way))
+    integrator = "lobe-4.25" if method == "thesis" else "rings"
+    image = renderer.image(state(n=3, integrator=integrator, planar=method))
     floor = renderer.image(state(planar="off"))[..., 2] == 0  # the dark probe
     assert 0.2 < floor.mean() < 0.9
     difference = np.abs(image - seen_below).max(axis=-1)[floor]
@@ -112,27 +113,27 @@ def test_what_stands_on_the_floor_meets_its_reflection(device: Any) -> None:
 
 
 @pytest.mark.parametrize("m", [0.03, 0.1])
-def test_few_samples_come_near_the_converged_picture(device: Any, m: float) -> None:
+def test_few_samples_come_near_the_converged_image(device: Any, m: float) -> None:
     renderer = Renderer(device, scene_of(mirror(m)))
     converged = renderer.converged(state(show="specular"), 256)
     error = {}
-    for integrator, way in WAYS:
-        image = renderer.image(state(n=7, integrator=integrator, planar=way, show="specular"))
-        error[way] = float(np.sqrt(np.mean((image - converged) ** 2)))
+    for integrator, method in METHODS:
+        image = renderer.image(state(n=7, integrator=integrator, planar=method, show="specular"))
+        error[method] = float(np.sqrt(np.mean((image - converged) ** 2)))
     assert error["marched"] < error["interleaved"] < error["thesis"]
     assert error["fixed"] < error["thesis"]
     assert error["interleaved"] < 0.1 * converged.mean() + 0.05
 
 
 def test_uniform_light_stays_uniform(device: Any) -> None:
-    """White furnace: under one radiance everywhere, a floor with albedo 1 shows it, whatever the way."""
+    """White furnace: under one radiance everywhere, a floor with albedo 1 shows it, whatever the method."""
     scene = scene_of(mirror(0.05))
     record = scene.record.model_copy(update={"objects": scene.record.objects[-1:]})
     sky = np.ones((6, 4, 4, 3), np.float32)
     scene = replace(scene, record=record, environment=sky, probes={"floor": Probe((0, 0, 0), sky)})
     renderer = Renderer(device, scene)
-    for integrator, way in WAYS:
-        image = renderer.image(state(n=7, integrator=integrator, planar=way))
+    for integrator, method in METHODS:
+        image = renderer.image(state(n=7, integrator=integrator, planar=method))
         np.testing.assert_allclose(image[HEIGHT // 2 :], 1.0, rtol=0.03)
 
 
@@ -189,7 +190,7 @@ def test_only_reflectors_in_view_cost_a_mirror(device: Any) -> None:
 
 
 def test_mirror_view_projects_and_clips() -> None:
-    (view,) = mirror_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4)
+    (view,) = planar_views(frame_of(CAMERA), [FLOOR], WIDTH, HEIGHT, 4)
     clip = view.frame["clip_from_world"].T.astype(float)
     eye = view.frame["eye"][:3].astype(float)
     np.testing.assert_allclose(eye, (0.4, -1.3, 3.0), atol=1e-6)
@@ -212,11 +213,7 @@ def test_mirror_view_projects_and_clips() -> None:
         assert below[2] > below[3]  # before the near plane
 
 
-def test_cells_of_a_mirror_picture_have_one_size() -> None:
-    assert f"const NEAR_PX = {FIRST_PX};" in assemble("planar_mirror.wgsl")
-
-
-def test_covered_share_of_a_square_that_fills_half_the_picture() -> None:
+def test_covered_share_of_a_square_that_fills_half_the_frame() -> None:
     camera = Camera(name="c", position=(0, 0, 1), target=(0, 0, 0), fov_y_deg=90)
     aspect = WIDTH / HEIGHT
     square = np.array([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], float)
@@ -238,11 +235,11 @@ def test_spirals_of_a_tile_share_the_lobe_evenly() -> None:
         assert np.abs(slopes[first::4].mean(axis=(0, 1))).max() < 0.05
 
 
-def test_wide_lobes_have_a_wider_mirror_picture() -> None:
+def test_wide_lobes_have_a_wider_buffer() -> None:
     width, height = 640, 480
     frame, sizes = frame_of(CAMERA, width, height), []
     for m in (0.01, 0.05, 0.1, 0.4):
-        (view,) = mirror_views(frame, [FLOOR], width, height, 4, {"floor": m})
+        (view,) = planar_views(frame, [FLOOR], width, height, 4, {"floor": m})
         sizes.append(view.size)
         at, wide = view.uniform["offset"], np.array(view.size)
         assert np.all(at >= MARGIN_PX)

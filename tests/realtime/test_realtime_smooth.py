@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import wgpu
 
-from lambent.realtime.parts import Whole
+from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.smooth import SmoothPass
-from lambent.realtime.passes.tonemap import DISPLAY_FORMAT
-from lambent.realtime.resources import Layouts
-from lambent.realtime.targets import PassTimer
+from lambent.realtime.pipelines import cover
+from lambent.realtime.slices import Whole
+from lambent.realtime.targets import DISPLAY_FORMAT
 
 SIZE = 64
 
@@ -21,7 +22,7 @@ SIZE = 64
 def smoothed(device) -> Any:
     """Function that sends grey values (SIZE, SIZE) in [0, 1] through the pass."""
     sampler = device.create_sampler(mag_filter="linear", min_filter="linear")
-    smooth = SmoothPass(device, Layouts(device), sampler)
+    smooth = SmoothPass(Layouts(device))
     use = wgpu.TextureUsage
     size = (SIZE, SIZE, 1)
     given = device.create_texture(size=size, format=DISPLAY_FORMAT, usage=use.TEXTURE_BINDING | use.COPY_DST)
@@ -32,7 +33,12 @@ def smoothed(device) -> Any:
         pixels = np.repeat(np.round(grey * 255).astype(np.uint8)[..., None], 4, axis=-1)
         device.queue.write_texture({"texture": given}, np.ascontiguousarray(pixels), rows, size)
         part = Whole(device.create_command_encoder())
-        for _ in smooth.encode(part, given, target.create_view(), PassTimer(device)):
+        context = SimpleNamespace(
+            part=part, unsmoothed=given, shown=target.create_view(),
+            state=SimpleNamespace(size=(SIZE, SIZE)), resources=SimpleNamespace(sampler=sampler),
+            cover=lambda name, views, pipeline, groups, band: cover(part.encoder, views, pipeline, groups, {}, band),
+        )  # fmt: skip
+        for _ in smooth.encode(context):
             pass
         device.queue.submit([part.encoder.finish()])
         read = np.frombuffer(device.queue.read_texture({"texture": target}, rows, size), np.uint8)
@@ -52,8 +58,8 @@ def test_what_needs_no_blending_stays(smoothed) -> None:
     edge = np.zeros((SIZE, SIZE))
     edge[:, 29:] = 0.8
     ramp = np.tile(np.arange(SIZE) / 255, (SIZE, 1))
-    for picture in (np.full((SIZE, SIZE), 0.4), edge, edge.T, ramp):
-        np.testing.assert_allclose(smoothed(picture), picture, atol=0.5 / 255)
+    for image in (np.full((SIZE, SIZE), 0.4), edge, edge.T, ramp):
+        np.testing.assert_allclose(smoothed(image), image, atol=0.5 / 255)
 
 
 @pytest.mark.parametrize(("slope", "left"), [(0.1, 0.5), (0.3, 0.5), (-0.45, 0.5), (0.7, 0.55), (1.0, 0.9)])

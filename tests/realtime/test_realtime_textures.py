@@ -1,4 +1,4 @@
-"""Pictures on surfaces: MIP chains that keep what they should, the right way round, and as the path tracer has them."""
+"""Textures on surfaces: MIP chains that keep what they should, the right way round, and as the path tracer has them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from lambent.core.camera import Camera
 from lambent.core.colour import srgb_decode
 from lambent.materials.document import Lobe, Material
 from lambent.realtime import textures as on_gpu
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.draws import draws_of
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
@@ -26,16 +28,16 @@ SQUARE = patch((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
 DARK = np.zeros((6, 2, 2, 3), np.float32)
 
 
-def picture(values: np.ndarray) -> Texture:
+def texture(values: np.ndarray) -> Texture:
     return Texture(np.asarray(values, np.float16))
 
 
 def constant(*values: float) -> Texture:
-    return picture(np.array(values)[None, None])
+    return texture(np.array(values)[None, None])
 
 
 def square(material: Material, textures: MaterialTextures, environment=DARK, light=(np.pi,) * 3):
-    """A square of 1 m that faces +z and fills FRONT's picture; uv runs with x and y."""
+    """A square of 1 m that faces +z and fills FRONT's image; uv runs with x and y."""
     scene = unbaked_scene({"o": SQUARE}, material, environment, irradiance=light)
     return replace(scene, textures={material.name: textures})
 
@@ -83,10 +85,10 @@ def test_opposite_directions_brush_alike() -> None:
 
 
 @pytest.mark.parametrize("part", ["diffuse", "opacity"])
-def test_pictures_are_drawn_unmirrored_and_upright(device, part: str) -> None:
+def test_textures_are_drawn_unmirrored_and_upright(device, part: str) -> None:
     texels = LETTER.repeat(8, 0).repeat(8, 1)[..., None]
     texels = texels.repeat(3, axis=2) if part == "diffuse" else texels
-    scene = square(Material(name="m", kd=1.0), MaterialTextures(**{part: picture(texels)}))
+    scene = square(Material(name="m", kd=1.0), MaterialTextures(**{part: texture(texels)}))
     image = Renderer(device, scene).image(FrameState(FRONT, 80, 80))
     np.testing.assert_allclose(image[8::16, 10::20, 0], LETTER, atol=0.02)
 
@@ -94,7 +96,7 @@ def test_pictures_are_drawn_unmirrored_and_upright(device, part: str) -> None:
 def test_a_uv_transform_repeats_and_shifts(device) -> None:
     texels = np.zeros((16, 16, 3))
     texels[8:, :8] = 1  # lower left
-    lies = replace(picture(texels), uv_transform=((2.0, 0.0, 0.0), (0.0, 1.0, 0.5)))
+    lies = replace(texture(texels), uv_transform=((2.0, 0.0, 0.0), (0.0, 1.0, 0.5)))
     image = Renderer(device, square(Material(name="m", kd=1.0), MaterialTextures(diffuse=lies))).image(
         FrameState(FRONT, 64, 64)
     )
@@ -110,7 +112,7 @@ def test_what_is_behind_a_hole_is_seen(device) -> None:
 
 
 def shown(renderer: Renderer, size: int, **how) -> np.ndarray:
-    """Light of a picture as it is shown in motion, without a view transform: (size, size)."""
+    """Light of an image as it is shown in motion, without a view transform: (size, size)."""
     frame = FrameState(FRONT, size, size, view_transform="linear", **how)
     return srgb_decode(renderer.display_image(frame)[..., 0].astype(np.float32) / 255)
 
@@ -118,7 +120,7 @@ def shown(renderer: Renderer, size: int, **how) -> np.ndarray:
 def test_edges_of_a_mask_are_as_wide_as_a_pixel_in_motion(device) -> None:
     """Texels of 8 pixels, the mask's edge a quarter into a pixel: the mean of light and dark by what is covered."""
     opaque = (np.arange(8) < 4).astype(np.float16) * np.ones((8, 1))
-    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque[..., None])))
+    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=texture(opaque[..., None])))
     moved = replace(scene, positions=scene.positions + np.float32([0.25 / 64, 0, 0]))
     middle = shown(Renderer(device, moved), 64)[32, 8:56]
     expected = 0.8 * (np.arange(48) < 24)
@@ -129,7 +131,7 @@ def test_edges_of_a_mask_are_as_wide_as_a_pixel_in_motion(device) -> None:
 def test_small_holes_become_a_mean_in_motion(device) -> None:
     """Of texels far smaller than pixels a third are holes: two thirds of the light at each size."""
     opaque = (np.arange(768) % 3 < 2) * np.ones((768, 1))
-    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque[..., None])))
+    scene = square(Material(name="m", kd=0.8), MaterialTextures(opacity=texture(opaque[..., None])))
     renderer = Renderer(device, scene)
     for size in (16, 50, 96):
         inside = shown(renderer, size)[2:-2, 2:-2]
@@ -140,7 +142,7 @@ def test_small_holes_become_a_mean_in_motion(device) -> None:
 def test_no_pixel_of_a_masked_surface_is_lost_in_motion(device) -> None:
     """What is covered in part and what is covered whole make up what the test alone finds."""
     opaque = np.random.default_rng(5).random((8, 8, 1)).astype(np.float16)
-    masked = Renderer(device, square(Material(name="m", kd=0.8), MaterialTextures(opacity=picture(opaque))))
+    masked = Renderer(device, square(Material(name="m", kd=0.8), MaterialTextures(opacity=texture(opaque))))
     finely_tested = shown(masked, 512, antialias=False).mean()
     assert shown(masked, 128).mean() == pytest.approx(finely_tested, rel=0.02)
     covered = Renderer(device, square(Material(name="m", kd=0.8), MaterialTextures(opacity=constant(1.0))))
@@ -148,19 +150,19 @@ def test_no_pixel_of_a_masked_surface_is_lost_in_motion(device) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["rings", "fis", "lobe-4.24", "lobe-4.25", "qmc", "split-sum"])
-def test_a_roughness_picture_equals_a_material_of_that_roughness(device, integrator: str) -> None:
+def test_a_roughness_texture_equals_a_material_of_that_roughness(device, integrator: str) -> None:
     """Half of everything: the samples move, the filter narrows, as a material of half the numbers has it."""
     lobe = Lobe(mx=0.2, my=0.12, r0=0.6, k=0.8, alpha=0.2)
     if integrator == "split-sum":
         lobe = lobe.model_copy(update={"alpha": 0.0})
     half = lobe.model_copy(update={"mx": 0.1, "my": 0.06, "k": (0.4, 0.8, 1.6)})
     light = cube_of(smooth_light)
-    pictures = MaterialTextures(roughness=constant(0.5), specular=constant(0.5, 1.0, 2.0))
+    textures = MaterialTextures(roughness=constant(0.5), specular=constant(0.5, 1.0, 2.0))
     state = FrameState(FRONT, 24, 24, integrator=integrator, n=9, accumulate=0, antialias=False)
-    textured = square(Material(name="m", lobes=(lobe,)), pictures, light)
+    textured = square(Material(name="m", lobes=(lobe,)), textures, light)
     plain = square(Material(name="m", lobes=(half,)), MaterialTextures(), light)
     got, expected = (Renderer(device, scene).image(state) for scene in (textured, plain))
-    # rings: normalised for the roughness that the material has without its picture
+    # rings: normalised for the roughness that the material has without its texture
     loose = {"rings": 0.01, "split-sum": 0.03, "lobe-4.24": 0.02, "lobe-4.25": 0.02}
     np.testing.assert_allclose(got, expected, rtol=loose.get(integrator, 4e-3))
 
@@ -169,7 +171,7 @@ def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
     """One-texel ridges, of which a pixel sees hundreds, reflect as wide along t as a lobe of both variances."""
     normals = np.zeros((64, 64, 3))
     normals[..., 2], normals[:, ::2, 0], normals[:, 1::2, 0] = 1, 0.1, -0.1
-    textures = MaterialTextures(normal=replace(picture(normals), uv_transform=((64.0, 0, 0), (0, 64.0, 0))))
+    textures = MaterialTextures(normal=replace(texture(normals), uv_transform=((64.0, 0, 0), (0, 64.0, 0))))
     lobe = Lobe(mx=0.1, my=0.1, r0=1.0)
     wide = lobe.model_copy(update={"mx": float(np.sqrt(0.01 + 2 * 0.01))})
     light = cube_of(smooth_light)
@@ -181,7 +183,7 @@ def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
     np.testing.assert_allclose(got, expected, rtol=0.02)
 
 
-def test_drawn_pictures_equal_path_traced_ones(device, mi, tmp_path) -> None:
+def test_drawn_images_equal_path_traced_ones(device, mi, tmp_path) -> None:
     """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
     from lambent.bake.environment import environment_cube
     from lambent.bake.reference import render_reference
@@ -196,11 +198,11 @@ def test_drawn_pictures_equal_path_traced_ones(device, mi, tmp_path) -> None:
     v, u = np.meshgrid((np.arange(32) + 0.5) / 32, (np.arange(32) + 0.5) / 32, indexing="ij")
     turn = np.arctan2(0.5 - v, u - 0.5)
     textures = MaterialTextures(
-        specular=picture(np.stack([0.2 + u, 1.2 - u, 0.5 + v], axis=-1)),
-        roughness=picture((0.4 + 1.6 * u)[..., None]),
-        normal=picture(np.stack([0.3 * np.sin(12 * u), 0.3 * np.cos(9 * v), np.ones_like(u)], axis=-1)),
-        direction=picture(np.stack([np.cos(turn), np.sin(turn)], axis=-1)),
-        opacity=picture((np.hypot(u - 0.7, v - 0.3) > 0.2)[..., None]),
+        specular=texture(np.stack([0.2 + u, 1.2 - u, 0.5 + v], axis=-1)),
+        roughness=texture((0.4 + 1.6 * u)[..., None]),
+        normal=texture(np.stack([0.3 * np.sin(12 * u), 0.3 * np.cos(9 * v), np.ones_like(u)], axis=-1)),
+        direction=texture(np.stack([np.cos(turn), np.sin(turn)], axis=-1)),
+        opacity=texture((np.hypot(u - 0.7, v - 0.3) > 0.2)[..., None]),
     )
     material = Material(name="m", lobes=(Lobe(mx=0.25, my=0.06, k=0.8, r0=0.6, alpha=0.3),))
     camera = Camera("c", (0.6, 0.3, 1.6), (0.0, 0.0, 0.0), fov_y_deg=34)
@@ -215,14 +217,14 @@ def test_drawn_pictures_equal_path_traced_ones(device, mi, tmp_path) -> None:
     np.testing.assert_allclose(drawn.mean(axis=(0, 1)), traced.mean(axis=(0, 1)), rtol=0.01)
 
 
-def test_materials_without_pictures_pay_nothing(device) -> None:
-    """No picture is read by the pipeline of a material that has none."""
+def test_materials_without_textures_pay_nothing(device) -> None:
+    """No texture is read by the pipeline of a material that has none."""
     renderer = Renderer(device, wall_scene(Material(name="m", kd=0.5), cube_of(smooth_light)))
-    assert [draw.textures for draw in renderer._draws(FrameState(FRONT, 8, 8))] == [0]
+    assert [draw.textures for draw in draws_of(FrameState(FRONT, 8, 8), renderer.resources)] == [0]
     gloss = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1),))
     everything = {part: constant(*[0.5] * channels) for part, channels in on_gpu.CHANNELS.items()}
     renderer = Renderer(device, square(gloss, MaterialTextures(**everything)))
-    assert [draw.textures for draw in renderer._draws(FrameState(FRONT, 8, 8))] == [1 | 2 | 4 | 8]
+    assert [draw.textures for draw in draws_of(FrameState(FRONT, 8, 8), renderer.resources)] == [1 | 2 | 4 | 8]
 
 
 BUMPS = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.2, -0.4))  # slopes of the normal along x and y
@@ -231,7 +233,7 @@ BUMPS = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.2, -0.4))  # slopes of the norm
 def shares(device, lean, slope) -> float:
     """Diffuse light of a wall that faces +z, over that without the normal map."""
     scene = square(Material(name="m", kd=0.5), MaterialTextures(normal=constant(*slope, 1.0)), light=(1.0, 2.0, 3.0))
-    scene = replace(scene, lean=None if lean is None else np.array(lean, np.float32)[None, None])
+    scene = replace(scene, dominant_direction=None if lean is None else np.array(lean, np.float32)[None, None])
     image = Renderer(device, scene).image(FrameState(FRONT, 8, 8))
     share = image / (0.5 / np.pi * np.array([1.0, 2.0, 3.0]))
     assert np.ptp(share) < 2e-3 * share.mean()

@@ -8,7 +8,8 @@ import pytest
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
 from lambent.materials.document import Material
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import CAMERA, irradiance, unbaked_scene, with_diffuse_light
 from lambent.scenes.environments import daylight
 from lambent.scenes.geometry import patch, sphere
@@ -27,8 +28,8 @@ def test_irradiance_of_an_even_and_of_half_a_sky():
 def test_a_white_sphere_under_an_even_sky_cannot_be_seen(device):
     white = Material(name="white", kd=1.0)
     scene = with_diffuse_light(unbaked_scene({"ball": sphere(0.8, 24, 12)}, white, EVEN))
-    picture = Renderer(device, scene).image(FrameState(CAMERA, 64, 64, integrator="diffuse"))
-    assert picture == pytest.approx(0.5, rel=0.02)
+    image = Renderer(device, scene).image(FrameState(CAMERA, 64, 64, integrator="diffuse"))
+    assert image == pytest.approx(0.5, rel=0.02)
 
 
 def test_light_comes_through_a_sheet(device):
@@ -40,8 +41,8 @@ def test_light_comes_through_a_sheet(device):
         (Material(name="m", kd=0.5), (0,) * 3),
     ):
         scene = with_diffuse_light(unbaked_scene({"sheet": sheet}, material, ABOVE))
-        picture = Renderer(device, scene).image(FrameState(below, 16, 16, integrator="diffuse"))
-        assert picture[8, 8] == pytest.approx(expected, abs=0.02)
+        image = Renderer(device, scene).image(FrameState(below, 16, 16, integrator="diffuse"))
+        assert image[8, 8] == pytest.approx(expected, abs=0.02)
 
 
 def test_daylight_comes_from_its_sun():

@@ -11,7 +11,8 @@ from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import read_encoded, read_image
 from lambent.core.photometry import photometric
 from lambent.realtime.device import open_device
-from lambent.realtime.frame import FrameState, Renderer
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
 from lambent.viewer.comparison import Comparison
 from lambent.viewer.filming import FilmOptions

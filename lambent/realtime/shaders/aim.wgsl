@@ -2,19 +2,16 @@
 // prominence of the lamps), rows 1 and 2 the probabilities of the six faces, then those of the four
 // quarters of each face, of each quarter and so on, faces one after the other, quarters in Morton order.
 //
-// A direction at the surface belongs to one of the probe by the look-up: itself, or the place on the bounding planes. All
-// planes that a point is inside of bound a convex room, which it and the probe's centre see whole, once each: the
-// mapping is one to one. The distance map's is not, and is not aimed through.
+// A direction at the surface belongs to one of the probe by the look-up in use (aimed_look_up).
 
-@group(2) @binding(4) var<storage, read> aim: array<vec4f>;
+@group(2) @binding(2) var<storage, read> aim: array<vec4f>;
 
 const AIM_NODES = 3u;
 const BELOW_ONE = 0.99999994;
 
-// Places of one direction: that in the probe, and the solid angle of the cube's square [-1, 1]^2 there, at the surface.
-struct Aimed {
-    direction: vec3f,
-    density: f32, // area on the cube's faces per solid angle at the surface, 1/sr
+// Sixteenths of a lobe's samples that should aim, by the prominence of the lamps and mx my: aimed_share of aim.py.
+fn wanted_sixteenths(prominence: f32, slopes: f32) -> f32 {
+    return clamp(prominence * (8.0 + 1.25 * log2(100.0 * slopes)), 0.0, 12.0);
 }
 
 fn aim_row(level: u32, face: u32, morton: u32) -> u32 {
@@ -91,57 +88,4 @@ fn aim_draw(given: vec2f) -> vec4f {
     if (face < 2u) { return vec4f(sign, -st.y, -sign * st.x, p); }
     if (face < 4u) { return vec4f(st.x, sign, sign * st.y, p); }
     return vec4f(sign * st.x, -st.y, sign, p);
-}
-
-// Whether the probe's centre is inside of every plane that x is inside of.
-fn aim_maps(x: vec3f) -> bool {
-    for (var i = 0u; i < PLANES; i++) {
-        if (dot(planes[i].xyz, x) + planes[i].w > PLANE_ACTIVE_M && planes[i].w <= PLANE_ACTIVE_M) { return false; }
-    }
-    return LOOKUP != 2u;
-}
-
-// planes_lookup, and how densely directions of the probe lie there. A piece of plane at the distance t, h above which x
-// is, is seen under the solid angle h/t^3 per area; on the cube's faces it covers h_centre/max|p|^3 per area.
-fn aimed_lookup(x: vec3f, w: vec3f) -> Aimed {
-    var nearness = 0.0;
-    var heights = 1.0;
-    for (var i = 0u; i < PLANES; i++) {
-        let height = dot(planes[i].xyz, x) + planes[i].w;
-        let near = -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > PLANE_ACTIVE_M);
-        heights = select(heights, planes[i].w / height, near > nearness);
-        nearness = max(nearness, near);
-    }
-    if (nearness < 1e-6) {
-        let major = max_norm(w);
-        return Aimed(w, 1.0 / (major * major * major));
-    }
-    let found = x + w / nearness;
-    let major = max_norm(found) * nearness;
-    return Aimed(found, heights / (major * major * major));
-}
-
-// Unit direction at x to what the probe sees in the direction q, and the density there as in aimed_lookup.
-struct Towards {
-    w: vec3f,
-    density: f32,
-}
-
-fn aim_towards(x: vec3f, q: vec3f) -> Towards {
-    var nearness = 0.0;
-    var heights = 1.0;
-    for (var i = 0u; i < PLANES; i++) {
-        let height = dot(planes[i].xyz, x) + planes[i].w;
-        let near = select(0.0, -dot(planes[i].xyz, q) / planes[i].w, height > PLANE_ACTIVE_M);
-        heights = select(heights, planes[i].w / height, near > nearness);
-        nearness = max(nearness, near);
-    }
-    let major = max_norm(q);
-    if (nearness < 1e-6) {
-        let w = normalize(q);
-        return Towards(w, dot(q, w) * dot(q, w) * dot(q, w) / (major * major * major));
-    }
-    let to = q / nearness - x;
-    let stretch = length(to) * nearness / major;
-    return Towards(normalize(to), heights * stretch * stretch * stretch);
 }

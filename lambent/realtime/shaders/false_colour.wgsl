@@ -1,4 +1,7 @@
-// Luminance in false colour: core.false_colour, of which this repeats the colours. Needs frame.wgsl.
+// Luminance in false colour: core.false_colour, of which this repeats the colours.
+
+#include "frame.wgsl"
+#include "colour.wgsl"
 
 const STOPS = array<vec3f, 9>(
     vec3f(0.11, 0.07, 0.28), vec3f(0.16, 0.27, 0.62), vec3f(0.12, 0.52, 0.78), vec3f(0.09, 0.70, 0.64),
@@ -8,7 +11,7 @@ const STOPS = array<vec3f, 9>(
 
 // Encoded colour of a radiance (or irradiance); frame.scale is (low, high, logarithmic, lm/W).
 fn false_colour(light: vec3f) -> vec3f {
-    let y = frame.scale.w * dot(light, vec3f(0.2126, 0.7152, 0.0722));
+    let y = frame.scale.w * luminance(light);
     let low = frame.scale.x;
     let high = frame.scale.y;
     var share = (y - low) / (high - low);

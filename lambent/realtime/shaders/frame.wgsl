@@ -1,4 +1,4 @@
-// What every pass of a frame knows (group 0). Matches FRAME_DTYPE in frame_data.py.
+// What every pass of a frame knows (group 0).
 
 struct Frame {
     clip_from_world: mat4x4f,
@@ -10,9 +10,14 @@ struct Frame {
     first_sample: u32, // index of this frame's first sample of a progressive series
     view_transform: u32,
     exposure: f32,   // factor on radiance, 2^EV
-    prior: f32,      // share of the picture of few samples that is shown beside a progressive mean
+    prior: f32,      // share of the last frame of few samples that is shown beside a progressive mean
     scale: vec4f,      // of false colour: low, high, logarithmic, lm/W
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var linear_sampler: sampler;
+
+// The ray from the eye, of depth 1, through a clip position.
+fn camera_ray(clip: vec2f) -> vec3f {
+    return frame.forward.xyz + clip.x * frame.across.xyz + clip.y * frame.up.xyz;
+}

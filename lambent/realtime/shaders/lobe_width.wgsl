@@ -13,7 +13,7 @@ fn lobe_half_widths(lobe: LambentLobe, wo: vec3f) -> vec2f {
     return 2.0 * vec2f(area * inverseSqrt(max(major2, 1e-12)), sqrt(major2));
 }
 
-// Pixels that an angle covers in the mirror picture where what is reflected lies `t` behind a pixel `away` from the eye.
+// Pixels that an angle covers in the mirrored view where what is reflected lies `t` behind a pixel `away` from the eye.
 fn pixels_of(angle: f32, focal_px: f32, t: f32, away: f32) -> f32 {
     return angle * focal_px * t / (t + away);
 }

@@ -1,7 +1,7 @@
-// A material's numbers and the pictures that multiply them (group 1). Matches MATERIAL_DTYPE in frame_data.py, and
-// PARTS in textures.py, whose head says what the texels of each picture mean.
+// A material's numbers and the textures that multiply them (group 1), in the order of KINDS in textures.py, whose head
+// says what the texels of each mean.
 
-// Bits of the pictures to read: 1 diffuse, 2 specular, 4 roughness, 8 normal, 16 direction. A constant: what a material
+// Bits of the textures to read: 1 diffuse, 2 specular, 4 roughness, 8 normal, 16 direction. A constant: what a material
 // does not have costs nothing.
 override TEXTURES: u32 = 0u;
 
@@ -10,19 +10,19 @@ struct Material {
     kt_d: vec4f,
     diffuse_scale: vec4f, // w: the opacity below which there is no surface
     specular_scale: vec4f,
-    lie: array<vec4f, 12>, // two rows of each picture's uv transform
+    lie: array<vec4f, 12>, // two rows of each texture's uv transform
 }
 
 @group(1) @binding(0) var<uniform> material: Material;
-@group(1) @binding(3) var picture_sampler: sampler;
-@group(1) @binding(4) var diffuse_picture: texture_2d<f32>;
-@group(1) @binding(5) var specular_picture: texture_2d<f32>;
-@group(1) @binding(6) var roughness_picture: texture_2d<f32>;
-@group(1) @binding(7) var normal_picture: texture_2d<f32>;
-@group(1) @binding(8) var direction_picture: texture_2d<f32>;
-@group(1) @binding(9) var opacity_picture: texture_2d<f32>;
+@group(1) @binding(3) var texture_sampler: sampler;
+@group(1) @binding(4) var diffuse_texture: texture_2d<f32>;
+@group(1) @binding(5) var specular_texture: texture_2d<f32>;
+@group(1) @binding(6) var roughness_texture: texture_2d<f32>;
+@group(1) @binding(7) var normal_texture: texture_2d<f32>;
+@group(1) @binding(8) var direction_texture: texture_2d<f32>;
+@group(1) @binding(9) var opacity_texture: texture_2d<f32>;
 
-// What the pictures say at a point.
+// The values of the textures at a point.
 struct Painted {
     diffuse: vec3f,  // factor of kd and kt_d
     specular: vec3f, // of k
@@ -32,10 +32,10 @@ struct Painted {
     turn: vec2f,     // cosine and sine of the angle from t to the brushing direction
 }
 
-// Texture coordinates of a picture: both v are up, rows go down.
-fn place(part: u32, uv: vec2f) -> vec2f {
+// Coordinates of the texels of a texture: both v are up, rows go down.
+fn place(kind: u32, uv: vec2f) -> vec2f {
     let p = vec3f(uv, 1.0);
-    return vec2f(dot(material.lie[2u * part].xyz, p), 1.0 - dot(material.lie[2u * part + 1u].xyz, p));
+    return vec2f(dot(material.lie[2u * kind].xyz, p), 1.0 - dot(material.lie[2u * kind + 1u].xyz, p));
 }
 
 // Half the angle of a doubled direction, which averaging has shortened.
@@ -50,27 +50,27 @@ fn half_angle(doubled: vec2f) -> vec2f {
 fn painted(uv: vec2f) -> Painted {
     var p = Painted(vec3f(1.0), vec3f(1.0), 1.0, vec2f(0.0), vec2f(0.0), vec2f(1.0, 0.0));
     if ((TEXTURES & 1u) != 0u) {
-        p.diffuse = material.diffuse_scale.rgb * textureSample(diffuse_picture, picture_sampler, place(0u, uv)).rgb;
+        p.diffuse = material.diffuse_scale.rgb * textureSample(diffuse_texture, texture_sampler, place(0u, uv)).rgb;
     }
     if ((TEXTURES & 2u) != 0u) {
-        p.specular = material.specular_scale.rgb * textureSample(specular_picture, picture_sampler, place(1u, uv)).rgb;
+        p.specular = material.specular_scale.rgb * textureSample(specular_texture, texture_sampler, place(1u, uv)).rgb;
     }
     if ((TEXTURES & 4u) != 0u) {
-        p.roughness = textureSample(roughness_picture, picture_sampler, place(2u, uv)).r;
+        p.roughness = textureSample(roughness_texture, texture_sampler, place(2u, uv)).r;
     }
     if ((TEXTURES & 8u) != 0u) {
-        let s = textureSample(normal_picture, picture_sampler, place(3u, uv));
+        let s = textureSample(normal_texture, texture_sampler, place(3u, uv));
         p.slope = s.xy;
         p.widening = max(s.zw, vec2f(0.0));
     }
     if ((TEXTURES & 16u) != 0u) {
-        p.turn = half_angle(textureSample(direction_picture, picture_sampler, place(4u, uv)).xy);
+        p.turn = half_angle(textureSample(direction_texture, texture_sampler, place(4u, uv)).xy);
     }
     return p;
 }
 
 fn is_hole(uv: vec2f) -> bool {
-    return textureSample(opacity_picture, picture_sampler, place(5u, uv)).r < material.diffuse_scale.w;
+    return textureSample(opacity_texture, texture_sampler, place(5u, uv)).r < material.diffuse_scale.w;
 }
 
 const SOLID = 0.95; // coverage from which a pixel counts as covered
@@ -79,8 +79,8 @@ const SOLID = 0.95; // coverage from which a pixel counts as covered
 // where they are smaller the share of those that pass it. Takes derivatives.
 fn coverage(uv: vec2f) -> f32 {
     let at = place(5u, uv);
-    let opacity = textureSample(opacity_picture, picture_sampler, at).rg;
-    let texels = vec2f(textureDimensions(opacity_picture));
+    let opacity = textureSample(opacity_texture, texture_sampler, at).rg;
+    let texels = vec2f(textureDimensions(opacity_texture));
     let texels_per_px = max(length(dpdx(at) * texels), length(dpdy(at) * texels));
     let slope = length(vec2f(dpdx(opacity.r), dpdy(opacity.r)));
     let edge = clamp((opacity.r - material.diffuse_scale.w) / max(slope, 1e-4) + 0.5, 0.0, 1.0);

@@ -1,19 +1,19 @@
-// Light of planar reflectors: where a direction meets the scene, found in the mirror picture (thesis M, 4.5.2).
+// Light of planar reflectors: where a direction meets the scene, found in the planar reflection buffer (thesis M, 4.5.2).
 // Appended to a shader of shade.wgsl; integrators bring integrate_planar(index, wo, s, place).
 //
-// Places are kept about the mirror eye e: q = p - e. A plane is N towards e and N.q, both of the same picture.
+// Places are kept about the mirrored eye e: q = p - e. A plane is N towards e and N.q, both of the same texel.
 
-#include "planar_mirror.wgsl"
+#include "planar_view.wgsl"
 
-@group(3) @binding(0) var<uniform> mirror: Mirror;
-@group(3) @binding(1) var mirror_light: texture_2d<f32>;
-@group(3) @binding(2) var mirror_planes: texture_2d<f32>;
-@group(3) @binding(3) var mirror_near: texture_2d<f32>; // of planar_near.wgsl
+@group(3) @binding(0) var<uniform> mirrored: MirroredView;
+@group(3) @binding(1) var buffer_light: texture_2d<f32>;
+@group(3) @binding(2) var buffer_planes: texture_2d<f32>;
+@group(3) @binding(3) var buffer_cells: texture_2d<f32>; // of planar_cells.wgsl
 
-override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the mirror picture shows something else before it
+override HIDDEN_DROP: f32 = 0.0; // of a hit's weight where the buffer shows something else before it
 
 const FARTHEST = 2e4; // m
-const FADE_PX = 24.0; // beyond the edges of the mirror picture
+const FADE_PX = 24.0; // beyond the edges of the buffer
 const BESIDE = 8u;    // neighbours, up to two pixels away
 
 // A pixel of a reflector: q, the plane seen in the mirror direction, the distance to it; x about the probe's centre.
@@ -24,8 +24,8 @@ struct Place {
     x: vec3f,
 }
 
-// Where a direction meets the scene: q, distance from the pixel, the plane there, texels of the mirror picture, and how
-// far (0 to 1) the picture can be trusted: 0 well outside it.
+// Where a direction meets the scene: q, distance from the pixel, the plane there, texels of the buffer, and how far
+// (0 to 1) the buffer can be trusted: 0 well outside it.
 struct Hit {
     q: vec3f,
     t: f32,
@@ -35,7 +35,7 @@ struct Hit {
 }
 
 fn plane_at(texel: vec2f) -> vec4f {
-    return textureLoad(mirror_planes, vec2i(clamp(texel, vec2f(0.0), mirror.size - 1.0)), 0);
+    return textureLoad(buffer_planes, vec2i(clamp(texel, vec2f(0.0), mirrored.size - 1.0)), 0);
 }
 
 // Distance to a plane along w, or `otherwise` where it is not met from its front.
@@ -45,35 +45,34 @@ fn meet(plane: vec4f, q: vec3f, w: vec3f, otherwise: f32) -> f32 {
     return select(otherwise, min(t, FARTHEST), closing > 1e-4 && t > 1e-4);
 }
 
-// Texels (x, y) of the mirror picture, and depth.
+// Texels (x, y) of the buffer, and depth.
 fn project(q: vec3f) -> vec3f {
-    let depth = dot(mirror.row_w.xyz, q);
-    let clip = vec2f(dot(mirror.row_x.xyz, q), -dot(mirror.row_y.xyz, q)) / max(depth, 1e-6);
-    return vec3f((clip + 1.0) * 0.5 * mirror.size, depth);
+    let depth = dot(mirrored.row_w.xyz, q);
+    let clip = vec2f(dot(mirrored.row_x.xyz, q), -dot(mirrored.row_y.xyz, q)) / max(depth, 1e-6);
+    return vec3f((clip + 1.0) * 0.5 * mirrored.size, depth);
 }
 
-fn inside_picture(projected: vec3f) -> f32 {
-    let beyond = max(max(-projected.xy, projected.xy - mirror.size), vec2f(0.0));
+fn inside_image(projected: vec3f) -> f32 {
+    let beyond = max(max(-projected.xy, projected.xy - mirrored.size), vec2f(0.0));
     return select(0.0, 1.0 - smoothstep(0.0, FADE_PX, max(beyond.x, beyond.y)), projected.z > 1e-6);
 }
 
-// Whether the picture shows anything there: the mirror eye sees nothing past the foot of a wall.
+// Whether the buffer shows anything there: the mirrored eye sees nothing past the foot of a wall.
 fn is_shown(plane: vec4f) -> bool {
     return dot(plane.xyz, plane.xyz) > 0.5;
 }
 
-// The point of the reflector at a texel of the mirror picture.
+// The point of the reflector at a texel of the buffer.
 fn reflector_at(texel: vec2f) -> vec3f {
-    let clip = texel / mirror.size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
-    let w = mirror.forward.xyz + clip.x * mirror.across.xyz + clip.y * mirror.up.xyz;
-    return w * (-(dot(mirror.plane.xyz, mirror.eye.xyz) + mirror.plane.w) / dot(mirror.plane.xyz, w));
+    let w = mirrored_ray(texel);
+    return w * (-(dot(mirrored.plane.xyz, mirrored.eye.xyz) + mirrored.plane.w) / dot(mirrored.plane.xyz, w));
 }
 
 // Pixels at the very foot of a wall, which the plan counts as past it, look from beside: the probe's light there would be
 // that of windows behind the wall.
 fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
-    var q = v.p_world - mirror.eye.xyz;
-    let texel = v.position.xy + mirror.offset;
+    var q = v.p_world - mirrored.eye.xyz;
+    let texel = v.position.xy + mirrored.offset;
     var seen = plane_at(texel);
     for (var i = 0u; i < BESIDE && !is_shown(seen); i++) {
         let step = (1.0 + f32(i >> 2u)) * select(-1.0, 1.0, (i & 1u) == 0u);
@@ -85,20 +84,16 @@ fn place_of(v: Varyings, s: Surface, w_mirror: vec3f) -> Place {
     return Place(q, seen, t, s.x);
 }
 
-// Depth of what the picture shows at a point's place, relative to the point's.
+// Depth of what the buffer shows at a point's place, relative to the point's.
 fn seen_depth(q: vec3f, plane: vec4f) -> f32 {
     return plane.w / min(dot(plane.xyz, q), -1e-6);
 }
 
-// The hit at distance t, or, where a wall is before it, that of the wall. The mirror eye sees below walls, which end at the
-// reflector: to it, what is outside looks like a hit to whoever looks at the foot of a wall. What lies beyond the probe's
-// bounding planes is believed where the picture shows no wall in the plane, as in a window.
+// The hit at distance t, or, where a wall is before it, that of the wall. The mirrored eye sees below walls, which end at
+// the reflector: there a ray towards the foot of a wall seems to meet what is outside. What lies beyond a wall that the
+// probe knows is believed where the buffer shows no wall in the plane, as in a window.
 fn hit_within(place: Place, w: vec3f, t: f32, plane: vec4f) -> Hit {
-    var nearness = 0.0; // 1 over the distance to the nearest plane, 0 where none is met
-    for (var i = 0u; i < PLANES; i++) {
-        let height = dot(planes[i].xyz, place.x) + planes[i].w;
-        nearness = max(nearness, -dot(planes[i].xyz, w) * select(0.0, 1.0 / height, height > 1e-3));
-    }
+    let nearness = incident_bound(place.x, w);
     let q_wall = place.q + w / max(nearness, 1.0 / FARTHEST);
     let wall = plane_at(project(q_wall).xy);
     let behind = t * nearness > 1.1 && seen_depth(q_wall, wall) < 1.05;
@@ -107,42 +102,62 @@ fn hit_within(place: Place, w: vec3f, t: f32, plane: vec4f) -> Hit {
     let projected = project(q);
     var found = plane;
     if (behind) { found = wall; }
-    return Hit(q, t_hit, found, projected.xy, select(0.0, inside_picture(projected), is_shown(found)));
+    return Hit(q, t_hit, found, projected.xy, select(0.0, inside_image(projected), is_shown(found)));
 }
 
-// The three steps: the plane seen in the mirror direction, then the one seen where that is met.
+// Where a ray meets a plane.
+struct Met {
+    t: f32,
+    plane: vec4f,
+}
+
+// The plane that the buffer shows where a ray is at the distance t.
+fn plane_along(place: Place, w: vec3f, t: f32) -> vec4f {
+    return plane_at(project(place.q + t * w).xy);
+}
+
+// The first guess: the plane seen in the mirror direction.
+fn first_guess(place: Place, w: vec3f) -> Met {
+    return Met(meet(place.seen, place.q, w, place.t), place.seen);
+}
+
+// The second: the plane seen where the first is met.
+fn guessed(place: Place, w: vec3f) -> Met {
+    let first = first_guess(place, w);
+    let plane = plane_along(place, w, first.t);
+    return Met(meet(plane, place.q, w, first.t), plane);
+}
+
+// The hit in three steps, without a search.
 fn find_hit(place: Place, w: vec3f) -> Hit {
-    let t_first = meet(place.seen, place.q, w, place.t);
-    let first = project(place.q + t_first * w);
-    let plane = plane_at(first.xy);
-    let t = meet(plane, place.q, w, t_first);
-    return hit_within(place, w, t, plane);
+    let guess = guessed(place, w);
+    return hit_within(place, w, guess.t, guess.plane);
 }
 
-fn mirror_sample(texel: vec2f, level: f32) -> vec3f {
-    let wanted = clamp(level, 0.0, mirror.levels - 1.0);
-    let uv = clamp(texel, vec2f(0.5), mirror.size - 0.5) / mirror.size;
-    let found = textureSampleLevel(mirror_light, linear_sampler, uv, wanted);
+fn buffer_sample(texel: vec2f, level: f32) -> vec3f {
+    let wanted = clamp(level, 0.0, mirrored.levels - 1.0);
+    let uv = clamp(texel, vec2f(0.5), mirrored.size - 0.5) / mirrored.size;
+    let found = textureSampleLevel(buffer_light, linear_sampler, uv, wanted);
     return found.rgb / max(found.a, 1e-3);
 }
 
-// How much a hit counts: less where it lies behind what the picture shows there, by 2 to 8 % of its depth.
+// How much a hit counts: less where it lies behind what the buffer shows there, by 2 to 8 % of its depth.
 fn seen_share(hit: Hit) -> f32 {
     let deeper = 1.0 - seen_depth(hit.q, plane_at(hit.texel));
     return 1.0 - HIDDEN_DROP * clamp((deeper - 0.02) / 0.06, 0.0, 1.0);
 }
 
 // Level at which a texel covers the solid angle of a sample: omega t^2/D^2 |N.v|/|N.wi| f^2/cos^3 texels, D and v from
-// the mirror eye, cos from the picture's axis.
+// the mirrored eye, cos from the axis of its view.
 fn level_of(hit: Hit, w: vec3f, half_log2_omega: f32) -> f32 {
     let d = length(hit.q);
-    let cosine = dot(mirror.row_w.xyz, hit.q) / d;
+    let cosine = dot(mirrored.row_w.xyz, hit.q) / d;
     let turned = abs(dot(hit.plane.xyz, hit.q)) / (d * max(abs(dot(hit.plane.xyz, w)), 1e-4));
-    return half_log2_omega + log2(hit.t / d * mirror.focal_px) + 0.5 * log2(clamp(turned, 0.1, 4.0))
+    return half_log2_omega + log2(hit.t / d * mirrored.focal_px) + 0.5 * log2(clamp(turned, 0.1, 4.0))
         - 1.5 * log2(max(cosine, 1e-3));
 }
 
-// Samples that the mirror picture does not hold, for one look-up in the probe in their mean direction.
+// Samples that the buffer does not hold, for one look-up in the probe in their mean direction.
 struct Beyond {
     gain: vec3f,
     w: vec3f,
@@ -165,20 +180,20 @@ fn planar_gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
 fn surface_number(interleaved: u32) -> f32 {
     let l = lobes[0].lobe;
     let mixed = dot(l.k, vec3f(3.7, 7.1, 1.3)) + dot(l.r0, vec3f(5.3, 2.9, 11.1)) + dot(vec2f(l.mx, l.my), vec2f(17.3, 31.7));
-    return 1.0 + floor(fract(mixed * 0.6180339 + mirror.number * 0.2718 + f32(interleaved) * 0.3719) * 1999.0);
+    return 1.0 + floor(fract(mixed * 0.6180339 + mirrored.number * 0.2718 + f32(interleaved) * 0.3719) * 1999.0);
 }
 
 struct PlanarLight {
-    @location(0) rough: vec4f, // lobes that are sampled in turns by neighbouring pixels; a: distance in the mirror direction
-    @location(1) sharp: vec4f, // all others; a: surface_number, 0 where no reflector is
+    @location(0) rough: vec4f, // see planar_layers.wgsl
+    @location(1) sharp: vec4f,
 }
 
 @fragment fn planar_main(v: Varyings, @builtin(front_facing) front: bool) -> PlanarLight {
-    let upright = dot(normalize(v.n_world), mirror.plane.xyz);
+    let upright = dot(normalize(v.n_world), mirrored.plane.xyz);
     let view = normalize(frame.eye.xyz - v.p_world);
     // seen from right above, so that no normal is bent as those of rounded things are at grazing angles
-    let s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirror.plane.xyz);
-    if (abs(dot(mirror.plane.xyz, v.p_world) + mirror.plane.w) > mirror.tolerance || abs(upright) < 0.998) { discard; }
+    let s = shading_frame(v, select(-1.0, 1.0, upright > 0.0), mirrored.plane.xyz);
+    if (abs(dot(mirrored.plane.xyz, v.p_world) + mirrored.plane.w) > mirrored.tolerance || abs(upright) < 0.998) { discard; }
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), max(dot(view, s.n), 1e-3)));
     let place = place_of(v, s, to_world(s, vec3f(-wo.xy, wo.z)));
     var result = PlanarLight(vec4f(0.0, 0.0, 0.0, min(place.t, HALF_MAX)), vec4f(0.0));

@@ -1,14 +1,13 @@
-// Quadrature on planes: as quadrature.wgsl, the light from the mirror picture, one filter size per sample.
+// Quadrature on planes: as quadrature.wgsl, the light from the planar reflection buffer, one filter size per sample.
 
-#include "planar.wgsl"
 #include "planar_march.wgsl"
 #include "planar_search.wgsl"
 
-// Filters in the probe against those in the mirror picture, half the log2. Of the 64 pixels that sample in turns few look
-// at a sun that the mirror picture does not hold: with narrow filters their tiles show as blocks.
+// Filters in the probe against those in the buffer, half the log2. Of the 64 pixels that sample in turns few look
+// at a sun that the buffer does not hold: with narrow filters their tiles show as blocks.
 override BEYOND_WIDER: f32 = 0.0;
 
-const SHARE_STEPS = 15.0; // of how far a sample lies outside the mirror picture: 4 bits, for up to 64 samples
+const SHARE_STEPS = 15.0; // of how far a sample lies outside the buffer: 4 bits, for up to 64 samples
 
 // Lobe `index` by the rows of the table from `first` on.
 // No branch about the look-up: software Vulkan (Mesa 22.3) crashes on textures that are sampled within branches of a loop.
@@ -16,13 +15,13 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
     let first_jitter = fract(0.754878 * f32(s.pixel.x & 3u) + 0.569840 * f32(s.pixel.y & 3u));
     let here = lobe_here(index, s);
     var sum = vec3f(0.0);
-    var mirrored = vec3f(0.0); // gains of all samples that the mirror picture has
+    var held = vec3f(0.0); // gains of all samples that the buffer holds
     var kept = vec3f(1e-9);    // of those not dropped
     var shares = array<u32, 8>();
     var beyond = 0u;
     for (var k = 0u; k < SAMPLES; k++) {
         let q = samples[first + k];
-        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
+        let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         if (!at.seen) { continue; }
         let g = q.w * planar_gain(here.lobe, at.wi, wo, at.h);
         let w = to_world(s, at.wi);
@@ -32,8 +31,8 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         beyond |= outside;
         let inside = 1.0 - f32(outside) / SHARE_STEPS;
         let counted = g * inside * seen_share(hit);
-        sum += counted * mirror_sample(hit.texel, level_of(hit, w, half_log2_omega(q, at, here)));
-        mirrored += g * inside;
+        sum += counted * buffer_sample(hit.texel, level_of(hit, w, half_log2_omega(q, at, here)));
+        held += g * inside;
         kept += counted;
     }
     // One by one: their mean direction leaps from pixel to pixel, past a sun. No look-up where there are none.
@@ -41,17 +40,13 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
     var others = vec3f(0.0);
     for (var k = 0u; k < count; k++) {
         let q = samples[first + k];
-        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
+        let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         let share = f32((shares[k >> 3u] >> ((k & 7u) << 2u)) & 15u) / SHARE_STEPS;
         let g = share * q.w * planar_gain(here.lobe, at.wi, wo, at.h);
         let light = incident(s, at.wi, half_log2_omega(q, at, here) + BEYOND_WIDER);
         others += select(vec3f(0.0), g * light, share > 0.0);
     }
-    return (sum * mirrored / kept + others) / f32(SAMPLES);
-}
-
-fn half_log2_omega(q: vec4f, at: Sample, here: LobeHere) -> f32 {
-    return q.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
+    return (sum * held / kept + others) / f32(SAMPLES);
 }
 
 fn first_hit(place: Place, w: vec3f, jitter: f32) -> Hit {

@@ -1,4 +1,4 @@
-// Quadrature on planes, interleaved: each pixel of an 8 x 8 tile takes n other samples of the lobe, and the picture is
+// Quadrature on planes, interleaved: each pixel of an 8 x 8 tile takes n other samples of the lobe, and the light is
 // cleaned afterwards (planar_clean.wgsl, planar_shown.wgsl). Lobes that cover few pixels need and stand no cleaning:
 // theirs are the fixed rings. The table of a lobe has SAMPLES rows of these, then 64 times SAMPLES rows.
 
@@ -16,7 +16,7 @@ fn bayer(pixel: vec2u) -> u32 {
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     let widths = lobe_half_widths(lobe_here(index, s).lobe, wo);
-    let px = pixels_of(sqrt(widths.x * widths.y), mirror.focal_px, place.t, length(place.q));
+    let px = pixels_of(sqrt(widths.x * widths.y), mirrored.focal_px, place.t, length(place.q));
     let block = select(0u, 1u + bayer(s.pixel), px >= LEAST_PX);
     let light = planar_quadrature(index, (index * 65u + block) * SAMPLES, wo, s, place);
     return vec4f(light, f32(min(block, 1u)));

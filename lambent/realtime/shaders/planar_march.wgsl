@@ -1,44 +1,34 @@
-// The first surface along a ray that the mirror picture shows, searched for step by step across the picture.
+// The first surface along a ray that the planar reflection buffer shows, searched for step by step across the image.
+
+#include "planar_ray.wgsl"
 
 override MARCH_STEPS: u32 = 24u;
 
-// Distance at which a ray leaves the mirror picture.
-fn exit_distance(q: vec3f, w: vec3f) -> f32 {
-    let at = vec3f(dot(mirror.row_x.xyz, q), dot(mirror.row_y.xyz, q), dot(mirror.row_w.xyz, q));
-    let along = vec3f(dot(mirror.row_x.xyz, w), dot(mirror.row_y.xyz, w), dot(mirror.row_w.xyz, w));
-    let sides = vec4f(at.z - at.x, at.z + at.x, at.z - at.y, at.z + at.y);
-    let closing = -vec4f(along.z - along.x, along.z + along.x, along.z - along.y, along.z + along.y);
-    let t = select(vec4f(FARTHEST), sides / max(closing, vec4f(1e-9)), closing > vec4f(1e-9));
-    return clamp(0.999 * min(min(t.x, t.y), min(t.z, t.w)), 1e-3, FARTHEST);
-}
-
-// What a ray meets that passes a wall, or behind something, before anything is found: the surface that the picture shows
+// The hit of a ray that passes a wall, or behind something, before anything is found: the surface that the buffer shows
 // where the ray was last before all, as the sky beside the frame of a window.
 fn hit_behind(place: Place, w: vec3f, free: f32) -> Hit {
     let projected = project(place.q + free * w);
     let plane = plane_at(projected.xy);
     let t = meet(plane, place.q, w, max(free, 1e-3));
-    let inside = select(0.0, inside_picture(projected), is_shown(plane));
+    let inside = select(0.0, inside_image(projected), is_shown(plane));
     return Hit(place.q + t * w, t, plane, projected.xy, inside);
 }
 
-// Steps are even in the picture but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
+// Steps are even in the image but for being denser near the pixel, and moved by `jitter` in [0, 1). A step has found a
 // hit where the ray meets the plane seen at its end within the step. No branch: see planar_quadrature.
 fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
     let guess = find_hit(place, w);
     let again = meet(plane_at(guess.texel), place.q, w, guess.t);
     let settled = is_shown(guess.plane) && abs(again - guess.t) < 0.03 * guess.t; // only what is nearer can be the hit
     let t_exit = min(exit_distance(place.q, w), select(FARTHEST, guess.t, settled));
-    let z = dot(mirror.row_w.xyz, place.q);
-    let z_exit = max(z + t_exit * dot(mirror.row_w.xyz, w), 1e-6);
     var found = -1.0;
     var before = 0.0;
     var walled = false; // a step has passed the foot of a wall
-    var free = 0.0; // the last step before all that the picture shows
+    var free = 0.0; // the last step before all that the buffer shows
     for (var i = 0u; i < MARCH_STEPS; i++) {
         let step = min((f32(i) + 1.0 - 0.999 * jitter) / (f32(MARCH_STEPS) - 1.0), 1.0);
         let share = step * sqrt(step);
-        let t = t_exit * share * z / mix(z_exit, z, share); // 1/depth is linear in the picture
+        let t = distance_at(place, w, t_exit, share);
         let q = place.q + t * w;
         let plane = plane_at(project(q).xy);
         let met = meet(plane, place.q, w, -1.0);
@@ -51,7 +41,7 @@ fn march(place: Place, w: vec3f, jitter: f32) -> Hit {
     }
     if (found < 0.0 && !settled) { return hit_behind(place, w, free); }
     let t_found = select(guess.t, found, found > 0.0);
-    let plane = plane_at(project(place.q + t_found * w).xy);
+    let plane = plane_along(place, w, t_found);
     let refined = meet(plane, place.q, w, t_found);
     let t = select(t_found, refined, abs(refined - t_found) < 0.05 * t_found);
     return hit_within(place, w, t, plane);

@@ -1,7 +1,6 @@
 // The progressive mode on planes: importance samples as in qmc.wgsl, unfiltered, each marched to its hit, so that the mean
-// converges to what the mirror picture knows: only surfaces hidden from the mirrored eye are missing.
+// converges to what the buffer knows: only surfaces hidden from the mirrored eye are missing.
 
-#include "planar.wgsl"
 #include "planar_march.wgsl"
 #include "sequence.wgsl"
 
@@ -17,7 +16,7 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
         let hit = march(place, to_world(s, at.wi), jitter);
         let inside = hit.inside;
-        sum += g * inside * mirror_sample(hit.texel, 0.0);
+        sum += g * inside * buffer_sample(hit.texel, 0.0);
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * g, beyond.w + share * at.wi, beyond.omega + share * 1e-6);
     }

@@ -2,40 +2,38 @@
 // lobes of transmission, have the probe's light. Interleaved light is cleaned here, along columns, as far as the lobe is
 // wider than the pixels it is mixed from.
 
+#include "colour.wgsl"
 #include "lobe_width.wgsl"
+#include "planar_layers.wgsl"
 
-@group(3) @binding(3) var planar_rough: texture_2d<f32>;
-@group(3) @binding(4) var planar_sharp: texture_2d<f32>;
-@group(3) @binding(5) var planar_sum: texture_2d<f32>;
-@group(3) @binding(6) var planar_wide: texture_2d<f32>;
-@group(3) @binding(7) var planar_least: texture_2d<f32>;
+@group(3) @binding(1) var planar_light: texture_2d_array<f32>;
 
 const WIDE = 3.0; // half-width in pixels of a lobe from which on 8 x 8 pixels are mixed, not 4 x 4
 
 fn specular_light(wo: vec3f, s: Surface) -> vec3f {
     let at = vec2i(s.pixel);
-    let sharp = textureLoad(planar_sharp, at, 0);
-    let mirrored = sharp.a > 0.0;
+    let sharp = textureLoad(planar_light, at, PLANAR_SHARP, 0);
+    let reflecting = sharp.a > 0.0;
     var sum = vec3f(0.0);
-    if (mirrored) { sum = sharp.rgb + cleaned(wo, s, at, sharp.a); }
+    if (reflecting) { sum = sharp.rgb + cleaned(wo, s, at, sharp.a); }
     for (var i = 0u; i < LOBES; i++) {
-        if (mirrored && lobes[i].lobe.side == LAMBENT_REFLECTION) { continue; }
+        if (reflecting && lobes[i].lobe.side == LAMBENT_REFLECTION) { continue; }
         sum += integrate(i, wo, s);
     }
     return sum;
 }
 
 fn cleaned(wo: vec3f, s: Surface, at: vec2i, number: f32) -> vec3f {
-    let size = textureDimensions(planar_rough);
+    let size = textureDimensions(planar_light);
     var narrow = vec4f(0.0);
     var wide = vec4f(0.0);
-    var least = 6e4;
+    var least = HALF_MAX;
     for (var i = -4; i <= 4; i++) {
         let there = vec2i(at.x, clamp(at.y + i, 0, i32(size.y) - 1));
-        let same = select(0.0, 1.0, textureLoad(planar_sharp, there, 0).a == number);
-        wide += same * select(1.0, 0.5, abs(i) == 4) * textureLoad(planar_wide, there, 0);
-        narrow += same * select(select(1.0, 0.5, abs(i) == 2), 0.0, abs(i) > 2) * textureLoad(planar_sum, there, 0);
-        least = min(least, select(6e4, textureLoad(planar_least, there, 0).x, same > 0.0));
+        let same = select(0.0, 1.0, textureLoad(planar_light, there, PLANAR_SHARP, 0).a == number);
+        wide += same * select(1.0, 0.5, abs(i) == 4) * textureLoad(planar_light, there, PLANAR_WIDE, 0);
+        narrow += same * select(select(1.0, 0.5, abs(i) == 2), 0.0, abs(i) > 2) * textureLoad(planar_light, there, PLANAR_NARROW, 0);
+        least = min(least, select(HALF_MAX, textureLoad(planar_light, there, PLANAR_LEAST, 0).x, same > 0.0));
     }
     let away = length(s.x + object.centre.xyz - frame.eye.xyz);
     let focal_px = 0.5 * f32(size.y) / length(frame.up.xyz);

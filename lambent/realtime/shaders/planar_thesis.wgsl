@@ -1,13 +1,12 @@
 // The estimate on planes as published (thesis M, 4.24, 4.25, 4.5.3): several rings within the lobe, one filter size per
-// pixel: the ellipse through the lobe's two extreme directions, projected into the mirror picture, divided by n.
+// pixel: the ellipse through the lobe's two extreme directions, projected into the buffer, divided by n.
 
 #include "planar.wgsl"
 
 override FORMULA: u32 = 25u;
 
 fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
-    let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-    return 2.0 * dot(wo, h) * h - wo;
+    return lambent_mirrored(wo, lambent_from_slopes(slope));
 }
 
 fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
@@ -24,14 +23,14 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
     var weights = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
-        let at = sample_about(wo, half_vector_of(sample.xy * here.growth));
+        let at = sample_about(wo, lambent_from_slopes(sample.xy * here.growth));
         if (!at.seen) { continue; }
         let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
         let q = planar_gain(lobe, at.wi, wo, at.h) / at.wi.z;
         let hit = find_hit(place, to_world(s, at.wi));
         let inside = hit.inside;
         let weight = select(q * q, q, FORMULA == 24u) * (at.wi.z * at.wi.z * p);
-        sum += mirror_sample(hit.texel, level) * inside * weight;
+        sum += buffer_sample(hit.texel, level) * inside * weight;
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * weight, beyond.w + share * at.wi, beyond.omega + share * omega);
         weights += select(q, vec3f(1.0), FORMULA == 24u) * (at.wi.z * p);

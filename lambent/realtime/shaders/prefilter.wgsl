@@ -2,6 +2,8 @@
 // it, seen from above (n = v = r), by filtered importance samples (Colbert & Krivanek 2007).
 
 #include "screen.wgsl"
+#include "lobes.wgsl"
+#include "directions.wgsl"
 
 struct Prefilter {
     s: vec4f, // columns of the face: direction = s clip.x + t clip.y + axis
@@ -22,20 +24,17 @@ struct Prefilter {
     let raw = prefilter.s.xyz * screen.clip.x + prefilter.t.xyz * screen.clip.y + prefilter.axis.xyz;
     let n = normalize(raw);
     if (prefilter.m <= 0.0) { return textureSampleLevel(source, linear_sampler, n, prefilter.level); }
-    let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
-    let t = normalize(cross(n, other));
+    let t = normalize(perpendicular(n));
     let b = cross(n, t);
     var sum = vec4f(0.0);
     var weight = 0.0;
     let count = arrayLength(&samples);
     for (var k = 0u; k < count; k++) {
-        let slope = prefilter.m * samples[k].xy;
-        let h = vec3f(slope, 1.0) * inverseSqrt(1.0 + dot(slope, slope));
-        let w = 2.0 * h.z * h - vec3f(0.0, 0.0, 1.0);
+        let h = lambent_from_slopes(prefilter.m * samples[k].xy);
+        let w = lambent_mirrored(vec3f(0.0, 0.0, 1.0), h);
         if (w.z <= 0.0) { continue; }
         let direction = w.x * t + w.y * b + w.z * n;
-        let a = abs(direction);
-        let major = max(a.x, max(a.y, a.z));
+        let major = max_norm(direction);
         // 1/(n pdf) = S 4 pi m^2 h_z^4/n sr, stretched by 1/major^3 on the cube
         let level = samples[k].z + log2(prefilter.m) + 2.0 * log2(h.z) - 1.5 * log2(major) + prefilter.texels;
         sum += w.z * textureSampleLevel(source, linear_sampler, direction, max(level, 0.0));

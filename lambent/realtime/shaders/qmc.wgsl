@@ -1,87 +1,18 @@
 // Unbiased reference: samples of an additive sequence (Roberts 2018), rotated per pixel and lobe (Cranley & Patterson
-// 1976), unfiltered. The sequence goes on from frame to frame, so the mean converges. A share of the samples aims at the
-// probe's lamps, the others follow the lobe; each counts by the balance heuristic (Veach & Guibas 1995).
+// 1976), unfiltered. The sequence goes on from frame to frame, so the mean converges.
 
 #include "frame.wgsl"
 #include "surface.wgsl"
 #include "sequence.wgsl"
-#include "aim.wgsl"
-
-override AIM: u32 = 0u; // 1: there are lamps worth aiming at, for some lobe here
-const SIXTEENTHS = 16u;
-
-// Sixteenths of a lobe's samples that aim, an even number, known before any sample is taken: 8 at a roughness of .1, 2.5
-// more for each doubling, at most 12, fewer where lamps hardly stand out (aim.py). By experiment (docs/performance.md).
-fn aimed_share(lobe: LambentLobe, s: Surface) -> u32 {
-    if (AIM == 0u || !aim_maps(s.x)) { return 0u; }
-    let wanted = aim[0].y * (8.0 + 1.25 * log2(100.0 * lobe.mx * lobe.my));
-    return 2u * u32(round(0.5 * clamp(wanted, 0.0, 12.0)));
-}
-
-// f cos_i times the light over the density of all samples at a direction, of which `aim_share` aim with density `aimed`.
-fn counted(lobe: LambentLobe, at: Sample, wo: vec3f, light: vec3f, aimed: f32, aim_share: f32) -> vec3f {
-    let pdf = lambent_distribution(at.h, lobe) * at.h.z / (4.0 * at.cos_d);
-    return gain(lobe, at.wi, wo, at.h) * light * (pdf / max(mix(pdf, aimed, aim_share), 1e-30));
-}
-
-fn probe_light(s: Surface, direction: vec3f) -> vec3f {
-    return s.open * textureSampleLevel(radiance_cube, linear_sampler, direction, 0.0).rgb;
-}
-
-fn of_lobe(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
-    let at = sample_about(wo, lambent_sample_half_vector(u, lobe));
-    if (!at.seen) { return vec3f(0.0); }
-    let w = on_side(lobe, at.wi);
-    if (AIM == 0u) { return gain(lobe, at.wi, wo, at.h) * incident_at_level(s, w, 0.0); }
-    let found = aimed_lookup(s.x, to_world(s, w));
-    let aimed = aim_probability(found.direction) * found.density;
-    return counted(lobe, at, wo, probe_light(s, found.direction), aimed, aim_share);
-}
-
-fn of_lamps(u: vec2f, lobe: LambentLobe, wo: vec3f, s: Surface, aim_share: f32) -> vec3f {
-    let drawn = aim_draw(u);
-    let to = aim_towards(s.x, drawn.xyz);
-    let wi = on_side(lobe, vec3f(dot(to.w, s.t), dot(to.w, s.b), dot(to.w, s.n)));
-    let h = lambent_half_vector(wi, wo);
-    let cos_d = dot(wo, h);
-    if (cos_d <= LAMBENT_COS_MIN || wi.z <= LAMBENT_COS_MIN) { return vec3f(0.0); }
-    let at = Sample(h, cos_d, wi, true);
-    return counted(lobe, at, wo, probe_light(s, drawn.xyz), drawn.w * to.density, aim_share);
-}
-
-// Which samples of the two sequences a frame takes: first and past, of the lobe's and of those that aim.
-struct Turn {
-    lobe: vec2u,
-    aimed: vec2u,
-}
-
-// Where a frame's samples divide evenly each kind goes on with its own sequence. Where they do not, as with one sample
-// per frame, frames take turns by a sequence of its own: it must not follow where in the pixel a frame looks.
-fn turn_of(share: u32, phase: u32) -> Turn {
-    let first = frame.first_sample;
-    let index = first / SAMPLES;
-    if (share * SAMPLES % SIXTEENTHS == 0u) {
-        let aimed = share * SAMPLES / SIXTEENTHS;
-        return Turn((SAMPLES - aimed) * vec2u(index, index + 1u), aimed * vec2u(index, index + 1u));
-    }
-    let aimed = (share * SAMPLES + ((phase + index * 2654435769u) >> 28u)) / SIXTEENTHS;
-    return Turn(vec2u(first + aimed, first + SAMPLES), vec2u(first, first + aimed));
-}
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let lobe = lobe_here(index, s).lobe;
-    let share = aimed_share(lobe, s);
-    let offset = pixel_hash(s.pixel, index);
-    let turn = turn_of(share, offset.z);
-    let aim_share = f32(share) / f32(SIXTEENTHS);
+    let offset = pixel_hash(s.pixel, index).xy;
     var sum = vec3f(0.0);
-    for (var k = turn.lobe.x; k < turn.lobe.y; k++) {
-        sum += of_lobe(sequence(offset.xy, k), lobe, wo, s, aim_share);
-    }
-    if (AIM == 0u) { return sum / f32(SAMPLES); }
-    let other = pixel_hash(s.pixel, index + 16u).xy;
-    for (var k = turn.aimed.x; k < turn.aimed.y; k++) {
-        sum += of_lamps(sequence(other, k), lobe, wo, s, aim_share);
+    for (var k = 0u; k < SAMPLES; k++) {
+        let at = sample_about(wo, lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe));
+        if (!at.seen) { continue; }
+        sum += gain(lobe, at.wi, wo, at.h) * incident_at_level(s, on_side(lobe, at.wi), 0.0);
     }
     return sum / f32(SAMPLES);
 }

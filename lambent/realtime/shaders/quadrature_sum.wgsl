@@ -7,10 +7,10 @@ fn quadrature_sum(here: LobeHere, first: u32, wo: vec3f, s: Surface) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let q = samples[first + k];
-        let at = sample_about(wo, half_vector_of(q.xy * here.growth));
+        let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         if (!at.seen) { continue; }
-        let half_log2_omega = q.z + here.half_log2_growth + 0.5 * log2(at.cos_d * at.h.z * at.h.z * at.h.z);
-        sum += q.w * gain(lobe, at.wi, wo, at.h) * incident(s, on_side(lobe, at.wi), half_log2_omega);
+        let light = incident(s, on_side(lobe, at.wi), half_log2_omega(q, at, here));
+        sum += q.w * gain(lobe, at.wi, wo, at.h) * light;
     }
     return sum;
 }

@@ -1,10 +1,10 @@
-// `rings`: quadrature at fixed samples, and a factor by cos_o that makes it exact under uniform light (normalised.py).
+// `rings`: quadrature at fixed samples, and a factor by cos_o that makes it exact under uniform light (albedo.py).
 //     L = c(cos_o)/n sum w g L_i
 
 #include "surface.wgsl"
 #include "quadrature_sum.wgsl"
 
-const FACTOR_ROWS = 8u; // FACTORS/4 of normalised.py
+const FACTOR_ROWS = 8u; // FACTORS/4 of albedo.py
 
 fn factor_at(first: u32, i: u32) -> f32 {
     return samples[first + i / 4u][i % 4u];

@@ -2,22 +2,23 @@
 
 #include "vertex.wgsl"
 #include "surface.wgsl"
-#include "lean.wgsl"
+#include "dominant_direction.wgsl"
 
-@group(3) @binding(0) var light_map: texture_2d<f32>;
-@group(3) @binding(1) var light_map_back: texture_2d<f32>;
-@group(3) @binding(2) var light_lean: texture_2d<f32>; // where front light comes from, world space; 0: not known
+@group(3) @binding(0) var light_maps: texture_2d_array<f32>;
+
+const FRONT = 0u;     // irradiance on the side of the normal
+const BACK = 1u;      // on the other
+const DIRECTION = 2u; // dominant direction of front light, world space; 0 where it is not known
 
 // Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
-const HALF_MAX = 65504.0; // the largest half float
 
 // Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
 // progressive series.
 fn mesh_frame(v: Varyings) -> mat3x3f {
     let n = normalize(select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12));
-    let flat_t = v.t_world - n * dot(n, v.t_world);
+    let flat_t = rejection(v.t_world, n);
     let t = flat_t * inverseSqrt(max(dot(flat_t, flat_t), 1e-12));
     return mat3x3f(t, cross(n, t), n);
 }
@@ -36,10 +37,16 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
         shown.widening = vec2f(dot(shares, shown.widening), dot(shares.yx, shown.widening));
     }
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
-    let along = brushed - n * dot(n, brushed);
-    let other = select(vec3f(1.0, 0.0, 0.0), vec3f(0.0, 1.0, 0.0), abs(n.x) > 0.7);
-    let t = normalize(select(cross(n, other), along, dot(along, along) > 1e-8));
+    let along = rejection(brushed, n);
+    let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
     return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0);
+}
+
+// Layers past the last are black.
+fn light_map(layer: u32, uv2: vec2f) -> vec3f {
+    let last = textureNumLayers(light_maps) - 1u;
+    let found = textureSampleLevel(light_maps, linear_sampler, uv2, min(layer, last), 0.0).rgb;
+    return select(vec3f(0.0), found, layer <= last);
 }
 
 fn surface_light(v: Varyings, front: bool) -> vec3f {
@@ -47,20 +54,20 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     var s = shading_frame(v, select(-1.0, 1.0, front), view);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
 
-    let e_front = textureSampleLevel(light_map, linear_sampler, v.uv2, 0.0).rgb;
-    let e_back = textureSampleLevel(light_map_back, linear_sampler, v.uv2, 0.0).rgb;
+    let e_front = light_map(FRONT, v.uv2);
+    let e_back = light_map(BACK, v.uv2);
     let e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front);
     var e_bent = e_here;
     if ((TEXTURES & 8u) != 0u && front) {
         let mesh = mesh_frame(v);
         let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
-        e_bent *= bent_share(textureSampleLevel(light_lean, linear_sampler, v.uv2, 0.0).xyz, mesh[2], bent);
+        e_bent *= bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
     }
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
-    s.open = open_share(s.n, e_bent);
+    s.occlusion = specular_occlusion(s.n, e_bent);
     let specular = specular_light(wo, s);
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return clamp(light, vec3f(0.0), vec3f(HALF_MAX));

@@ -1,6 +1,6 @@
-// Edges of the shown picture, blended: fast approximate antialiasing (Lottes 2009), written from the published idea.
+// Edges of the display image, blended: fast approximate antialiasing (Lottes 2009), written from the published idea.
 // A step of luma runs along an edge; where the edge ends on both sides tells how much of this pixel lies beyond it,
-// and the picture is read as far across. The encoded picture is what the eye judges, so a lamp's edge is smoothed too.
+// and the image is read as far across. The encoded image is what the eye judges, so a lamp's edge is smoothed too.
 
 #include "screen.wgsl"
 

@@ -1,11 +1,11 @@
 // What today's engines do (Karis 2013): one look-up in a cube prefiltered for the roughness, about the normal, times
 // a table of the lobe's albedo. Isotropic: an anisotropic lobe gets the roughness sqrt(mx my).
-// Where a picture varies the roughness, the level follows it, and the table stays that of the material's numbers.
+// Where a texture varies the roughness, the level follows it, and the table stays that of the material's numbers.
 // The table has rows (A, B) over cos_o: k (r0 A + B) is the albedo.
 
 #include "surface.wgsl"
 
-const LAST_LEVEL = 6.0; // LEVELS of split_sum.py, less one
+const LAST_LEVEL = 6.0; // LEVELS of albedo.py, less one
 
 fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let here = lobe_here(index, s);

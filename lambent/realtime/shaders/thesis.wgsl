@@ -7,7 +7,7 @@
 override FORMULA: u32 = 25u;
 
 fn reflected(wo: vec3f, slope: vec2f) -> vec3f {
-    return sample_about(wo, half_vector_of(slope)).wi;
+    return lambent_mirrored(wo, lambent_from_slopes(slope));
 }
 
 fn tangent_of_angle(a: vec3f, b: vec3f) -> f32 {
@@ -27,7 +27,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     for (var k = 0u; k < SAMPLES; k++) {
         let sample = samples[index * SAMPLES + k];
         // no longer quite equal angles where the roughness varies
-        let at = sample_about(wo, half_vector_of(sample.xy * here.growth));
+        let at = sample_about(wo, lambent_from_slopes(sample.xy * here.growth));
         if (!at.seen) { continue; }
         let p = sample.w / (at.h.z * at.h.z * at.h.z * at.cos_d);
         let q = gain(lobe, at.wi, wo, at.h) / at.wi.z;

@@ -6,7 +6,7 @@ from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
-from lambent.realtime.frame import Renderer
+from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import unbaked_scene, with_diffuse_light
 from lambent.viewer.editor.preview import OBJECT, SHAPES, Floats, with_lamp
 from lambent.viewer.input import Rect

@@ -1,19 +1,19 @@
-// Depth of a mirror picture before anything is drawn: nothing passes where the mirror eye looks past the foot of a wall.
+// Depth of a mirrored view before anything is drawn: nothing passes where its eye looks past the foot of a wall.
 
 #include "frame.wgsl"
 #include "screen.wgsl"
 
-struct Plan { // PLAN_DTYPE in mirror.py
-    to_u: vec4f, // what leads from the mirror eye to a point of the reflector's plane, to its place in the plan
+struct Plan {
+    to_u: vec4f, // offset of a point of the reflector's plane from the mirrored eye -> its place in the plan
     to_v: vec4f,
-    below: f32,  // m: the mirror eye under the plane
+    below: f32,  // m: the mirrored eye under the plane
 }
 
 @group(1) @binding(0) var<uniform> plan: Plan;
 @group(1) @binding(1) var distances: texture_2d<f32>;
 
-@fragment fn mirror_walls_main(screen: Screen) -> @builtin(frag_depth) f32 {
-    let w = frame.forward.xyz + screen.clip.x * frame.across.xyz + screen.clip.y * frame.up.xyz;
+@fragment fn planar_walls_main(screen: Screen) -> @builtin(frag_depth) f32 {
+    let w = camera_ray(screen.clip);
     let rising = dot(w, vec3f(frame.across.w, frame.up.w, frame.forward.w));
     let q = w * (plan.below / max(rising, 1e-9));
     let uv = vec2f(dot(plan.to_u, vec4f(q, 1.0)), dot(plan.to_v, vec4f(q, 1.0)));

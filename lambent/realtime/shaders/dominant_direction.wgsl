@@ -1,9 +1,9 @@
-// Diffuse light on a bent normal, from where the irradiance of the mesh's normal comes from.
+// Diffuse light on a bent normal, from the dominant direction of the light on the mesh's normal.
 
-// E(bent)/E(n) for light of lean d, the mean of the directions it comes from, weighted by their irradiance
-// (bake/light_lean.py), in the frame of d. The light is taken as a share a of a uniform hemisphere, whose lean is 2/3 n,
-// and one lamp in direction l: d = a 2/3 n + (1 - a) l with |l| = 1 gives a. Exact for either alone. What is below the
-// mesh's own horizon is dark.
+// E(bent)/E(n) for light of the dominant direction d: the mean of the directions it comes from, weighted by what each adds
+// to the irradiance, in the frame of n and bent. The light is taken as a share a of a uniform hemisphere, whose mean is
+// 2/3 n, and one lamp in direction l: d = a 2/3 n + (1 - a) l with |l| = 1 gives a. Exact for either alone. What is below
+// the mesh's own horizon is dark.
 fn bent_share(d: vec3f, n: vec3f, bent: vec3f) -> f32 {
     let square = dot(d, d);
     if (square < 1e-6) { return 1.0; }

@@ -1,11 +1,12 @@
-"""What a planar reflector shows: the scene seen by the camera mirrored at its plane (thesis M, 4.5.1).
+"""The mirrored view of a planar reflector: the scene seen by the camera mirrored at its plane (thesis M, 4.5.1).
 
 Instead of moving the camera the world is mirrored, so that a point of the reflector and what it mirrors lie at the same
-place of both pictures. The mirror picture is larger than the frame by a margin, for what lobes see beyond its edges.
+place of the frame and of the planar reflection buffer. The buffer is larger than the frame by a margin, for what lobes
+see beyond its edges.
 
 Depth is reversed. In front of the reflector there is nothing to see: its plane is the near plane (Lengyel 2005, here
 for reversed, infinite depth). With w the depth of a point and h its height over the plane,
-    z = w - a h,  a = 1/max(n.ray) over the picture's rays of depth 1
+    z = w - a h,  a = 1/max(n.ray) over the view's rays of depth 1
 is 1 (times w) in the plane and falls with the distance along every ray to 1 - a n.ray >= 0 at infinity.
 """
 
@@ -17,65 +18,42 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.store.contract import PlanRecord, ReflectorRecord
+from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE
+from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
 Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
-MOST_MARGIN = 0.1  # of the picture's longer side: what a wide lobe sees beyond is left to the probe
+MOST_MARGIN = 0.1  # of the frame's longer side: what a wide lobe sees beyond is left to the probe
 STEP_PX = 64  # sizes are multiples of this: six MIP levels without remainder
 CLEARANCE = 1e-5  # over the reflector's highest vertex, of the largest coordinate: what lies below is not mirrored
-LEAST_SHARE = 2e-4  # of the picture: a reflector that covers less is left to its probes
+LEAST_SHARE = 2e-4  # of the frame: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
-
-MIRROR_DTYPE = np.dtype(  # Mirror in shaders/planar_mirror.wgsl
-    [
-        ("eye", "f4", 4), ("row_x", "f4", 4), ("row_y", "f4", 4), ("row_w", "f4", 4), ("plane", "f4", 4),
-        ("across", "f4", 4), ("up", "f4", 4), ("forward", "f4", 4),
-        ("size", "f4", 2), ("offset", "f4", 2), ("tolerance", "f4"), ("focal_px", "f4"), ("levels", "f4"),
-        ("number", "f4"),
-    ]
-)  # fmt: skip
-PLAN_DTYPE = np.dtype([("to_u", "f4", 4), ("to_v", "f4", 4), ("below", "f4", 4)])  # Plan in shaders/mirror_walls.wgsl
+MOST_REFLECTORS = 4  # of a frame; those that cover less of it are left to their probes
 
 
 @dataclass(frozen=True)
-class MirrorView:
-    """One reflector of one frame.
-
-    Attributes
-    ----------
-    reflector : ReflectorRecord
-    plane : (4,)
-        (n, d), n on the viewer's side.
-    frame : NDArray of FRAME_DTYPE
-        The mirrored frame: what the mirror rendering is drawn with.
-    uniform : NDArray of MIRROR_DTYPE
-        How places in the scene find theirs in the mirror picture.
-    size : tuple of int
-        Width and height of the mirror picture, pixels.
-    share : float
-        Of the frame that the reflector's outline covers.
-    plan : NDArray of PLAN_DTYPE or None
-        How rays of the mirrored frame find their place in the reflector's plan; None where no walls stand on it.
-    """
+class PlanarView:
+    """One reflector of one frame."""
 
     reflector: ReflectorRecord
-    plane: Floats
-    frame: NDArray[np.void]
-    uniform: NDArray[np.void]
-    size: tuple[int, int]
-    share: float
-    plan: NDArray[np.void] | None = None
+    frame: NDArray[np.void]  # record of FRAME_DTYPE that the buffer is drawn with
+    uniform: NDArray[np.void]  # of MIRRORED_VIEW_DTYPE: how places in the scene find theirs in the buffer
+    size: tuple[int, int]  # width and height of the buffer, pixels
+    plan: NDArray[np.void] | None = None  # of PLAN_DTYPE: how rays find their place in the reflector's plan, if any
+
+    def has(self, record: ObjectRecord) -> bool:
+        """Whether an object is a part of the reflector."""
+        return any(part.object == record.name for part in self.reflector.parts)
 
 
-def mirror_views(
+def planar_views(
     frame: NDArray[np.void], reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
     widest: Mapping[str, float] | None = None,
-) -> list[MirrorView]:  # fmt: skip
+) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
-    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger mirror picture. All pictures
-    of a frame have one size.
+    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. All buffers of a
+    frame have one size.
     """
     seen = []
     for reflector in reflectors:
@@ -90,14 +68,12 @@ def mirror_views(
     seen.sort(key=lambda one: -one[0])
     m = max((widest or {}).get(part.object, 0.0) for _, r, _ in seen[:most] for part in r.parts) if seen else 0.0
     place = _padded(frame, (width, height), m)
-    views = (
-        _view(frame, plane, r, share, (width, height), place, i) for i, (share, r, plane) in enumerate(seen[:most])
-    )
+    views = (_view(frame, plane, r, (width, height), place, i) for i, (_, r, plane) in enumerate(seen[:most]))
     return [view for view in views if view is not None]
 
 
 def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
-    """How far over a reflector its mirror picture begins, m: some 80 roundings of float32.
+    """How far over a reflector its mirrored view begins, m: some 80 roundings of float32.
 
     Light from outside comes in through it, below what stands on the reflector.
     """
@@ -105,7 +81,7 @@ def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
 
 
 def covered_share(frame: NDArray[np.void], outline: Floats) -> float:
-    """Share of the picture that a convex polygon (P, 3) covers, 0 where it is out of view."""
+    """Share of the frame that a convex polygon (P, 3) covers, 0 where it is out of view."""
     clip_from_world = frame["clip_from_world"].T.astype(float)
     points = np.column_stack([outline, np.ones(len(outline))]) @ clip_from_world[[0, 1, 3]].T
     for sides in ((0, 0, 1), (1, 0, 1), (-1, 0, 1), (0, 1, 1), (0, -1, 1)):
@@ -130,14 +106,10 @@ def _clipped(points: Floats, height: Floats) -> Floats:
 
 
 def _view(
-    frame: NDArray[np.void],
-    plane: Floats,
-    reflector: ReflectorRecord,
-    share: float,
-    size: tuple[int, int],
-    place: tuple[Floats, Floats],
-    number: int,
-) -> MirrorView | None:
+    frame: NDArray[np.void], plane: Floats, reflector: ReflectorRecord, size: tuple[int, int],
+    place: tuple[Floats, Floats], number: int,
+) -> PlanarView | None:  # fmt: skip
+    """The view of a reflector in the plane (n, d), n on the viewer's side; None where no ray of the frame meets it."""
     n, d = plane[:3], float(plane[3])
     turn = np.eye(3) - 2 * np.outer(n, n)
     mirrored = np.eye(4)
@@ -166,7 +138,7 @@ def _view(
     seen["across"][3], seen["up"][3], seen["forward"][3] = n
     seen["show"] = (1, 1, 1, 0)
     upright = n @ reflector.plane[:3] > 0  # walls stand on the side that the reflector faces
-    uniform = np.zeros((), MIRROR_DTYPE)
+    uniform = np.zeros((), MIRRORED_VIEW_DTYPE)
     uniform["eye"][:3] = eye
     for row, name in ((0, "row_x"), (1, "row_y"), (3, "row_w")):
         uniform[name][:3] = clip[row, :3]
@@ -175,9 +147,9 @@ def _view(
     uniform["plane"], uniform["size"], uniform["offset"] = plane, wide, offset
     uniform["tolerance"] = reflector.deviation_m + 2 * clearance
     uniform["focal_px"] = wide[1] / 2 / np.linalg.norm(up)
-    uniform["levels"], uniform["number"] = levels_of((int(wide[0]), int(wide[1]))), number
     size_px, plan = (int(wide[0]), int(wide[1])), _plan(reflector.plan, plane, eye) if upright else None
-    return MirrorView(reflector, plane, seen, uniform, size_px, share, plan)
+    uniform["levels"], uniform["number"] = levels_of(size_px), number
+    return PlanarView(reflector, seen, uniform, size_px, plan)
 
 
 def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.void] | None:
@@ -185,8 +157,7 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.v
         return None
     uniform = np.zeros((), PLAN_DTYPE)
     offset = eye - np.asarray(record.corner)
-    axes = (("to_u", record.across, record.columns), ("to_v", record.along, record.rows))
-    for name, axis, cells in axes:
+    for name, axis, cells in (("to_u", record.across, record.columns), ("to_v", record.along, record.rows)):
         uniform[name][:3] = np.asarray(axis) / (record.cell_m * cells)
         uniform[name][3] = (offset @ np.asarray(axis) / record.cell_m + 0.5) / cells
     uniform["below"] = -(plane[:3] @ eye + plane[3])
@@ -194,7 +165,7 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.v
 
 
 def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[Floats, Floats]:
-    """Size of the mirror picture of a frame of `size`, and where the frame's first pixel lies in it.
+    """Size of the buffer of a frame of `size`, and where the frame's first pixel lies in it.
 
     The margin holds the half-width 2 m of the widest lobe about the rays at the edges.
     """
@@ -205,5 +176,5 @@ def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[F
 
 
 def levels_of(size: tuple[int, int]) -> int:
-    """MIP levels of a mirror picture."""
+    """MIP levels of a planar reflection buffer."""
     return min(MOST_LEVELS, int(np.log2(min(size))) - 1)

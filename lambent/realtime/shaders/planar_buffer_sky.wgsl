@@ -1,4 +1,4 @@
-// The environment in a mirror picture: a plane far away that faces the mirror eye.
+// The environment in a planar reflection buffer: a plane far away that faces the mirrored eye.
 
 #include "frame.wgsl"
 #include "screen.wgsl"
@@ -7,15 +7,15 @@
 
 const FAR = 1e4; // metres, as in store/contract.py
 
-struct MirrorSky {
+struct BufferTexel {
     @location(0) light: vec4f,
     @location(1) plane: vec4f,
 }
 
-@fragment fn mirror_sky_main(screen: Screen) -> MirrorSky {
-    let w = frame.forward.xyz + screen.clip.x * frame.across.xyz + screen.clip.y * frame.up.xyz;
+@fragment fn planar_buffer_sky_main(screen: Screen) -> BufferTexel {
+    let w = camera_ray(screen.clip);
     let n = vec3f(frame.across.w, frame.up.w, frame.forward.w);
     let faced = dot(w, n) > 0.0; // other rays never leave the reflector: nothing lies there
     let light = vec4f(textureSampleLevel(environment, linear_sampler, w, 0.0).rgb, 1.0);
-    return MirrorSky(select(vec4f(0.0), light, faced), vec4f(-normalize(w), -FAR));
+    return BufferTexel(select(vec4f(0.0), light, faced), vec4f(-normalize(w), -FAR));
 }

@@ -1,7 +1,7 @@
 """The specular integrators on planar reflectors, by the name they have on curved objects.
 
-Each is a shader with `integrate_planar(index, wo, surface, place)` and a table of samples (patterns.py says what a row
-is). What has none here is left to the probes.
+Each is a shader with `integrate_planar(index, wo, surface, place)` and a table of samples (rows as in patterns.py). An
+integrator without one shows the probes on planar reflectors, too.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.integrators import Integrator
@@ -17,12 +18,12 @@ from lambent.realtime.integrators import Integrator
 Floats = NDArray[np.floating]
 TILE = 64  # pixels that sample a lobe in turns
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
-# Of the filter, against one that covers the lobe: found by experiment. The narrower the better where each sample finds
-# its own hit, and where 64 pixels share the lobe.
+# Factors on the filter, 1 where it covers the lobe, by experiment: the narrower the better where each sample finds its
+# own hit, and where 64 pixels share the lobe.
 FIXED_BIAS, INTERLEAVED_BIAS = 0.4, 0.03
 MOST_RINGS = 3
 THREE_STEPS = {"MARCH_STEPS": 0}
-# Hidden hits count a fifth. What the mirror picture does not hold is filtered in the probe as fixed rings are.
+# Hidden hits count a fifth. Samples that leave the buffer are filtered in the probe as those of fixed rings are.
 SHARED = {"HIDDEN_DROP": 0.8, "BEYOND_WIDER": 1.75}
 
 
@@ -64,6 +65,8 @@ def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Flo
     return np.concatenate(blocks)
 
 
+# Two searches for hits: `marched` is the better one on a real floor, `interleaved` takes .7 of its time and is as good
+# where little stands on the floor (docs/performance.md).
 PLANAR: dict[str, dict[str, Integrator]] = {
     "rings": {
         "marched": Integrator("planar_interleaved.wgsl", interleaved_table, {"MARCH_STEPS": 12, **SHARED}),
@@ -77,34 +80,20 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
 }
 AUTO, OFF = "auto", "off"
-CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for ways in PLANAR.values() for name in ways if name != "qmc")]))
+CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
 
 
-def planar_integrator(integrator: str, way: str) -> Integrator | None:
-    """How planar reflectors are drawn with an integrator: the `way` said, else its first, else None, by probes."""
-    if way not in CHOICES:
-        hint = did_you_mean(way, CHOICES)
-        raise UserError("unknown way to draw planar reflectors", got=way, expected=", ".join(CHOICES), hint=hint)
-    ways = PLANAR.get(integrator, {})
-    if way == OFF or not ways:
-        return None
-    return ways.get(way, next(iter(ways.values())))
+def planar_integrator(integrator: str, method: str) -> Integrator | None:
+    """How planar reflectors are drawn with an integrator: by `method`, else its first one, else None, by probes."""
+    known("method for planar reflectors", method, CHOICES)
+    methods = PLANAR.get(integrator, {})
+    return None if method == OFF or not methods else methods.get(method, next(iter(methods.values())))
 
 
-def check_planar(integrator: str, way: str) -> None:
-    """Raise `UserError` where an integrator does not know a way: a frame would draw with its first."""
-    planar_integrator(integrator, way)
-    known = (AUTO, OFF, *PLANAR.get(integrator, {}))
-    if way not in known:
-        expected = ", ".join(known)
-        raise UserError(f"{integrator} does not draw reflectors so", field="--planar", got=way, expected=expected)
-
-
-def is_interleaved(how: Integrator) -> bool:
-    """Whether neighbouring pixels sample lobes in turns, so that the picture is cleaned afterwards."""
-    return how.table is interleaved_table
-
-
-def is_searched(how: Integrator) -> bool:
-    """Whether hits are searched for in the cells of `passes.near`."""
-    return how.constants.get("CELL_STEPS", 0) > 0
+def check_planar(integrator: str, method: str) -> None:
+    """Raise `UserError` where an integrator does not have a method: a frame would be drawn by its first."""
+    planar_integrator(integrator, method)
+    choices = (AUTO, OFF, *PLANAR.get(integrator, {}))
+    if method not in choices:
+        expected = ", ".join(choices)
+        raise UserError(f"{integrator} does not draw reflectors so", field="--planar", got=method, expected=expected)

@@ -1,4 +1,4 @@
-"""A frame in parts is the frame, and what is left out of it cannot be seen."""
+"""A frame in slices is the frame, and what is left out of it cannot be seen."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import pytest
 
 from lambent.core.camera import Camera, clip_from_world
 from lambent.realtime.clusters import CLUSTER_FACES, Clusters
-from lambent.realtime.frame import FrameState, Renderer
-from lambent.realtime.parts import PART_S, STEP_ROWS, Cut
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.slices import SLICE_S, STEP_ROWS, Cut
+from lambent.realtime.targets import pixels
 from lambent.scenes.geometry import sphere
 from lambent.store.contract import ObjectRecord
 from tests.realtime.test_realtime_planar import mirror, scene_of, state
@@ -82,8 +84,8 @@ def renderer(device: Any) -> Renderer:
     return Renderer(device, scene_of(mirror(0.15)))
 
 
-def in_parts(renderer: Renderer, frame: FrameState, view: Any, cut: Cut) -> tuple[Any, int]:
-    steps, count = renderer.parts(frame, view, cut), 0
+def in_slices(renderer: Renderer, frame: FrameState, view: Any, cut: Cut) -> tuple[Any, int]:
+    steps, count = renderer.slices(frame, view, cut), 0
     while True:
         try:
             next(steps)
@@ -97,35 +99,33 @@ def in_parts(renderer: Renderer, frame: FrameState, view: Any, cut: Cut) -> tupl
     [{}, {"integrator": "qmc", "n": 1, "accumulate": 0, "prior": 0.7}, {"view_transform": "false-colour"}],
     ids=["rings", "qmc", "false-colour"],
 )
-def test_a_frame_in_parts_is_the_frame_to_the_bit(renderer: Renderer, more: dict[str, Any]) -> None:
+def test_a_frame_in_slices_is_the_frame_to_the_bit(renderer: Renderer, more: dict[str, Any]) -> None:
     frame = replace(state(), width=SIZE[0], height=SIZE[1], antialias=True, **more)
-    shown = renderer._targets.picture("display", *SIZE)
-    kind = np.float32 if "accumulate" in more else np.float16
+    shown = renderer._targets.display("display", SIZE)
 
-    def pixels(radiance: Any) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            renderer._read_pixels(shown, frame, np.uint8).copy(),
-            renderer._read_pixels(radiance, frame, kind).copy(),
-        )
+    def both(radiance: Any) -> tuple[np.ndarray, np.ndarray]:
+        return pixels(renderer.device, shown).copy(), pixels(renderer.device, radiance).copy()
 
-    whole = pixels(renderer.draw(frame, shown.create_view()))
+    whole = both(renderer.draw(frame, shown.create_view()))
     assert whole[0].std() > 1, "there is something to compare"
-    cut = Cut(dict.fromkeys(("mirror", "planar", "shade", "tonemap", "smooth"), PART_S))  # a pixel a part: least bands
-    radiance, count = in_parts(renderer, frame, shown.create_view(), cut)
+    cut = Cut(
+        dict.fromkeys(("mirror", "planar", "shade", "tonemap", "smooth"), SLICE_S)
+    )  # a pixel a slice: least bands
+    radiance, count = in_slices(renderer, frame, shown.create_view(), cut)
     assert count > 10
-    for one, other in zip(whole, pixels(radiance), strict=True):
+    for one, other in zip(whole, both(radiance), strict=True):
         np.testing.assert_array_equal(one, other)
     statistics = renderer.statistics
     assert statistics["mirrors"] == 1 and statistics["draw_calls"] > 10
 
 
-def test_a_renderer_beside_may_draw_between_two_parts(renderer: Renderer) -> None:
+def test_a_renderer_beside_may_draw_between_two_slices(renderer: Renderer) -> None:
     """It shares the materials' buffers, and writes other samples into them."""
     frame = replace(state(), width=SIZE[0], height=SIZE[1])
-    view = renderer._targets.picture("display", *SIZE).create_view()
-    expected = renderer._read_pixels(renderer.draw(frame, view), frame, np.float16).copy()
+    view = renderer._targets.display("display", SIZE).create_view()
+    expected = pixels(renderer.device, renderer.draw(frame, view)).copy()
     beside = Renderer(renderer.device, renderer.scene, beside=renderer)
-    steps = renderer.parts(frame, view, Cut())
+    steps = renderer.slices(frame, view, Cut())
     while True:
         try:
             next(steps)
@@ -133,12 +133,12 @@ def test_a_renderer_beside_may_draw_between_two_parts(renderer: Renderer) -> Non
             radiance = done.value
             break
         beside.image(replace(state(), integrator="qmc", n=5))
-    np.testing.assert_array_equal(renderer._read_pixels(radiance, frame, np.float16), expected)
+    np.testing.assert_array_equal(pixels(renderer.device, radiance), expected)
 
 
 def test_a_frame_that_is_overtaken_ends(renderer: Renderer) -> None:
     frame = state()
-    steps = renderer.parts(frame, renderer._targets.picture("display", frame.width, frame.height).create_view(), Cut())
+    steps = renderer.slices(frame, renderer._targets.display("display", frame.size).create_view(), Cut())
     next(steps)
     renderer.image(frame)
     with pytest.raises(RuntimeError, match="another frame"):
@@ -149,10 +149,10 @@ def test_bands_follow_what_they_took() -> None:
     cut = Cut()
     bands = cut.bands("shade", (100, 10 * STEP_ROWS + 3))
     assert next(bands).end == STEP_ROWS, "nothing is known yet"
-    cut.took(PART_S / 8)
+    cut.took(SLICE_S / 8)
     assert (band := next(bands)).end - band.begin == 2 * STEP_ROWS and band.load_op == "load", "grown by and by"
-    cut.took(PART_S / 4)
+    cut.took(SLICE_S / 4)
     assert (band := next(bands)).end - band.begin == 4 * STEP_ROWS
-    cut.took(100 * PART_S)
+    cut.took(100 * SLICE_S)
     rest = list(bands)
     assert [b.end - b.begin for b in rest] == [STEP_ROWS] * 3 + [3] and rest[-1].shares[1] == 1

@@ -1,0 +1,94 @@
+"""What the passes of a frame share."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.realtime.clusters import Clusters, Seen
+from lambent.realtime.draws import Draw
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.pipelines import cover
+from lambent.realtime.planar_view import PlanarView
+from lambent.realtime.resources import SceneResources
+from lambent.realtime.slices import Band, Cut, Steps, Whole
+from lambent.realtime.targets import PassTimer, Target, Targets, stored
+
+SMOOTH_PRIOR = 0.5  # share of the prior from which edges are those of one frame, and so are blended
+
+
+@dataclass
+class FrameContext:
+    """A frame under way. Passes read it, and leave in it what the next ones need."""
+
+    part: Whole | Cut  # whose encoder takes the passes
+    state: FrameState
+    data: NDArray[np.void]  # of FRAME_DTYPE
+    frame_group: Any  # group 0 of all pipelines, with `data`
+    resources: SceneResources
+    clusters: Clusters
+    targets: Targets
+    timer: PassTimer
+    target: Target  # that light is drawn into
+    draws: list[Draw]
+    views: list[PlanarView]  # of the planar reflectors that have a buffer in this frame
+    counts: Counter[str]  # draw_calls
+    shown: Any = None  # view that the display image is drawn into, if any
+    radiance: Any = None  # texture of linear light, as the passes before left it
+    prior: Any = None  # texture of the last frame of few samples, where it is shown beside a progressive mean
+    reflections: Any = None  # group 3 of draws that have pixels on planar reflectors
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the frame is shown once: half floats suffice, and edges of masked surfaces can be blended."""
+        return self.shown is not None and self.state.accumulate is None
+
+    @property
+    def blends_masks(self) -> bool:
+        """Whether pixels that masked surfaces cover in part are blended with what is behind."""
+        return self.is_passing and self.state.is_smoothed and bool(self.resources.masked)
+
+    @property
+    def unsmoothed(self) -> Any:
+        """Texture of the display image before its edges are blended, None where they are not."""
+        of_one = self.state.accumulate is None or (self.prior is not None and self.state.prior > SMOOTH_PRIOR)
+        smoothed = self.shown is not None and of_one and self.state.is_smoothed
+        return self.targets.display("unsmoothed", self.state.size) if smoothed else None
+
+    def seen(self, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
+        """What the frame's camera may see of the scene in a band of rows."""
+        return self.clusters.seen(self.data["clip_from_world"].T, rows)
+
+    def begin(
+        self, name: str, views: Iterable[Any], load_op: str, depth: str = "load", band: Band | None = None
+    ) -> Any:
+        """A render pass into `views` and the target's depth, which it loads or clears; group 0 is set."""
+        render = self.part.encoder.begin_render_pass(
+            color_attachments=stored(views, load_op),
+            depth_stencil_attachment={
+                "view": self.target.depth.create_view(), "depth_clear_value": 0.0, "depth_load_op": depth,
+                "depth_store_op": "store",
+            },
+            **self.timer.writes(name),
+        )  # fmt: skip
+        if band is not None:
+            band.cut(render)
+        render.set_bind_group(0, self.frame_group)
+        return render
+
+    def cover(
+        self, name: str, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], band: Band | None = None
+    ) -> None:
+        """A render pass of a `screen_pipeline` into `views`."""
+        cover(self.part.encoder, views, pipeline, groups, self.timer.writes(name), band)
+
+
+class Pass(Protocol):
+    """A step of a frame; does nothing where the frame has no need of it."""
+
+    def encode(self, context: FrameContext) -> Steps: ...

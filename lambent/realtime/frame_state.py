@@ -1,0 +1,157 @@
+"""What a frame depends on besides the store, the choices there are, and the record that shaders read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lambent.core.camera import Camera, clip_from_world, image_plane
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
+from lambent.core.false_colour import Range
+from lambent.core.photometry import ILLUMINANCE, LUMINANCE, NOISE, Quantity
+from lambent.core.sequences import radical_inverse
+from lambent.materials.document import Material
+from lambent.realtime.integrators import integrator
+from lambent.realtime.patterns import N_MAX, automatic_n
+from lambent.realtime.planar_integrators import AUTO, TILE, planar_integrator
+from lambent.realtime.structs import FRAME_DTYPE
+
+LIGHT_MAP = "light-map"  # irradiance, in the place of radiance
+LIGHT_MAP_NOISE = "noise"  # its relative standard error before it was denoised
+# Weights of diffuse, specular, sky, light map.
+SHOW = {
+    "full": (1, 1, 1, 0), "diffuse": (1, 0, 0, 0), "specular": (0, 1, 0, 0),
+    LIGHT_MAP: (0, 0, 0, 1), LIGHT_MAP_NOISE: (0, 0, 0, 1),
+}  # fmt: skip
+QUANTITIES = {LIGHT_MAP: ILLUMINANCE, LIGHT_MAP_NOISE: NOISE}  # of what is shown; of everything else luminance
+FALSE_COLOUR = "false-colour"
+VIEW_TRANSFORMS = {FALSE_COLOUR: 3, "linear": 0, "neutral": 1, "filmic": 2}  # as shaders/tonemap.wgsl numbers them
+QMC_N = 8  # samples per pixel, lobe and frame of the progressive mode
+
+
+@dataclass(frozen=True)
+class FrameState:
+    """All that a frame depends on besides the store.
+
+    Attributes
+    ----------
+    camera : Camera
+    width, height : int
+        Pixels.
+    integrator : str
+        A name of `integrators.INTEGRATORS`.
+    n : int, optional
+        Samples per lobe, 1 to 64; by default chosen per material from its roughness.
+    exposure_ev : float
+        Radiance is multiplied by 2^exposure_ev before the view transform; only the display image knows it.
+    view_transform : str
+        filmic, neutral, linear, or false-colour: luminance in colours of `scale`.
+    scale : false_colour.Range
+        What the false colours mean, in the unit of `quantity_of(show)`.
+    near_m : float, optional
+        Nearer things are cut away; by default a ten-thousandth of the scene's size.
+    materials : mapping
+        Materials that stand in for the store's, by name.
+    lookup : str
+        How a direction finds its light in a probe: auto, or a look-up of `realtime.incident`.
+    lookups : mapping
+        The same for single objects, by name.
+    planar : str
+        How planar reflectors are drawn: auto, off (by their probes), or a method of `planar_integrators`.
+    show : str
+        full, diffuse, specular, light-map: the irradiance, W/m^2, or noise: its relative standard error, which is
+        always in false colours.
+    accumulate : int, optional
+        Index of the frame in a progressive series: it is averaged into the frames 0 ... index - 1 before it.
+    prior : float
+        Share, in the display image of a progressive series, of the last frame of few samples that was displayed.
+    antialias : bool
+        Edges of the display image are blended, or, when accumulating, frames are jittered.
+    jitter_px : tuple of float
+        Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
+    """
+
+    camera: Camera
+    width: int = 1680
+    height: int = 1050
+    integrator: str = "rings"
+    n: int | None = None
+    exposure_ev: float = 0.0
+    view_transform: str = "filmic"
+    scale: Range = field(default_factory=Range)
+    near_m: float | None = None
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    lookup: str = "auto"
+    lookups: Mapping[str, str] = field(default_factory=dict)
+    planar: str = AUTO
+    show: str = "full"
+    accumulate: int | None = None
+    prior: float = 0.0
+    antialias: bool = True
+    jitter_px: tuple[float, float] = (0.0, 0.0)
+
+    def check(self) -> None:
+        """Raise `UserError` for a value that no frame can have; look-ups are checked where objects are drawn."""
+        integrator(self.integrator)
+        planar_integrator(self.integrator, self.planar)
+        if self.n is not None and not 1 <= self.n <= N_MAX:
+            raise UserError("sample count is out of range", field="n", got=self.n, expected=f"1 to {N_MAX}")
+        known("view transform", self.view_transform, reversed(VIEW_TRANSFORMS))
+        if self.is_false_coloured:
+            self.scale.check()
+        known("part of the light", self.show, SHOW)
+        if not (0 < self.width <= 8192 and 0 < self.height <= 8192):
+            size = f"{self.width}x{self.height}"
+            raise UserError("picture size is out of range", got=size, expected="1x1 to 8192x8192")
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.width, self.height
+
+    @property
+    def is_false_coloured(self) -> bool:
+        """Whether the display image is in false colours."""
+        return self.view_transform == FALSE_COLOUR or self.show == LIGHT_MAP_NOISE
+
+    @property
+    def is_smoothed(self) -> bool:
+        """Whether edges of the display image are blended where it comes from one frame."""
+        return self.antialias and not self.is_false_coloured
+
+    def samples(self, material: Material, roughness: float = 1.0) -> int:
+        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
+        return self.n or (QMC_N if integrator(self.integrator).progressive else automatic_n(material, roughness))
+
+
+def quantity_of(show: str) -> Quantity:
+    """Quantity and unit of an image that shows this part of the light."""
+    return QUANTITIES.get(show, LUMINANCE)
+
+
+def frame_data(state: FrameState, bounds: ArrayLike) -> NDArray[np.void]:
+    """Record of FRAME_DTYPE; `bounds` (2, 3) are those of the scene."""
+    camera, width, height = state.camera, state.width, state.height
+    jitter = state.jitter_px
+    if state.accumulate is not None and state.antialias:
+        index = np.array([state.accumulate + 1])
+        jitter = (float(radical_inverse(index, 2)[0]) - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
+    low, high = np.asarray(bounds)
+    near_m = state.near_m or float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+    across, up, forward = image_plane(camera, width, height)
+    data = np.zeros((), FRAME_DTYPE)
+    data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns
+    data["eye"][:3], data["across"][:3], data["up"][:3] = camera.position, across, up
+    data["forward"][:3] = forward + across * (2 * jitter[0] / width) - up * (2 * jitter[1] / height)
+    data["eye"][3] = np.floor((jitter[0] + 0.5) * TILE) % TILE
+    data["show"] = SHOW[state.show]
+    data["scale"] = (state.scale.low, state.scale.high, state.scale.log, quantity_of(state.show).per_y)
+    data["first_sample"] = (state.accumulate or 0) * (state.n or QMC_N)
+    data["view_transform"] = VIEW_TRANSFORMS[FALSE_COLOUR if state.is_false_coloured else state.view_transform]
+    data["prior"] = state.prior
+    data["exposure"] = 2.0**state.exposure_ev
+    return data

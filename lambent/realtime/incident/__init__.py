@@ -1,0 +1,64 @@
+"""Look-ups of incident light: where in a probe a direction at a surface finds its light. One file each, found by name.
+
+A look-up is a module that has what `LookUp` lists, and beside it a shader of the same name with
+    fn incident_look_up(x: vec3f, w: vec3f) -> LookUp    where to look from x, about the probe's centre, along w
+    fn incident_bound(x: vec3f, w: vec3f) -> f32         1/m: 1 over the distance at which a wall that is known ends the
+                                                         view along w; 0 where none is known
+and, where samples can be aimed at lamps through it (AIMS),
+    fn aim_maps(x: vec3f) -> bool                        whether that can be done at x
+    fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed        incident_look_up, and how densely the probe's directions lie
+    fn aim_towards(x: vec3f, q: vec3f) -> Towards        the way back, from a direction q of the probe
+The types are those of shaders/incident.wgsl. Bindings of its own are in group 2, from 3 on.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from lambent.core.discovery import known, modules_in
+from lambent.realtime.baked import Probe
+
+AUTO = "auto"
+
+
+class LookUp(Protocol):
+    """What a module of this package has."""
+
+    NAME: str  # as the command line and the window have it
+    COST: int  # relative: lists go from cheap to dear
+    PREFERENCE: int  # AUTO takes the look-up of the highest preference that serves a probe
+    AIMS: bool  # whether samples can be aimed at the probe's lamps through it
+    BINDINGS: tuple[str, ...]  # kinds (`layouts.KINDS`) of its resources
+    __file__: str
+
+    def __hash__(self) -> int: ...
+
+    def serves(self, probe: Probe) -> bool:
+        """Whether the probe has what the look-up needs."""
+
+    def constants(self, probe: Probe) -> dict[str, int]:
+        """Values of the shader's `override` constants."""
+
+    def resources(self, device: Any, probe: Probe) -> tuple[Any, ...]:
+        """Buffers and views of textures that its shader reads."""
+
+
+def look_ups() -> dict[str, LookUp]:
+    """All look-ups by name, from cheap to dear."""
+    found = [cast(LookUp, module) for module in modules_in(sys.modules[__name__], having="NAME").values()]
+    return {look_up.NAME: look_up for look_up in sorted(found, key=lambda one: one.COST)}
+
+
+def look_up_of(probe: Probe, wanted: str, among: dict[str, LookUp]) -> LookUp:
+    """The look-up `wanted` if it serves the probe, else, and for AUTO, the one of the highest preference that does."""
+    known("look-up", wanted, (AUTO, *among))
+    if wanted != AUTO and among[wanted].serves(probe):
+        return among[wanted]
+    return max((one for one in among.values() if one.serves(probe)), key=lambda one: one.PREFERENCE)
+
+
+def shader_of(look_up: LookUp) -> str:
+    """WGSL of a look-up."""
+    return Path(look_up.__file__).with_suffix(".wgsl").read_text(encoding="utf-8")

@@ -1,0 +1,22 @@
+"""Light from afar: the probe is looked up in the direction itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lambent.realtime.baked import Probe
+
+NAME, COST, PREFERENCE, AIMS = "plain", 0, 0, True
+BINDINGS: tuple[str, ...] = ()
+
+
+def serves(probe: Probe) -> bool:
+    return True
+
+
+def constants(probe: Probe) -> dict[str, int]:
+    return {}
+
+
+def resources(device: Any, probe: Probe) -> tuple[Any, ...]:
+    return ()

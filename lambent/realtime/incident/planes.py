@@ -1,0 +1,40 @@
+"""Bounding planes: a direction ends at the nearest of the planes around the object (thesis M, 4.4.1)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.realtime.baked import Probe
+
+NAME, COST, PREFERENCE, AIMS = "planes", 1, 2, True
+BINDINGS = ("storage",)
+STEP = 6  # plane counts are padded to multiples of this: each count is a pipeline of its own
+
+
+def serves(probe: Probe) -> bool:
+    return len(probe.planes) > 0
+
+
+def constants(probe: Probe) -> dict[str, int]:
+    return {"PLANES": padded_count(probe)}
+
+
+def resources(device: Any, probe: Probe) -> tuple[Any, ...]:
+    return (device.create_buffer_with_data(data=about_centre(probe), usage=wgpu.BufferUsage.STORAGE),)
+
+
+def padded_count(probe: Probe) -> int:
+    return -(-len(probe.planes) // STEP) * STEP
+
+
+def about_centre(probe: Probe) -> NDArray[np.float32]:
+    """(P, 4) planes (n, n.c + d) about the probe's centre c, P a multiple of STEP."""
+    planes = np.asarray(probe.planes, np.float32)
+    padded = np.zeros((padded_count(probe), 4), np.float32)  # a zero plane is never approached
+    padded[: len(planes)] = planes
+    padded[: len(planes), 3] += planes[:, :3] @ np.asarray(probe.centre, np.float32)
+    return padded

@@ -1,0 +1,58 @@
+"""Bind group layouts: 0 frame, 1 material, 2 object, 3 light of the scene; and what single passes bind."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import wgpu
+
+from lambent.scenes.textures import CHANNELS
+
+_UNFILTERED = {"sample_type": "unfilterable-float"}
+KINDS: dict[str, dict[str, Any]] = {
+    "uniform": {"buffer": {"type": "uniform"}},
+    "storage": {"buffer": {"type": "read-only-storage"}},
+    "sampler": {"sampler": {"type": "filtering"}},
+    "flat": {"texture": {"sample_type": "float", "view_dimension": "2d"}},
+    "layers": {"texture": {"sample_type": "float", "view_dimension": "2d-array"}},
+    "cube": {"texture": {"sample_type": "float", "view_dimension": "cube"}},
+    "exact": {"texture": {**_UNFILTERED, "view_dimension": "2d"}},  # loaded, never filtered
+    "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
+}
+
+
+class Layouts:
+    """Bind group layouts of one device. Bindings of the same kinds share a layout, and so fit the same pipelines."""
+
+    def __init__(self, device: Any) -> None:
+        self.device = device
+        self.of = cache(self._of)
+        both = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
+        self.frame = self._of("uniform", "sampler", visibility=both)
+        self.material = self.of("uniform", "storage", "storage", "sampler", *["flat"] * len(CHANNELS))
+        self.light = self.of("layers")
+        self.cube = self.of("cube")
+        self.shown = self.of("flat", "sampler")
+        self.empty = device.create_buffer(size=16, usage=wgpu.BufferUsage.STORAGE)  # a binding must hold something
+
+    def object(self, look_up: tuple[str, ...]) -> Any:
+        """Layout of group 2 with the bindings of a look-up of incident light."""
+        return self.of("uniform", "cube", "storage", *look_up)
+
+    def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:
+        """Layout of bindings of these `KINDS`."""
+        entries = [{"binding": i, "visibility": visibility, **KINDS[kind]} for i, kind in enumerate(kinds)]
+        return self.device.create_bind_group_layout(entries=entries)
+
+    def uniform(self, size: int) -> Any:
+        """Uniform buffer of a record that is written anew for each frame."""
+        return self.device.create_buffer(size=size, usage=wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST)
+
+    def group(self, layout: Any, *resources: Any) -> Any:
+        """Bind group of `resources` (buffers, samplers, views) in the layout's order."""
+        entries = [
+            {"binding": i, "resource": {"buffer": r} if isinstance(r, wgpu.GPUBuffer) else r}
+            for i, r in enumerate(resources)
+        ]
+        return self.device.create_bind_group(layout=layout, entries=entries)

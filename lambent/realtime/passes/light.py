@@ -1,0 +1,127 @@
+"""The light of every visible pixel: objects, the sky behind them, and the edges of masked surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from lambent.realtime.clusters import Seen
+from lambent.realtime.context import FrameContext
+from lambent.realtime.draws import Draw
+from lambent.realtime.frame_state import LIGHT_MAP_NOISE
+from lambent.realtime.incident import shader_of
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.depth import draw_seen, set_geometry
+from lambent.realtime.pipelines import pipeline, screen_pipeline
+from lambent.realtime.shader_source import assemble
+from lambent.realtime.slices import Steps
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a pass makes of an object's light: entry point, and the shader that has it, if not the integrator's."""
+
+    entry: str
+    shader: str = ""
+    front_face: str = "ccw"
+    blended: bool = False  # laid over what is behind by its alpha, in no order, instead of standing for it
+
+    def shaders(self, draw: Draw) -> tuple[str, ...]:
+        """Names of the files that the shader of a draw is assembled from."""
+        if not self.shader:
+            return "diffuse.wgsl", "probe_light.wgsl", "shade.wgsl", draw.shader
+        return draw.shader, "planar_shown.wgsl" if draw.planar else "probe_light.wgsl", "shade.wgsl", self.shader
+
+
+SHADE = Stage("shade_main", "shade.wgsl")
+FRINGE = Stage("fringe_main", "fringe.wgsl", blended=True)  # of masked surfaces, after what is whole
+_OVER = {
+    "color": {"src_factor": "src-alpha", "dst_factor": "one-minus-src-alpha", "operation": "add"},
+    "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
+}
+
+
+class Shading:
+    """Draws objects where the depth pass saw them; one pipeline per integrator, look-up and set of constants.
+
+    `light` is the layout of group 3, `reflections` that for draws with `planar`.
+    """
+
+    def __init__(self, layouts: Layouts, stage: Stage, light: Any, reflections: Any = None) -> None:
+        self._layouts, self._stage, self._light, self._reflections = layouts, stage, light, reflections
+        self._modules: dict[tuple[Any, ...], Any] = {}
+        self._pipelines: dict[tuple[Any, ...], Any] = {}
+
+    def draw(
+        self, render: Any, context: FrameContext, draws: Iterable[Draw], seen: Seen, formats: tuple[str, ...],
+        light: Any,
+    ) -> None:  # fmt: skip
+        """Encode into a render pass of `formats` whose group 0 is set; `light` is group 3."""
+        set_geometry(render, context.resources)
+        for draw in draws:
+            record = draw.item.record
+            if not seen.of(record.first_face, record.face_count):
+                continue
+            render.set_pipeline(self._pipeline(draw, formats))
+            render.set_bind_group(1, draw.material_group)
+            render.set_bind_group(2, draw.object_group)
+            render.set_bind_group(3, context.reflections if self._is_reflecting(draw) else light)
+            context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
+
+    def _is_reflecting(self, draw: Draw) -> bool:
+        return draw.planar and self._reflections is not None
+
+    def _pipeline(self, draw: Draw, formats: tuple[str, ...]) -> Any:
+        stage, constants = self._stage, draw.constants
+        shaders = (stage.shaders(draw), draw.look_up.NAME)
+        key = (*shaders, formats, *constants.items())
+        if key not in self._pipelines:
+            layouts = self._layouts
+            if shaders not in self._modules:
+                code = assemble(*shaders[0], given={"look_up.wgsl": shader_of(draw.look_up)})
+                self._modules[shaders] = layouts.device.create_shader_module(code=code)
+            light = self._reflections if self._is_reflecting(draw) else self._light
+            groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS), light]
+            self._pipelines[key] = pipeline(
+                layouts.device, self._modules[shaders], stage.entry, groups, formats, constants=constants,
+                compare="greater" if stage.blended else "equal", blend=_OVER if stage.blended else None,
+                front_face=stage.front_face,
+            )  # fmt: skip
+        return self._pipelines[key]
+
+
+class LightPass:
+    """Draws linear radiance into the frame's target, whose depth is there."""
+
+    def __init__(self, layouts: Layouts, reflections: Any) -> None:
+        """`reflections` is the layout of group 3 for draws that have pixels on planar reflectors."""
+        self._layouts = layouts
+        self._shade, self._fringe = (Shading(layouts, stage, layouts.light, reflections) for stage in (SHADE, FRINGE))
+        self._sky: dict[str, Any] = {}
+
+    def encode(self, context: FrameContext) -> Steps:
+        """Draw the bands of the target, which becomes the frame's radiance."""
+        resources, format = context.resources, context.target.radiance.format
+        light = resources.noise_group if context.state.show == LIGHT_MAP_NOISE else resources.light_group
+        masked = resources.masked if context.blends_masks else set()
+        fringes = [draw for draw in context.draws if draw.item.record.name in masked]
+        for band in context.part.bands("shade", context.state.size):
+            render = context.begin("shade", [context.target.radiance.create_view()], band.load_op, band=band)
+            seen = context.seen(band.shares)
+            self._shade.draw(render, context, context.draws, seen, (format,), light)
+            self._draw_sky(render, context, format)
+            self._fringe.draw(render, context, fringes, seen, (format,), light)
+            render.end()
+            yield
+        context.radiance = context.target.radiance
+
+    def _draw_sky(self, render: Any, context: FrameContext, format: str) -> None:
+        """The environment where the depth pass left infinity."""
+        if format not in self._sky:
+            groups = [self._layouts.frame, self._layouts.cube]
+            self._sky[format] = screen_pipeline(self._layouts.device, "sky", groups, [format], compare="equal")
+        render.set_pipeline(self._sky[format])
+        render.set_bind_group(1, context.resources.sky_group)
+        render.draw(3)
+        context.counts["draw_calls"] += 1

@@ -1,0 +1,156 @@
+"""The planar reflection buffer: light of the mirrored view with its MIP levels, and the plane seen at every pixel.
+
+Beside it the walls that end the view, and the nearest surface in each of its cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from typing import Any
+
+from lambent.realtime.context import FrameContext
+from lambent.realtime.integrators import INTEGRATORS
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.light import Shading, Stage
+from lambent.realtime.pipelines import screen_pipeline
+from lambent.realtime.planar_view import PlanarView, levels_of
+from lambent.realtime.slices import Steps
+from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
+from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
+from lambent.realtime.uploads import upload
+from lambent.store.contract import PlanRecord
+from lambent.store.plans import plan_of
+
+CELL_FORMAT = "rgba32float"
+FIRST_PX = 4  # side of the finest cells, CELL_PX of shaders/planar_view.wgsl
+MOST_LEVELS = 7  # of cells; the coarsest have 256 px
+FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
+MIRRORED_N = 3  # samples per lobe of what is mirrored, from its probe
+STAGE = Stage("planar_buffer_main", "planar_buffer.wgsl", "cw")  # mirrored triangles turn the other way
+
+
+@dataclass(frozen=True)
+class PlanarBuffer:
+    """Textures of one size, used by one reflector after the other, and their views."""
+
+    target: Target
+    light: Any  # all levels
+    levels: list[Any]
+    planes: Any
+
+    @staticmethod
+    def of(device: Any, size: tuple[int, int]) -> PlanarBuffer:
+        depth, planes = (target_texture(device, size, format) for format in (DEPTH_FORMAT, PLANE_FORMAT))
+        light = target_texture(device, size, LIGHT_FORMAT, levels_of(size))
+        levels = [light.create_view(base_mip_level=i, mip_level_count=1) for i in range(levels_of(size))]
+        return PlanarBuffer(Target(depth, light), light.create_view(), levels, planes.create_view())
+
+
+class PlanarWalls:
+    """Holes in the depth of a mirrored view, where its eye looks past the foot of a wall: nothing is drawn there."""
+
+    def __init__(self, layouts: Layouts) -> None:
+        self._layouts, self._layout = layouts, layouts.of("uniform", "flat")
+        groups = [layouts.frame, self._layout]
+        self._pipeline = screen_pipeline(
+            layouts.device, "planar_walls", groups, (), compare="always", writes_depth=True
+        )
+        self._texture = cache(self._uploaded)
+        self._uniform = cache(lambda index: layouts.uniform(PLAN_DTYPE.itemsize))
+
+    def draw(self, render: Any, index: int, view: PlanarView) -> int:
+        """Encode into a render pass of depth whose group 0 is set, before all else; returns the draw calls.
+
+        `index` is that of the view in its frame.
+        """
+        if view.plan is None or view.reflector.plan is None:
+            return 0
+        self._layouts.device.queue.write_buffer(self._uniform(index), 0, view.plan.tobytes())
+        texture = self._texture(view.reflector.plan)
+        render.set_pipeline(self._pipeline)
+        render.set_bind_group(1, self._layouts.group(self._layout, self._uniform(index), texture))
+        render.draw(3)
+        return 1
+
+    def _uploaded(self, record: PlanRecord) -> Any:
+        distance = plan_of(record).distance[None, ..., None]
+        return upload(self._layouts.device, [distance], "r8snorm").create_view()
+
+
+class PlanarCells:
+    """The nearest surface in each cell of a buffer, which lets a search do with few steps."""
+
+    def __init__(self, layouts: Layouts) -> None:
+        self._layouts, self._layout = layouts, layouts.of("uniform", "exact")
+        self._first, self._next = (
+            screen_pipeline(layouts.device, "planar_cells", [self._layout], [CELL_FORMAT], entry)
+            for entry in ("first_cells_main", "cells_main")
+        )
+        self.views = lru_cache(1)(self._new_views)
+
+    def _new_views(self, size: tuple[int, int]) -> list[Any]:
+        """Views of the cells of buffers of that size: all levels, then each."""
+        cells = (size[0] // FIRST_PX, size[1] // FIRST_PX)
+        levels = min(MOST_LEVELS, max(cells).bit_length())
+        made = target_texture(self._layouts.device, cells, CELL_FORMAT, levels)
+        single = (made.create_view(base_mip_level=i, mip_level_count=1) for i in range(levels))
+        return [made.create_view(), *single]
+
+    def encode(self, context: FrameContext, planes: Any, size: tuple[int, int], uniform: Any) -> None:
+        """Fill the cells from a view of the planes of a buffer of that size."""
+        finer = planes
+        for level, into in enumerate(self.views(size)[1:]):
+            group = self._layouts.group(self._layout, uniform, finer)
+            context.cover("mips", [into], self._next if level else self._first, [group])
+            finer = into
+
+
+class PlanarBufferPass:
+    """Draws the mirrored views of a frame; they share one buffer, so each is shaded from before the next is drawn."""
+
+    def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
+        device = layouts.device
+        self._layouts, self._depth = layouts, depth
+        self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
+        self.buffer = lru_cache(1)(lambda size: PlanarBuffer.of(device, size))
+        self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
+        self._frame = cache(lambda index: layouts.uniform(FRAME_DTYPE.itemsize))
+        groups = [layouts.frame, layouts.cube]
+        self._sky = screen_pipeline(device, "planar_buffer_sky", groups, FORMATS, compare="equal")
+        self._mips = screen_pipeline(device, "planar_buffer_mips", [layouts.shown], [LIGHT_FORMAT])
+
+    def mirrored(self, context: FrameContext) -> Iterator[FrameContext]:
+        """The mirrored frames of a frame, one after the other; `uniform` has the record of each."""
+        write, layouts = self._layouts.device.queue.write_buffer, self._layouts
+        rings, diffuse = INTEGRATORS["rings"], INTEGRATORS["diffuse"]
+        draws = [d.by(rings if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
+        for index, view in enumerate(context.views):
+            write(self._frame(index), 0, view.frame.tobytes())
+            write(self.uniform(index), 0, view.uniform.tobytes())
+            group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)
+            target = self.buffer(view.size).target
+            yield replace(context, data=view.frame, frame_group=group, draws=draws, target=target, shown=None)
+
+    def encode(self, context: FrameContext, index: int, view: PlanarView) -> Steps:
+        """Draw a mirrored frame, band by band."""
+        buffer, resources = self.buffer(view.size), context.resources
+        render = context.begin("mirror", [], "clear", depth="clear")
+        context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
+        render.end()
+        yield
+        for band in context.part.bands("mirror", view.size):
+            render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
+            seen = context.seen(band.shares)
+            self._shading.draw(render, context, context.draws, seen, FORMATS, resources.light_group)
+            render.set_pipeline(self._sky)
+            render.set_bind_group(1, resources.sky_group)
+            render.draw(3)
+            context.counts["draw_calls"] += 1
+            render.end()
+            yield
+        for finer, into in zip(buffer.levels, buffer.levels[1:], strict=False):
+            group = self._layouts.group(self._layouts.shown, finer, resources.sampler)
+            context.cover("mips", [into], self._mips, [group])

@@ -1,0 +1,78 @@
+"""A probe on the GPU: its cube maps, the table of its lamps, and what the look-ups read of it."""
+
+from __future__ import annotations
+
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.materials.document import Material
+from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
+from lambent.realtime.baked import Probe
+from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
+from lambent.realtime.incident import LookUp, look_up_of
+from lambent.realtime.integrators import Cube
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.prefilter import prefiltered_cube
+from lambent.realtime.uploads import cube_texture
+
+DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
+
+
+class ProbeMaps:
+    """Cube maps of a probe's radiance, (6, N, N, 3), each made when an integrator first asks for it."""
+
+    def __init__(self, layouts: Layouts, radiance: NDArray[np.floating], sampler: Any) -> None:
+        self._layouts, self._radiance, self._sampler = layouts, radiance, sampler
+        self._texture = cache(self._new_texture)
+
+    def view(self, cube: Cube) -> Any:
+        return self._texture(cube).create_view(dimension="cube")
+
+    def half_log2_texels(self, cube: Cube) -> float:
+        """Half the log2 of texels, as large as a look-up blurs, per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17)."""
+        return float(np.log2(self._radiance.shape[1] / 2) - (np.log2(SMOOTH_AREA) / 2 if cube == "smooth" else 0))
+
+    def _new_texture(self, cube: Cube) -> Any:
+        if cube == "prefiltered":
+            return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
+        chain = smooth_chain if cube == "smooth" else mip_chain
+        return cube_texture(self._layouts.device, chain(finite(self._radiance)[0]))
+
+
+class LampTable:
+    """The table of a probe's lamps (aim.py), and their prominence, 0 to 1."""
+
+    def __init__(self, device: Any, radiance: NDArray[np.floating]) -> None:
+        table = aim_table(finite(radiance)[0])
+        self.buffer = device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
+        self.prominence = float(table[0, 1])
+
+    def is_aimed_at(self, material: Material, textured: bool) -> bool:
+        """Whether samples of a material's lobes, which textures may widen, are worth aiming at all."""
+        return aimed_share(widest_lobe(material, textured), self.prominence) > 1 / 16
+
+
+class ProbeLight:
+    """What objects bind of the probe that they share; without a probe they are dark."""
+
+    def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
+        self._device, self.probe, self._look_ups = layouts.device, probe or DARK, look_ups
+        self.maps = ProbeMaps(layouts, self.probe.radiance, sampler)
+        self.resources = cache(lambda look_up: look_up.resources(self._device, self.probe))  # of a LookUp
+
+    @cached_property
+    def lamps(self) -> LampTable:
+        return LampTable(self._device, self.probe.radiance)
+
+    @cached_property
+    def cheapest(self) -> LookUp:
+        """The look-up of draws that have no lobes."""
+        return next(one for one in self._look_ups.values() if one.serves(self.probe))
+
+    def look_up(self, wanted: str) -> LookUp:
+        """The look-up of that name, if it serves the probe, else the preferred one."""
+        return look_up_of(self.probe, wanted, self._look_ups)

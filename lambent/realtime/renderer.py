@@ -1,0 +1,240 @@
+"""Draws frames: state in, image out. The window and the headless commands run this same code.
+
+renderer = Renderer(open_device(), store)
+image = renderer.display_image(FrameState(camera, 1680, 1050))
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from lambent.core.colour import srgb_decode, srgb_encode
+from lambent.core.errors import UserError
+from lambent.core.images import to_bytes
+from lambent.core.progress import Progress, silent
+from lambent.core.sequences import hammersley
+from lambent.realtime.baked import BakedScene, read_baked
+from lambent.realtime.clusters import Clusters
+from lambent.realtime.context import FrameContext, Pass
+from lambent.realtime.draws import draws_of
+from lambent.realtime.frame_state import QMC_N, SHOW, FrameState, frame_data
+from lambent.realtime.integrators import integrator
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.accumulate import AccumulatePass
+from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.light import LightPass
+from lambent.realtime.passes.planar import PlanarPass
+from lambent.realtime.passes.smooth import SmoothPass
+from lambent.realtime.passes.tonemap import TonemapPass
+from lambent.realtime.planar_integrators import planar_integrator
+from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
+from lambent.realtime.resources import SceneResources
+from lambent.realtime.slices import Cut, Steps, Whole
+from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.targets import PassTimer, Targets, pixels
+from lambent.store.store import Store
+
+Floats = NDArray[np.float32]
+SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
+
+
+class Renderer:
+    """Draws frames of one baked scene on one device.
+
+    Attributes
+    ----------
+    scene : BakedScene
+    missing : tuple of str
+        What the store lacks, in plain words.
+    """
+
+    def __init__(self, device: Any, source: Store | BakedScene, beside: Renderer | None = None) -> None:
+        """`beside` draws the same scene on the same device already: what stays on the GPU is shared with it."""
+        self.device = device
+        self.scene = source if isinstance(source, BakedScene) else read_baked(source)
+        self.missing = self.scene.missing
+        self._layouts: Layouts = beside._layouts if beside else Layouts(device)
+        layouts, scene = self._layouts, self.scene
+        self.resources: SceneResources = beside.resources if beside else SceneResources(layouts, self.scene)
+        self._clusters: Clusters = (
+            beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
+        )
+        depth = DepthPass(layouts)
+        planar = PlanarPass(layouts, depth)
+        light = LightPass(layouts, planar.reflections)
+        display = TonemapPass(layouts), SmoothPass(layouts)
+        self._passes: tuple[Pass, ...] = (depth, planar, light, AccumulatePass(layouts), *display)
+        self._targets, self._timer = Targets(device), PassTimer(device)
+        self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
+        self._frame_group = layouts.group(layouts.frame, self._frame_buffer, self.resources.sampler)
+        self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
+        self._few: Any = None  # radiance of the last displayed frame of few samples
+        self._counts: dict[str, Any] = {}
+        self._gpu_ms: dict[str, float] | None = None  # of a frame in slices
+        self._frames = 0  # that were begun
+
+    def draw(self, state: FrameState, target_view: Any = None) -> Any:
+        """Draw a frame; returns the texture of linear radiance that it left.
+
+        With `target_view` (of a texture of the state's size and of `DISPLAY_FORMAT`) the frame is also shown there,
+        encoded and smoothed. Returns before the GPU is done: see `finish`.
+        """
+        started = time.perf_counter()
+        part, self._gpu_ms = Whole(self.device.create_command_encoder()), None
+        context = self._begun(part, state, target_view)
+        for _ in self._steps(context):
+            pass
+        self._timer.resolve(part.encoder)
+        self.device.queue.submit([part.encoder.finish()])
+        self._counts["encode_ms"] = (time.perf_counter() - started) * 1e3
+        return context.radiance
+
+    def slices(self, state: FrameState, target_view: Any, cut: Cut) -> Generator[None, None, Any]:
+        """The same frame to the bit, in slices of about `slices.SLICE_S` seconds, each of which is waited for.
+
+        Generator that yields between slices and returns the texture of radiance. It can be dropped at any time; another
+        frame of this renderer ends it with a `RuntimeError`. Until the end `target_view` holds nothing that is to be
+        seen, and what `draw` returned before is drawn over where it has this size.
+        """
+        times: dict[str, float] = {}
+        encode_s, started = 0.0, time.perf_counter()
+        cut.encoder = self.device.create_command_encoder()
+        context = self._begun(cut, state, target_view)
+        frame = self._frames
+        for _ in self._steps(context):
+            self._timer.resolve(cut.encoder)
+            self.device.queue.submit([cut.encoder.finish()])
+            encode_s += time.perf_counter() - started
+            self.finish()
+            cut.took(time.perf_counter() - started)
+            for name, ms in self._timer.read().items():
+                times[name] = times.get(name, 0.0) + ms
+            cut.encoder = self.device.create_command_encoder()
+            yield
+            if self._frames != frame:
+                raise RuntimeError("another frame was begun by the same renderer")
+            started = time.perf_counter()
+        self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
+        return context.radiance
+
+    def finish(self) -> None:
+        """Return when the GPU is done with all frames."""
+        self.device.queue.read_buffer(self._done)
+
+    def image(self, state: FrameState) -> Floats:
+        """Linear radiance (height, width, 3) float32, row 0 on top."""
+        return np.asarray(pixels(self.device, self.draw(state)), np.float32)
+
+    def display_image(self, state: FrameState) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
+        state.check()  # before a texture of a size that cannot be is made
+        image = self._targets.display("display", state.size)
+        self.draw(state, image.create_view())
+        return pixels(self.device, image)
+
+    def still(self, state: FrameState, supersamples: int = SUPERSAMPLES) -> NDArray[np.uint8]:
+        """`display_image` from `supersamples` frames that look at other places of each pixel.
+
+        The mean is that of the light a display would emit: after the view transform, so that edges against a lamp are
+        smooth, and before the encoding, so that half a pixel of white is half as bright.
+        """
+        emitted = srgb_decode(np.arange(256, dtype=np.float32) / 255)
+        mean = _mean(emitted[self.display_image(part)] for part in _subframes(state, supersamples))
+        return to_bytes(srgb_encode(mean))
+
+    def still_radiance(self, state: FrameState, supersamples: int = SUPERSAMPLES) -> Floats:
+        """`image`, the mean over each pixel, from `supersamples` frames that look at other places of it."""
+        return _mean(self.image(part) for part in _subframes(state, supersamples))
+
+    def converged(self, state: FrameState, spp: int, progress: Progress = silent) -> Floats:
+        """Linear radiance (height, width, 3) of at least `spp` unfiltered samples per pixel and lobe.
+
+        By the state's integrator, if it is progressive, else by `qmc`.
+        """
+        if not integrator(state.integrator).progressive:
+            state = replace(state, integrator="qmc")
+        per_frame = state.n or QMC_N
+        frames = max(1, -(-spp // per_frame))
+        radiance = None
+        for index in range(frames):
+            radiance = self.draw(replace(state, accumulate=index))
+            if index % 16 == 15:
+                self.finish()
+                progress((index + 1) * per_frame, frames * per_frame, "samples per pixel")
+        return np.asarray(pixels(self.device, radiance), np.float32)
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """Of the last frame: gpu_ms per pass (empty without timestamps), draw calls, triangles, samples, encode_ms.
+
+        Waits for the GPU.
+        """
+        return {**self._counts, "gpu_ms": self._timer.read() if self._gpu_ms is None else self._gpu_ms}
+
+    def _steps(self, context: FrameContext) -> Steps:
+        """Encode a frame, step by step."""
+        for one in self._passes:
+            yield from one.encode(context)
+        if context.is_passing:
+            self._few = context.radiance
+        self._counts = {
+            "integrator": context.state.integrator,
+            "width": context.state.width,
+            "height": context.state.height,
+            "draw_calls": context.counts["draw_calls"],
+            "mirrors": len(context.views),
+            "triangles": len(self.scene.faces),
+            "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
+        }
+
+    def _begun(self, part: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
+        """A frame before its first pass."""
+        state.check()
+        self._frames += 1
+        data = frame_data(state, self.scene.record.bounds)
+        self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        views = self._planar_views(state, data)
+        draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})
+        passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
+        target = self._targets.fit(state.size, "rgba16float" if passing else "rgba32float")
+        context = FrameContext(
+            part, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
+            draws, views, Counter(), shown=target_view,
+        )  # fmt: skip
+        if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
+            context.prior = self._few
+        return context
+
+    def _planar_views(self, state: FrameState, data: NDArray[np.void]) -> list[PlanarView]:
+        """Mirrored views of the planar reflectors that have a buffer in this frame."""
+        if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
+            return []
+        record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
+        widest = {
+            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes), default=0.0)
+            for o in record.objects
+        }
+        return planar_views(data, record.reflectors, state.width, state.height, MOST_REFLECTORS, widest)
+
+
+def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:
+    if count < 1:
+        raise UserError("a still needs at least one frame", field="supersamples", got=count)
+    places = hammersley(count)
+    for x, y in (places - places.mean(axis=0)).tolist():
+        yield replace(state, accumulate=None, antialias=False, jitter_px=(x, y))
+
+
+def _mean(images: Iterable[Floats]) -> Floats:
+    count, total = 0, np.zeros((), np.float32)
+    for image in images:
+        count, total = count + 1, total + image
+    return np.asarray(total / np.float32(count))

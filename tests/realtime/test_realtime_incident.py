@@ -1,0 +1,157 @@
+"""Look-ups of incident light: found by name, the same in numpy, and a new one is one file and its shader."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import OBLIQUE, cube_of, smooth_light, wall_scene
+
+from lambent.bake import probe_modes
+from lambent.core.directions import normalize
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.realtime import incident
+from lambent.realtime.baked import Probe
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.incident import look_up_of, look_ups, shader_of
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.shader_source import assemble
+from tests.tools.shader_parity import assert_parity, run_wgsl
+
+MIRROR = Material(name="m", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))
+STATE = FrameState(OBLIQUE, 8, 8, n=1, antialias=False, show="specular")
+ROOM = np.array([2.0, 1.5, 2.5])  # half sizes
+PLANES = np.array([[*-sign * axis, axis @ ROOM] for axis in np.eye(3) for sign in (1, -1)], np.float32)
+DISTANCE = np.ones((6, 4, 4), np.float32)
+CUBE = np.ones((6, 4, 4, 3), np.float32)
+
+TOY = """
+import numpy as np
+import wgpu
+
+NAME, COST, PREFERENCE, AIMS = "toy", 9, -1, False
+BINDINGS = ("storage",)
+
+
+def serves(probe):
+    return probe.distance is None
+
+
+def constants(probe):
+    return {"TIMES": 3}
+
+
+def resources(device, probe):
+    return (device.create_buffer_with_data(data=np.float32([0, 1, 0, 0]), usage=wgpu.BufferUsage.STORAGE),)
+"""
+TOY_SHADER = """
+@group(2) @binding(3) var<storage, read> toy: array<vec4f>;
+override TIMES: u32 = 1u;
+
+fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {
+    return LookUp(f32(TIMES) * toy[0].xyz + 0.0 * w, 1.0);
+}
+
+fn incident_bound(x: vec3f, w: vec3f) -> f32 {
+    return 0.0;
+}
+"""
+
+
+def test_a_look_up_is_one_file_and_its_shader(device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A toy that sees what is above, whatever the direction: found, offered, drawn with, and taken by nothing else."""
+    (tmp_path / "toy.py").write_text(TOY)
+    (tmp_path / "toy.wgsl").write_text(TOY_SHADER)
+    monkeypatch.setattr(incident, "__path__", [*incident.__path__, str(tmp_path)])
+    try:
+        assert list(look_ups()) == ["plain", "planes", "distance", "toy"]
+        scene = wall_scene(MIRROR, cube_of(smooth_light), planes=PLANES)
+        renderer = Renderer(device, scene)
+        above = smooth_light(np.array([0.0, 1.0, 0.0]))
+        image = renderer.image(replace(STATE, lookup="toy"))
+        np.testing.assert_allclose(image, np.broadcast_to(above, image.shape), rtol=0.01)
+        for integrator in ("qmc", "fis", "split-sum"):
+            drawn = renderer.image(replace(STATE, lookups={"wall": "toy"}, integrator=integrator, accumulate=0))
+            np.testing.assert_allclose(drawn, image, rtol=0.02)
+        automatic = renderer.image(STATE)
+        np.testing.assert_array_equal(automatic, renderer.image(replace(STATE, lookup="planes")))
+        assert np.abs(automatic - image).max() > 0.05
+    finally:
+        sys.modules.pop("lambent.realtime.incident.toy", None)
+
+
+def test_the_preferred_look_up_that_serves_a_probe() -> None:
+    bare = Probe((0.0, 0.0, 0.0), CUBE)
+    rich = replace(bare, distance=DISTANCE, planes=PLANES)
+    known = look_ups()
+
+    def chosen(probe: Probe, wanted: str) -> str:
+        return look_up_of(probe, wanted, known).NAME
+
+    assert [chosen(bare, name) for name in ("auto", *known)] == ["plain"] * 4
+    assert [chosen(rich, name) for name in ("auto", *known)] == ["planes", "plain", "planes", "distance"]
+    assert chosen(replace(bare, distance=DISTANCE), "planes") == "distance"
+    with pytest.raises(UserError, match="look-up"):
+        look_up_of(bare, "plane", known)
+
+
+def places(count: int = 4000) -> tuple[np.ndarray, np.ndarray]:
+    """Points in the room, about its centre, and unit directions."""
+    rng = np.random.default_rng(2)
+    return rng.uniform(-0.95, 0.95, (count, 3)) * ROOM, normalize(rng.normal(size=(count, 3)))
+
+
+def looked_up(name: str, monkeypatch: pytest.MonkeyPatch, x: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Unit directions that the bake's copy of a look-up finds for rays about a probe at the origin."""
+    found = []
+
+    def sample(cube: np.ndarray, w: np.ndarray) -> np.ndarray:
+        found.append(w)
+        return np.zeros((len(w), cube.shape[-1])) if cube.shape[-1] == 3 else inverse_depth(w)
+
+    monkeypatch.setattr(probe_modes, "sample", sample)
+    rays = probe_modes.Mirrored(x, w, w, CUBE[0, 0, :1], x[:, 0], x[:, 0], x[:, 0] > 0)
+    if name == "planes":
+        probe_modes.by_planes(rays, CUBE, np.zeros(3), PLANES.astype(float))
+    else:
+        probe_modes.by_distance(rays, CUBE, np.zeros(3), DISTANCE)
+    return found[-1]
+
+
+def inverse_depth(w: np.ndarray) -> np.ndarray:
+    """(n, 1): 1/max(|x|, |y|, |z|) of the room's wall that its centre sees in directions w (n, 3)."""
+    return ((np.abs(w) / ROOM).max(axis=-1) / np.abs(w).max(axis=-1))[:, None]
+
+
+def in_shader(name: str, x: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """The same by the shader, with the planes and the depth of the room in the place of its bindings."""
+    source = assemble("incident.wgsl", "look_up.wgsl", given={"look_up.wgsl": shader_of(look_ups()[name])})
+    for old, new in (
+        ("override PLANES: u32 = 0u;", f"const PLANES = {len(PLANES)}u;"),
+        ("@group(2) @binding(3) var<storage, read> planes: array<vec4f>;", ""),
+        ("@group(2) @binding(3) var inverse_depth_cube: texture_cube<f32>;", ""),
+        (
+            "textureSampleLevel(inverse_depth_cube, linear_sampler, w, 0.0).r",
+            "max_norm(w / vec3f({}, {}, {})) / max_norm(w)".format(*ROOM),
+        ),
+    ):
+        source = source.replace(old, new)
+    tables = {"planes": PLANES} if name == "planes" else {}
+    call = "normalize(incident_look_up(x, w).direction)"
+    return run_wgsl(source, call, {"x": x, "w": w}, components=3, tables=tables)
+
+
+@pytest.mark.parametrize("name", ["planes", "distance"])
+def test_shaders_look_up_as_the_bake_does(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bake chooses between look-ups by its own copies of them."""
+    x, w = places()
+    got, expected = in_shader(name, x, w), looked_up(name, monkeypatch, x, w)
+    assert_parity(got, expected.astype(np.float32), atol=2e-4)
+    with np.errstate(divide="ignore"):
+        t = ((np.sign(w) * ROOM - x) / w).min(axis=-1)
+    error = np.linalg.norm(got - normalize(x + t[:, None] * w), axis=-1)
+    assert np.quantile(error, 1 if name == "planes" else 0.5) < 2e-3, "steps of the march may skip an edge of the room"

@@ -1,0 +1,91 @@
+"""Structs shared with shaders: what numpy writes into every field is what WGSL reads from it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import wgpu
+
+from lambent.materials.shader_layout import wgsl_dtype
+from lambent.realtime.shader_source import FOLDERS
+from lambent.realtime.structs import STRUCTS
+from tests.tools.shader_parity import gpu_device
+
+WGSL = "\n".join(path.read_text() for folder in FOLDERS for path in sorted(folder.glob("*.wgsl")))
+
+
+def leaves(place: str, dtype: np.dtype[Any], begin: int = 0) -> Iterator[tuple[str, int]]:
+    """WGSL expressions of all numbers of a record, and the words where numpy has them."""
+    if dtype.fields is not None:
+        for field, (inner, offset, *_) in dtype.fields.items():
+            yield from leaves(f"{place}.{field}", inner, begin + offset)
+        return
+    for word, index in enumerate(np.ndindex(dtype.shape)):
+        yield place + "".join(f"[{i}]" for i in index), begin // 4 + word
+
+
+@pytest.mark.parametrize("name", STRUCTS)
+def test_every_field_is_read_where_it_was_written(name: str) -> None:
+    """Each word of the record holds its own number, which a shader reads field by field."""
+    dtype = STRUCTS[name]
+    words = 7 + 3 * np.arange(dtype.itemsize // 4, dtype=np.uint32)
+    words |= np.uint32(0x3F000000)  # ordinary floats, too
+    found = list(leaves("given", dtype))
+    stores = "\n".join(f"out[{word}] = bitcast<u32>({place});" for place, word in found)
+    structs = "\n".join(re.search(rf"^struct {one} {{.*?^}}", WGSL, re.M | re.S)[0] for one in STRUCTS)  # type: ignore
+    code = f"""{structs}
+@group(0) @binding(0) var<uniform> given: {name};
+@group(0) @binding(1) var<storage, read_write> out: array<u32>;
+@compute @workgroup_size(1) fn main() {{ {stores} }}"""
+    device = gpu_device()
+    use = wgpu.BufferUsage
+    given = device.create_buffer_with_data(data=words, usage=use.UNIFORM)
+    out = device.create_buffer(size=words.nbytes, usage=use.STORAGE | use.COPY_SRC)
+    pipeline = device.create_compute_pipeline(
+        layout="auto", compute={"module": device.create_shader_module(code=code), "entry_point": "main"}
+    )
+    entries = [{"binding": i, "resource": {"buffer": buffer}} for i, buffer in enumerate((given, out))]
+    group = device.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=entries)
+    encoder = device.create_command_encoder()
+    compute = encoder.begin_compute_pass()
+    compute.set_pipeline(pipeline)
+    compute.set_bind_group(0, group)
+    compute.dispatch_workgroups(1)
+    compute.end()
+    device.queue.submit([encoder.finish()])
+    read = np.frombuffer(device.queue.read_buffer(out), np.uint32)
+    at = [word for _, word in found]
+    assert len(set(at)) == len(at) >= 0.75 * len(words)
+    np.testing.assert_array_equal(read[at], words[at])
+
+
+def test_layout_by_hand() -> None:
+    """A number fits behind a vector of three; other vectors, structs and arrays begin at multiples of 16 bytes."""
+    text = """
+struct Inner {
+    a: vec3f, // a comment, with: a colon
+    b: f32,
+    c: u32,
+}
+struct Outer {
+    a: f32,
+    b: vec2f,
+    c: vec3f,
+    d: Inner,
+    e: array<vec4f, 2>,
+    f: f32,
+}
+"""
+    dtype, align = wgsl_dtype("Outer", text)
+    assert dtype.fields is not None
+    assert [dtype.fields[name][1] for name in "abcdef"] == [0, 8, 16, 32, 64, 96]
+    assert (dtype.itemsize, align) == (112, 16)
+    inner = dtype["d"]
+    assert inner.fields is not None and inner.itemsize == 32
+    assert [inner.fields[name][1] for name in "abc"] == [0, 12, 16]
+    with pytest.raises(AssertionError, match="no struct"):
+        wgsl_dtype("Missing", text)
