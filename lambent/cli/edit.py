@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from lambent.cli.console import parse_size
+from lambent.cli.walk import SIZE, Size
 
 
 def command(
@@ -18,13 +19,13 @@ def command(
     environment: Annotated[
         list[Path] | None, typer.Option(help="Lat-long .hdr or .exr to light the preview with. Repeatable.")
     ] = None,
-    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the window.")] = "1680x1050",
+    size: Size = SIZE,
 ) -> None:
     """Edit a material beside its measurement: disks, curves, error and preview follow every drag; fit, undo, save.
 
     Example: lambent edit brushed.bsdf brushed.json --environment studio.hdr
     """
-    window = parse_size(size)
+    pixels = parse_size(size)
     from lambent.viewer import edit
 
-    edit.run(file, material, environment or (), size=window)
+    edit.run(file, material, environment or (), size=pixels)

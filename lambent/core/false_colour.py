@@ -81,10 +81,14 @@ def fitting_range(values: Floats, *, log: bool = True) -> Range:
 def false_colour(values: Floats, scale: Range) -> Floats:
     """Encoded colours (..., 3) of luminances (...)."""
     share = scale.share(values)
-    at = np.clip(share, 0, 1) * (len(STOPS) - 1)
-    colours = np.stack([np.interp(at, np.arange(len(STOPS)), channel) for channel in STOPS.T], axis=-1)
-    colours = np.where((share < 0)[..., None], BELOW, colours)
+    colours = np.where((share < 0)[..., None], BELOW, ramp(share))
     return np.asarray(np.where((share > 1)[..., None], ABOVE, colours))
+
+
+def ramp(share: Floats, stops: Floats = STOPS) -> Floats:
+    """Colours (..., 3) at shares (...) of a scale, between `stops` (N, 3) at even steps."""
+    at = np.clip(share, 0, 1) * (len(stops) - 1)
+    return np.stack([np.interp(at, np.arange(len(stops)), channel) for channel in stops.T], axis=-1)
 
 
 def number(value: float) -> str:

@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lambent.core.camera import Camera
+from lambent.core.plain import Triple, triple
 from lambent.scenes.scene import EYE_HEIGHT_M
-from lambent.store.contract import Triple
 
 Bounds = tuple[Triple, Triple]
 
@@ -37,7 +38,7 @@ KEYS = {
 
 def yaw_pitch(camera: Camera) -> tuple[float, float]:
     """Heading (0 looks along -z, positive to the right) and elevation of the line of sight."""
-    x, y, z = _sight(camera)
+    x, y, z = np.subtract(camera.target, camera.position)
     return math.atan2(x, -z), math.atan2(y, math.hypot(x, z))
 
 
@@ -72,8 +73,24 @@ def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
     return _placed(camera, camera.position, np.array(camera.position) + sight * _distance(camera))
 
 
+@dataclass
+class Walker:
+    """Pace of who walks, and height of the eye above the floor."""
+
+    speed_m_s: float
+    eye_height_m: float
+
+    @classmethod
+    def of(cls, bounds: Bounds) -> Walker:
+        """`EYE_HEIGHT_M`, or 60 % of the height of a scene that is too low to stand in; the pace in proportion."""
+        height_m = bounds[1][1] - bounds[0][1]
+        eye_height_m = EYE_HEIGHT_M if height_m >= EYE_HEIGHT_M + 2 * WALL_M else 0.6 * height_m
+        return cls(WALK_M_S * eye_height_m / EYE_HEIGHT_M, eye_height_m)
+
+
 def walk(
     camera: Camera,
+    walker: Walker,
     keys: AbstractSet[str],
     dt_s: float,
     *,
@@ -81,15 +98,12 @@ def walk(
     floor_y: float | None,
     flying: bool = False,
     fast: bool = False,
-    pace_m_s: float | None = None,
-    height_m: float | None = None,
     allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] = lambda eye, step: step,
 ) -> Camera:
     """Moved for `dt_s` seconds by the held `keys` (names as in `KEYS`; others are ignored).
 
     On foot the eye moves level, as far as `allowed(eye, step)` gives way, and settles at eye height above `floor_y`
-    (the scene's lowest point where it is None). `pace_m_s` and `height_m` are the walker's own, in place of those that
-    suit the scene. Flying, it moves along the line of sight, through everything, and up
+    (the scene's lowest point where it is None). Flying, it moves along the line of sight, through everything, and up
     and down by the keys for it.
     """
     right, up, forward = np.sum([KEYS[key] for key in keys if key in KEYS] or [(0, 0, 0)], axis=0)
@@ -102,13 +116,10 @@ def walk(
     length = float(np.linalg.norm(step))
     if length > 0:
         step = step / length
-    eye, step = (
-        np.array(camera.position),
-        step * (pace_m_s * (FAST if fast else 1.0) if pace_m_s else speed_m_s(bounds, fast)) * dt_s,
-    )
+    eye, step = np.array(camera.position), step * (walker.speed_m_s * (FAST if fast else 1.0)) * dt_s
     eye = eye + (step if flying else allowed(eye, step))
     if not flying:
-        eye_y = (bounds[0][1] if floor_y is None else floor_y) + (height_m or eye_height_m(bounds))
+        eye_y = (bounds[0][1] if floor_y is None else floor_y) + walker.eye_height_m
         eye[1] += (eye_y - eye[1]) * (1 - math.exp(-dt_s / SETTLE_S))
     eye = confined(eye, camera.position, bounds)
     return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))
@@ -116,31 +127,20 @@ def walk(
 
 def standing(camera: Camera, bounds: Bounds, floor_y: float | None, height_m: float) -> Camera:
     """The camera with its eye `height_m` above `floor_y` (the scene's lowest point where it is None)."""
-    down = np.array([0.0, (bounds[0][1] if floor_y is None else floor_y) + height_m - camera.position[1], 0.0])
-    eye, target = np.array(camera.position) + down, np.array(camera.target) + down
-    return _placed(camera, eye, target)
+    return lifted(camera, (bounds[0][1] if floor_y is None else floor_y) + height_m - camera.position[1])
 
 
-def eye_height_m(bounds: Bounds) -> float:
-    """`EYE_HEIGHT_M`, or 60 % of the height of a scene that is too low to stand in."""
-    height = bounds[1][1] - bounds[0][1]
-    return EYE_HEIGHT_M if height >= EYE_HEIGHT_M + 2 * WALL_M else 0.6 * height
-
-
-def speed_m_s(bounds: Bounds, fast: bool) -> float:
-    """Walking speed, slower in a small model in proportion to the eye height."""
-    return WALK_M_S * eye_height_m(bounds) / EYE_HEIGHT_M * (FAST if fast else 1.0)
+def lifted(camera: Camera, lift_m: float) -> Camera:
+    """The camera `lift_m` higher."""
+    (px, py, pz), (tx, ty, tz) = camera.position, camera.target
+    return replace(camera, name="free", position=(px, py + lift_m, pz), target=(tx, ty + lift_m, tz))
 
 
 def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
     """`eye` kept inside the bounds; where `before` was outside already, it gets no farther out."""
     low, high = np.array(bounds)
     margin = np.minimum(WALL_M, 0.1 * (high - low))
-    return np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before))
-
-
-def _sight(camera: Camera) -> np.ndarray:
-    return np.subtract(camera.target, camera.position)
+    return np.asarray(np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before)))
 
 
 def _distance(camera: Camera) -> float:
@@ -153,7 +153,4 @@ def _direction(yaw: float, pitch: float) -> np.ndarray:
 
 
 def _placed(camera: Camera, position: np.ndarray | Triple, target: np.ndarray | Triple) -> Camera:
-    (px, py, pz), (tx, ty, tz) = map(float, position), map(float, target)
-    return Camera(
-        name="free", position=(px, py, pz), target=(tx, ty, tz), up=(0.0, 1.0, 0.0), fov_y_deg=camera.fov_y_deg
-    )
+    return Camera("free", triple(position), triple(target), fov_y_deg=camera.fov_y_deg)

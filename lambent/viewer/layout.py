@@ -1,36 +1,19 @@
 """Where things stand in the window: the picture on the left, one column of panels on the right.
 
-With the material editor open, its disks stand beside the picture and its curves below both; the borders can be dragged.
+A mode may show plots beside the picture and below it; the borders can be dragged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import imgui_bundle
 from imgui_bundle import imgui, implot
 
-from lambent.viewer.input import Rect
-from lambent.viewer.panels import (
-    compare,
-    curves,
-    disks,
-    editing,
-    film,
-    fitting,
-    help,
-    marks,
-    material,
-    metering,
-    overlay,
-    preview,
-    scene,
-    statistics,
-    view,
-)
-from lambent.viewer.state import ViewerState
+from lambent.viewer.mode import Beside, Drawing, Mode, Textures
+from lambent.viewer.panels.widgets import shadowed
+from lambent.viewer.screen import Rect
 
 COLUMN_PX = 370  # logical
 LABEL_PX = 88
@@ -38,9 +21,6 @@ BORDER_PX = 6  # between picture, disks and curves
 LEAST_SHARE = 0.15  # of the window that a border leaves on either side
 FONT = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
 FONT_PX = 15.0
-PANELS = (scene, view, material, metering, compare, film, statistics, help)
-EDITOR_PANELS = (editing, fitting, preview, view, statistics, help)
-OPEN_AT_START = (scene, view, material, editing, fitting, preview)
 COLOURS = {
     imgui.Col_.window_bg: (0.11, 0.115, 0.125, 1.0),
     imgui.Col_.popup_bg: (0.14, 0.145, 0.155, 1.0),
@@ -64,11 +44,11 @@ _BARE = FIXED | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_scrollb
 
 @dataclass(frozen=True)
 class Regions:
-    """What stands where, in logical pixels; disks and curves only while the editor shows them."""
+    """Places of the picture, the column of panels, and, where there are some, the plots right and below."""
 
     picture: Rect
-    disks: Rect | None = None
-    curves: Rect | None = None
+    column: Rect
+    plots: tuple[Rect, Rect] | None = None
 
 
 def set_style() -> None:
@@ -89,108 +69,89 @@ def set_style() -> None:
         plots.set_color_(shade, value)
 
 
-def regions(state: ViewerState, width: float, height: float) -> Regions:
+def regions(mode: Mode, width: float, height: float) -> Regions:
     """How a window of that size is shared out."""
-    column = min(COLUMN_PX, round(0.6 * width)) if state.panels_shown else 0
-    left, down = max(1, round(width) - column), max(1, round(height))
-    editor = state.editor
-    if editor is None or not editor.plots_shown or not state.panels_shown:
-        return Regions(Rect(0, 0, left, down))
-    across, below = round(editor.split_across * left), round(editor.split_down * down)
+    wide = min(COLUMN_PX, round(0.6 * width)) if mode.screen.panels_shown else 0
+    left, down = max(1, round(width) - wide), max(1, round(height))
+    column = Rect(round(width) - wide, 0, wide, down)
+    if mode.beside is None or not mode.screen.panels_shown:
+        return Regions(Rect(0, 0, left, down), column)
+    across, below = round(mode.across * left), round(mode.down * down)
     right, under = across + BORDER_PX, below + BORDER_PX
-    return Regions(
-        Rect(0, 0, max(1, across), max(1, below)),
-        Rect(right, 0, max(1, left - right), max(1, below)),
-        Rect(0, under, left, max(1, down - under)),
-    )
+    plots = Rect(right, 0, max(1, left - right), max(1, below)), Rect(0, under, left, max(1, down - under))
+    return Regions(Rect(0, 0, max(1, across), max(1, below)), column, plots)
 
 
-def picture_rect(state: ViewerState, width: float, height: float) -> Rect:
-    """What the panels leave of a window of that size, in logical pixels."""
-    return regions(state, width, height).picture
-
-
-def draw(state: ViewerState, textures: Mapping[str, imgui.ImTextureRef] | None = None) -> bool:
-    """The whole interface of one frame; returns whether the mouse is the interface's, also over the picture.
-
-    `textures` are "picture A", "picture B", and the editor's images by their names; what is not there is not drawn.
-    """
+def draw(mode: Mode, textures: Textures | None = None) -> bool:
+    """The whole interface of one frame; returns whether the mouse is the interface's, also over the picture."""
     textures = textures or {}
     width, height = imgui.get_io().display_size
-    shared = regions(state, width, height)
-    dragged = _pictures(state, shared.picture, textures)
-    if state.editor is not None and shared.disks is not None and shared.curves is not None:
-        _beside(state, shared, textures)
-    if state.panels_shown:
-        left = width - min(COLUMN_PX, round(0.6 * width))
-        imgui.set_next_window_pos((left, 0))
-        imgui.set_next_window_size((width - left, height))
-        imgui.begin("panels", None, FIXED)
-        _column(state)
+    shared, beside = regions(mode, width, height), mode.beside
+    dragged = _pictures(mode.drawing, shared.picture, textures)
+    if beside is not None and shared.plots is not None:
+        _beside(mode, beside, *shared.plots, textures)
+    if mode.screen.panels_shown:
+        _window("panels", shared.column, FIXED)
+        _column(mode)
         imgui.end()
-    marks.draw(state, shared.picture, textures)
-    overlay.draw(state, shared.picture)
+    mode.draw_over(textures)
     return dragged or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 
-def _column(state: ViewerState) -> None:
+def _window(name: str, place: Rect, flags: int) -> None:
+    imgui.set_next_window_pos((place.x, place.y))
+    imgui.set_next_window_size((place.width, place.height))
+    imgui.begin(name, None, flags)
+
+
+def _column(mode: Mode) -> None:
     imgui.push_item_width(-LABEL_PX)
-    state.meter.wanted = False
-    alone = state.preview is not None
-    if alone:
-        editing.draw_head(state)
+    if mode.head is not None:
+        mode.head()
         imgui.begin_child("sections")
         imgui.push_item_width(-LABEL_PX)
-    for panel in EDITOR_PANELS if alone else PANELS:
-        opened = imgui.TreeNodeFlags_.default_open if panel in OPEN_AT_START and not (alone and panel is view) else 0
-        if imgui.collapsing_header(panel.TITLE, opened):
-            imgui.push_id(panel.TITLE)
-            panel.draw(state)
+    for panel in mode.panels:
+        if imgui.collapsing_header(panel.title, imgui.TreeNodeFlags_.default_open if panel.opened else 0):
+            imgui.push_id(panel.title)
+            panel.draw()
             imgui.pop_id()
-    if alone:
+    if mode.head is not None:
         imgui.pop_item_width()
         imgui.end_child()
     imgui.pop_item_width()
 
 
-def _pictures(state: ViewerState, place: Rect, textures: Mapping[str, imgui.ImTextureRef]) -> bool:
+def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:
     """The picture, or A and B with the divider between them; returns whether the mouse is at the divider."""
     behind = imgui.get_background_draw_list()
-    begin, end = (place.x, place.y), (place.x + place.width, place.y + place.height)
+    begin, end = place.point(0, 0), place.point(1, 1)
     a, b = textures.get("picture A"), textures.get("picture B")
     if a is None:
         return False
-    comparison = state.comparison
-    beside = state.preview or (comparison if comparison and comparison.mode == "side by side" else None)
-    if b is None or beside is None:
-        behind.add_image(textures.get("error map", a), begin, end)
+    divider = drawing.divider
+    if b is None or divider is None:
+        behind.add_image(a, begin, end)
         return False
-    at = place.x + beside.split * place.width
-    behind.add_image(a, begin, (at, end[1]), (0, 0), (beside.split, 1))
-    behind.add_image(b, (at, begin[1]), end, (beside.split, 0), (1, 1))
+    share, (at, _) = divider.share, place.point(divider.share, 0)
+    behind.add_image(a, begin, (at, end[1]), (0, 0), (share, 1))
+    behind.add_image(b, (at, begin[1]), end, (share, 0), (1, 1))
     held, at = _border("divider", (at, place.y), place.height, upright=True)
-    beside.split = min(max((at - place.x) / place.width, 0.02), 0.98)
-    labels = ("A", "B") if state.preview or comparison is None else (comparison.a_label, comparison.b_label)
-    for text, x in ((labels[0], at - 12 - imgui.calc_text_size(labels[0]).x), (labels[1], at + 12)):
-        behind.add_text((x + 1, place.y + 9), imgui.get_color_u32((0, 0, 0, 0.8)), text)
-        behind.add_text((x, place.y + 8), imgui.get_color_u32((1, 1, 1, 0.95)), text)
+    divider.move((at - place.x) / place.width)
+    for text, x in ((divider.a_label, at - 12 - imgui.calc_text_size(divider.a_label).x), (divider.b_label, at + 12)):
+        shadowed(behind, (x, place.y + 8), text, (1, 1, 1, 0.95))
     return held
 
 
-def _beside(state: ViewerState, shared: Regions, textures: Mapping[str, imgui.ImTextureRef]) -> None:
-    editor, picture = state.editor, shared.picture
-    assert editor is not None and shared.disks is not None and shared.curves is not None
-    for name, place, panel in (("disks", shared.disks, disks), ("curves", shared.curves, curves)):
-        imgui.set_next_window_pos((place.x, place.y))
-        imgui.set_next_window_size((place.width, place.height))
-        imgui.begin(name, None, FIXED | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_scrollbar)
-        panel.draw(editor, textures)
+def _beside(mode: Mode, beside: Beside, right: Rect, below: Rect, textures: Textures) -> None:
+    for name, place, draw_plot in (("right", right, beside.right), ("below", below, beside.below)):
+        _window(name, place, FIXED | imgui.WindowFlags_.no_scroll_with_mouse | imgui.WindowFlags_.no_scrollbar)
+        draw_plot(textures)
         imgui.end()
-    left, down = shared.curves.width, shared.curves.y + shared.curves.height
-    _, x = _border("across", (picture.width + BORDER_PX / 2, 0), picture.height, upright=True)
-    _, y = _border("down", (0, picture.height + BORDER_PX / 2), left, upright=False)
-    editor.split_across = min(max((x - BORDER_PX / 2) / left, LEAST_SHARE), 1 - LEAST_SHARE)
-    editor.split_down = min(max((y - BORDER_PX / 2) / down, LEAST_SHARE), 1 - LEAST_SHARE)
+    left, down, half, picture = below.width, below.y + below.height, BORDER_PX / 2, mode.screen.picture
+    _, x = _border("across", (picture.width + half, 0), picture.height, upright=True)
+    _, y = _border("down", (0, picture.height + half), left, upright=False)
+    mode.across = min(max((x - half) / left, LEAST_SHARE), 1 - LEAST_SHARE)
+    mode.down = min(max((y - half) / down, LEAST_SHARE), 1 - LEAST_SHARE)
 
 
 def _border(name: str, begin: tuple[float, float], length: float, *, upright: bool) -> tuple[bool, float]:
@@ -213,9 +174,8 @@ def _border(name: str, begin: tuple[float, float], length: float, *, upright: bo
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew if upright else imgui.MouseCursor_.resize_ns)
     shade = 0.55 if held else 0.4 if hovered else 0.24
     end = (x, y + length) if upright else (x + length, y)
-    imgui.get_window_draw_list().add_line(
-        begin, end, imgui.get_color_u32((shade, shade, shade, 1)), 2.0 if hovered or held else 1.0
-    )
+    colour, wide = imgui.get_color_u32((shade, shade, shade, 1)), 2.0 if hovered or held else 1.0
+    imgui.get_window_draw_list().add_line(begin, end, colour, wide)
     imgui.end()
     imgui.pop_style_var(2)
     return held or hovered, at

@@ -1,4 +1,4 @@
-"""What is kept when the window is lost: by an error, a signal, or a display that goes away.
+"""Keep unsaved work when the window is lost: by an error, a signal, or a display that goes away.
 
 An X server that dies ends the process from within Xlib, past every `finally` and `atexit` of Python; Xlib offers one
 call before it does. A process that is killed outright (SIGKILL), or dies in the graphics driver, keeps nothing.
@@ -17,25 +17,14 @@ from types import FrameType
 from typing import Any
 
 from lambent.core.errors import UserError
-from lambent.viewer.state import ViewerState
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 LIBX11 = "libX11.so.6"
 _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
-def keep(state: ViewerState) -> None:
-    """Write what was not saved to files of new names, and say where on stderr."""
-    _keep("an unsaved material", state.rescue_materials)
-    keep_walk(state)
-
-
-def keep_walk(state: ViewerState) -> None:
-    """Save what was recorded, or write it to a file of a new name, and say where on stderr."""
-    _keep("the recorded walk", state.rescue_recording)
-
-
-def _keep(what: str, write: Callable[[], Iterable[object]]) -> None:
+def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
+    """Say on stderr where `write` put what was not saved, or why it could not."""
     try:
         for place in write():
             sys.stderr.write(f"lambent: note: {what} is in {place}\n")
@@ -44,8 +33,8 @@ def _keep(what: str, write: Callable[[], Iterable[object]]) -> None:
 
 
 @contextmanager
-def kept(state: ViewerState, end: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """While the window is open: where it is lost, keep what was not saved and call `end`.
+def kept(rescue: Callable[[], None]) -> Iterator[None]:
+    """While the window is open: call `rescue` once where it is lost.
 
     Signals that end a process, and Xlib's error of the connection, are taken over inside and given back after.
     """
@@ -55,8 +44,7 @@ def kept(state: ViewerState, end: Callable[[], None] = lambda: None) -> Iterator
         nonlocal over
         if not over:
             over = True  # what follows may fail in its turn
-            keep(state)
-            end()
+            rescue()
 
     def on_signal(number: int, _: FrameType | None) -> None:
         lost()

@@ -43,10 +43,6 @@ class Resolution:
         self._times: dict[float, float] = {}  # seconds by scale
         self._fixed_s = self._pixels_s = 0.0  # of a frame of no pixels, and of all pixels besides
 
-    def restart(self, scale: float) -> None:
-        """Forget what was learnt."""
-        self.__init__(scale)  # type: ignore[misc]
-
     def seconds(self, scale: float) -> float:
         """What a frame would take."""
         return self._fixed_s + self._pixels_s * scale * scale
@@ -90,9 +86,9 @@ class Pacer:
         self._mirrors = not slow_adapter  # in motion
         start = 0.5 if slow_adapter else 1.0
         self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirror pictures, and without
-        self._shown: object = None
+        self.shown: object = None  # the picture that the window shows or is about to
+        self.accumulated = 0  # frames that it is the mean of; 0: it is one of motion
         self._changed_s = 0.0
-        self._accumulated = 0
         self._last: Plan | None = None
         self._budget_s = BUDGET_S
 
@@ -101,27 +97,14 @@ class Pacer:
         """The next frame in motion."""
         return Plan(self._sizes[self._mirrors].scale, None, self._mirrors)
 
-    @property
-    def moving_scale(self) -> float:
-        return self.moving.scale
-
-    @property
-    def shown(self) -> object:
-        """The picture that the window shows or is about to."""
-        return self._shown
-
-    @property
-    def accumulated(self) -> int:
-        return self._accumulated
-
     def aim(self, seconds: float) -> None:
         """A frame in motion should take no longer from now on."""
         self._budget_s = seconds
 
     def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
         """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
-        if picture != self._shown:
-            self._shown, self._changed_s, self._accumulated = picture, now_s, 0
+        if picture != self.shown:
+            self.shown, self._changed_s, self.accumulated = picture, now_s, 0
             return self.moving if adaptive else WHOLE
         return self._next(refine) if now_s - self._changed_s >= REST_S else None
 
@@ -131,13 +114,13 @@ class Pacer:
 
     def _next(self, refine: bool) -> Plan | None:
         """What a resting camera still lacks."""
-        if not (self._accumulated or self._last == WHOLE):
+        if not (self.accumulated or self._last == WHOLE):
             return WHOLE
-        return Plan(1.0, self._accumulated) if refine and self._accumulated < self.accumulate_to else None
+        return Plan(1.0, self.accumulated) if refine and self.accumulated < self.accumulate_to else None
 
     def drawn(self, plan: Plan) -> None:
         self._last = plan
-        self._accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
+        self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
         """Learn what a frame in motion took, with so many mirror pictures, and choose the next."""
@@ -149,7 +132,7 @@ class Pacer:
             self._mirrors = False
         elif not plan.mirrors and plan.scale == 1.0 and MIRROR_COST * seconds <= self._budget_s:
             self._mirrors = True
-            self._sizes[True].restart(LEAST_MIRRORED)
+            self._sizes[True] = Resolution(LEAST_MIRRORED)  # what was learnt before is forgotten
 
 
 def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:

@@ -1,4 +1,4 @@
-"""What is under the mouse, and what is under the feet: rays against the scene's triangles, on the CPU."""
+"""Rays against the scene's triangles, on the CPU: the object under the mouse."""
 
 from __future__ import annotations
 
@@ -6,63 +6,32 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from lambent.core.camera import Camera, rays_through
 from lambent.store.contract import ObjectRecord
-from lambent.viewer.walls import Walls
 
 Floats = NDArray[np.floating]
-STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
-
-
-def ray_through(camera: Camera, x: float, y: float, width: int, height: int) -> tuple[Floats, Floats]:
-    """Origin and unit direction of the ray through the picture point (x, y) in pixels, y downwards."""
-    return np.array(camera.position, float), rays_through(camera, x, y, width, height)
 
 
 class Geometry:
-    """Triangles ready for rays. positions (V, 3), faces (T, 3) sorted by object."""
+    """Objects that can be picked. positions (V, 3), faces (T, 3) sorted by object; `triangles` (T, 3, 3) float32."""
 
     def __init__(self, positions: Floats, faces: NDArray[np.integer], objects: Sequence[ObjectRecord]) -> None:
         self._objects = tuple(objects)
-        self._triangles = positions[faces].astype(np.float32)
-        normals = np.cross(self._triangles[:, 1] - self._triangles[:, 0], self._triangles[:, 2] - self._triangles[:, 0])
-        lengths = np.linalg.norm(normals, axis=-1)
-        # Floors are what one can stand on: not steeper than 45 degrees, on either side (some floors are modelled upside
-        # down).
-        level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(lengths, 1e-20)
-        self._level = self._triangles[level]
-        self._walls = Walls(self._triangles)
-        self._level_low, self._level_high = self._level.min(axis=1), self._level.max(axis=1)
+        self.triangles = positions[faces].astype(np.float32)
 
-    def pick(self, origin: Floats, direction: Floats) -> ObjectRecord | None:
-        """The first object that the ray meets."""
+    def pick(self, origin: ArrayLike, direction: Floats) -> ObjectRecord | None:
+        """The first object on a ray; None where it meets none."""
+        start = np.asarray(origin, float)
         nearest, chosen = math.inf, None
         for item in self._objects:
-            entry = _box_entry(origin, direction, np.array(item.bounds))
+            entry = _box_entry(start, direction, np.array(item.bounds))
             if entry < nearest:
-                triangles = self._triangles[item.first_face : item.first_face + item.face_count]
-                distance = first_hit(origin, direction, triangles)
+                triangles = self.triangles[item.first_face : item.first_face + item.face_count]
+                distance = first_hit(start, direction, triangles)
                 if distance < nearest:
                     nearest, chosen = distance, item
         return chosen
-
-    def allowed(self, eye: Floats, step: Floats, eye_height_m: float) -> Floats:
-        """The part of a walker's step that nothing stands in the way of."""
-        return self._walls.allowed(eye, step, knee_y=eye[1] - eye_height_m + STEP_M)
-
-    def floor_below(self, eye: Sequence[float], eye_height_m: float) -> float | None:
-        """Height of the highest floor under the eye that one could step on; None where there is none."""
-        x, y, z = eye
-        reach = y - eye_height_m + STEP_M
-        near = (
-            (self._level_low[:, 0] <= x) & (x <= self._level_high[:, 0])
-            & (self._level_low[:, 2] <= z) & (z <= self._level_high[:, 2]) & (self._level_low[:, 1] <= reach)
-        )  # fmt: skip
-        from_above = np.array([x, reach, z])
-        distance = first_hit(from_above, np.array([0.0, -1.0, 0.0]), self._level[near])
-        return None if math.isinf(distance) else reach - distance
 
 
 def first_hit(origin: Floats, direction: Floats, triangles: Floats) -> float:

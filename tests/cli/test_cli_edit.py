@@ -9,10 +9,16 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
-from lambent.viewer.edit import editor_state
+from lambent.viewer.modes.material.mode import MaterialState
+from lambent.viewer.screen import Screen
 from tests.viewer.measured_specimens import BRASS, write_measurement
 
 ROOT = Path(__file__).parents[2]
+
+
+def opened(folder, file, material=None, environments=()):
+    """State of the material mode."""
+    return MaterialState.of(file, material, environments, Screen(folder))
 
 
 def test_without_a_display(tmp_path):
@@ -37,22 +43,22 @@ def test_what_cannot_be_shown(tmp_path, file, says):
     (tmp_path / "junk.txt").write_text("hello")
     (tmp_path / "bad.json").write_text('{"kd": -1}')
     with pytest.raises(UserError, match=says):
-        editor_state(tmp_path / file, folder=tmp_path)
+        opened(tmp_path, tmp_path / file)
 
 
 def test_two_documents_are_compared(tmp_path):
     for name in ("a", "b"):
         Material(name=name, kd=0.5).save(tmp_path / f"{name}.json")
-    editor = editor_state(tmp_path / "a.json", tmp_path / "b.json", folder=tmp_path).editor
-    assert (editor.material.name, editor.compared.name, editor.measurement) == ("a", "b", None)
+    editor = opened(tmp_path, tmp_path / "a.json", tmp_path / "b.json").editor
+    assert (editor.subject.material.name, editor.subject.compared.name, editor.measurement) == ("a", "b", None)
 
 
 def test_the_order_does_not_matter(tmp_path):
     BRASS.save(tmp_path / "brass.json")
     file = write_measurement(tmp_path / "brass.txt", BRASS)
     for pair in ((file, tmp_path / "brass.json"), (tmp_path / "brass.json", file)):
-        editor = editor_state(*pair, folder=tmp_path).editor
-        assert editor.measurement.path == file and editor.material == BRASS
+        editor = opened(tmp_path, *pair).editor
+        assert editor.measurement.path == file and editor.subject.material == BRASS
 
 
 def test_environments_are_named_and_found(tmp_path):
@@ -64,9 +70,9 @@ def test_environments_are_named_and_found(tmp_path):
     other = tmp_path / "elsewhere" / "beside.exr"
     other.parent.mkdir()
     write_image(other, dusk(4)[0])
-    preview = editor_state(tmp_path / "a.json", None, [other], folder=tmp_path).preview
+    preview = opened(tmp_path, tmp_path / "a.json", None, [other]).preview
     assert preview.environments[-2:] == ("beside", "beside'") and preview.environment == "beside'"
     with pytest.raises(UserError, match="not a lat-long"):
         preview.light("beside")
     with pytest.raises(UserError, match="no such file"):
-        editor_state(tmp_path / "a.json", None, [tmp_path / "none.hdr"], folder=tmp_path)
+        opened(tmp_path, tmp_path / "a.json", None, [tmp_path / "none.hdr"])

@@ -1,11 +1,14 @@
-"""A recorded scene for tests that need no store."""
+"""A recorded scene, and the state of the walk mode on it, for tests that need no store."""
 
+import numpy as np
 import pytest
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
 from lambent.store.contract import ObjectRecord, SceneRecord
-from lambent.viewer.state import Choices
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.picking import Geometry
+from lambent.viewer.screen import Rect, Screen
 
 
 @pytest.fixture
@@ -29,12 +32,33 @@ def scene():
     )
 
 
+class Clock:
+    """Time stands still until a test moves `now_s`."""
+
+    now_s = 0.0
+
+    def __call__(self):
+        return self.now_s
+
+
 @pytest.fixture
-def choices():
-    return Choices(
-        integrators=("rings", "qmc"),
-        view_transforms=("filmic", "linear"),
-        shows=("full", "diffuse", "specular"),
-        lookups=("planes", "plain"),
-        sample_counts=(1, 3, 5, 7),
-    )
+def screen(tmp_path):
+    return Screen(tmp_path, Clock(), Rect(0, 0, 400, 300))
+
+
+@pytest.fixture
+def state(scene, screen):
+    """The walk mode on a scene whose store is the folder of the screen."""
+    return WalkState.of(scene, "walk", screen, screen.folder)
+
+
+@pytest.fixture
+def geometry(scene):
+    """The floor at 0 and the table top at 1 m of the scene."""
+
+    def square(half, y):
+        return [(-half, y, -half), (-half, y, half), (half, y, half), (half, y, -half)]
+
+    positions = np.array(square(4, 0.0) + square(1, 1.0), np.float32)
+    faces = np.array([(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)], np.uint32)
+    return Geometry(positions, faces, scene.objects)

@@ -16,8 +16,8 @@ SIZE = (1400, 1600)
 class PanelDriver:
     """`rects[label]` is where a control was drawn last."""
 
-    def __init__(self, monkeypatch, state, size=SIZE):
-        self.state, self.rects = state, {}
+    def __init__(self, monkeypatch, mode, size=SIZE):
+        self.mode, self.state, self.rects = mode, mode.state, {}
         self._context = imgui.create_context()
         imgui.set_current_context(self._context)
         self.io = imgui.get_io()
@@ -36,7 +36,8 @@ class PanelDriver:
             self.rects.clear()
             self.io.delta_time = 1 / 30
             imgui.new_frame()
-            self.popup_open = layout.draw(self.state, None)
+            self.state.screen.picture = layout.regions(self.mode, *self.io.display_size).picture
+            self.popup_open = layout.draw(self.mode)
             imgui.render()
 
     def point(self, label, along=0.5):

@@ -73,7 +73,7 @@ def test_the_picture_of_the_disks_holds_each_at_its_place(brushed):
     values = np.zeros((len(disks.tiles), int(disks._inside.sum()), 3), np.float32)
     values[4] = 1
     picture = disks.picture(values, 1.0)
-    (u0, v0), (u1, v1) = disks.place(4)
+    (u0, v0), (u1, v1) = disks.place(4, False)
     height, width = picture.shape[:2]
     tile = picture[round(v0 * height) : round(v1 * height), round(u0 * width) : round(u1 * width)]
     assert tile.shape[:2] == (16, 16) and tile[8, 8].tolist() == [255, 255, 255, 255]

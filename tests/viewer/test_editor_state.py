@@ -8,13 +8,12 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material, Provenance, load_material
-from lambent.viewer.editor.documents import same_numbers
 from lambent.viewer.editor.editor import Editor
-from lambent.viewer.editor.measurement import read_measurement
+from lambent.viewer.editor.measurement import read_measurement, start_material
 from lambent.viewer.editor.restrictions import Restrictions, lobe_names
-from lambent.viewer.editor.start import start_material
-from lambent.viewer.editor.work import Work
-from lambent.viewer.state import MaterialEdits
+from lambent.viewer.editor.subject import same_numbers
+from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.work import Work
 from tests.viewer.measured_specimens import BRASS, FROSTED, write_measurement
 
 PATIENCE_S = 60.0
@@ -26,13 +25,25 @@ def brass_file(tmp_path_factory):
 
 
 @pytest.fixture
-def said():
-    return []
+def said(screen):
+    """Messages so far."""
+    return Said(screen)
+
+
+class Said:
+    def __init__(self, screen):
+        self._screen = screen
+
+    def __len__(self):
+        return len(self._screen.messages)
+
+    def __getitem__(self, index):
+        return self._screen.messages[index].text
 
 
 @pytest.fixture
-def editor(tmp_path, said):
-    return Editor(MaterialEdits({"brass": BRASS}), "brass", tmp_path, said.append)
+def editor(screen):
+    return Editor(MaterialEdits({"brass": BRASS}), "brass", screen)
 
 
 def moved(material, **changes):
@@ -50,64 +61,64 @@ def until(editor, condition):
 def test_a_drag_is_one_step_and_is_shown_at_once(editor, brass_file):
     editor.show_measurement(read_measurement(brass_file))
     editor.tick()
-    error, image, curve = editor.shown.error, editor.shown.images["A"], editor.shown.curves["A", False]
+    error, image, curve = editor.shown.error, editor.shown.images["A"], editor.shown.curves["A", False][1]
     assert error < 0.01 * editor.measurement.lambertian["cuberoot"]
     for mx in (0.2, 0.3, 0.4):
-        editor.change(moved(editor.material, mx=mx, my=mx))
+        editor.subject.change(moved(editor.subject.material, mx=mx, my=mx))
         editor.tick()
         assert editor.shown.error > error
         error = editor.shown.error
     assert editor.shown.images["A"] is not image
-    assert editor.shown.curves["A", False].max() < curve.max()
-    editor.edits.end_stroke()
-    editor.edits.undo()
-    assert editor.material == BRASS and not editor.edits.can_undo
+    assert editor.shown.curves["A", False][1].max() < curve.max()
+    editor.subject.edits.end_stroke()
+    editor.subject.edits.undo()
+    assert editor.subject.material == BRASS and not editor.subject.edits.can_undo
     until(editor, lambda: editor.shown.exact and editor.shown.layout["A"].pixels > 60)
     assert editor.shown.error == pytest.approx(editor.measurement.exact_errors(BRASS)["cuberoot"])
 
 
 def test_what_is_compared_with(editor):
-    editor.reference = "as loaded"
-    editor.step(moved(BRASS, mx=0.3))
-    editor.step(moved(BRASS, mx=0.5))
-    assert editor.compared == BRASS
-    editor.reference = "before the last step"
-    assert editor.compared.lobes[0].mx == 0.3
-    editor.reference = "as saved"
-    assert editor.compared is None
+    editor.subject.reference = "as loaded"
+    editor.subject.step(moved(BRASS, mx=0.3))
+    editor.subject.step(moved(BRASS, mx=0.5))
+    assert editor.subject.compared == BRASS
+    editor.subject.reference = "before the last step"
+    assert editor.subject.compared.lobes[0].mx == 0.3
+    editor.subject.reference = "as saved"
+    assert editor.subject.compared is None
     editor.save()
-    assert editor.compared.lobes[0].mx == 0.5
+    assert editor.subject.compared.lobes[0].mx == 0.5
     editor.tick()
     assert ("B", False) in editor.shown.curves
-    editor.reference = "nothing"
+    editor.subject.reference = "nothing"
     editor.tick()
     assert ("B", False) not in editor.shown.curves and "B" not in editor.shown.images
 
 
 def test_revert_can_be_undone(editor):
-    editor.step(moved(BRASS, mx=0.3))
-    assert editor.unsaved
-    editor.revert()
-    assert editor.material == BRASS and not editor.unsaved
-    editor.edits.undo()
-    assert editor.material.lobes[0].mx == 0.3
+    editor.subject.step(moved(BRASS, mx=0.3))
+    assert editor.subject.unsaved
+    editor.subject.step(editor.subject.loaded)
+    assert editor.subject.material == BRASS and not editor.subject.unsaved
+    editor.subject.edits.undo()
+    assert editor.subject.material.lobes[0].mx == 0.3
 
 
 def test_lobes_come_and_go_and_restrictions_follow(editor):
-    editor.add_lobe("reflection")
-    editor.add_lobe("transmission")
-    assert [names["mx"] for names in lobe_names(editor.material)] == ["mx", "mx_2", "t_mx"]
-    editor.restrictions.fix("mx_2", True)
-    editor.restrictions.fix("kd", True)
-    editor.restrictions.narrow("mx", (0.1, 0.2))
-    editor.remove_lobe(0)
-    assert editor.restrictions.fixed == {"mx", "kd"} and editor.restrictions.ranges == {}
-    editor.turn_lobe(0, "transmission")
-    assert [lobe.side for lobe in editor.material.lobes] == ["transmission", "transmission"]
-    assert editor.restrictions.fixed == {"kd"}
+    editor.subject.add_lobe("reflection")
+    editor.subject.add_lobe("transmission")
+    assert [names["mx"] for names in lobe_names(editor.subject.material)] == ["mx", "mx_2", "t_mx"]
+    editor.subject.restrictions.fix("mx_2", True)
+    editor.subject.restrictions.fix("kd", True)
+    editor.subject.restrictions.narrow("mx", (0.1, 0.2))
+    editor.subject.remove_lobe(0)
+    assert editor.subject.restrictions.fixed == {"mx", "kd"} and editor.subject.restrictions.ranges == {}
+    editor.subject.turn_lobe(0, "transmission")
+    assert [lobe.side for lobe in editor.subject.material.lobes] == ["transmission", "transmission"]
+    assert editor.subject.restrictions.fixed == {"kd"}
     for _ in range(4):
-        editor.edits.undo()
-    assert editor.material == BRASS
+        editor.subject.edits.undo()
+    assert editor.subject.material == BRASS
 
 
 def test_restrictions_of_a_fit():
@@ -125,35 +136,35 @@ def test_restrictions_of_a_fit():
 
 def test_a_fit_comes_as_one_step_and_keeps_what_is_fixed(editor, brass_file, said):
     editor.show_measurement(read_measurement(brass_file))
-    editor.step(moved(BRASS, mx=0.5, my=0.5, alpha=0.0))
-    editor.restrictions.fix("alpha", True)
-    editor.options.distribution = "beckmann"
-    editor.start_fit()
-    until(editor, lambda: editor.fitting is None)
-    found = editor.material
+    editor.subject.step(moved(BRASS, mx=0.5, my=0.5, alpha=0.0))
+    editor.subject.restrictions.fix("alpha", True)
+    editor.fit.distribution = "beckmann"
+    editor.fit.start(editor.measurement, editor.metric)
+    until(editor, lambda: editor.fit.work is None)
+    found = editor.subject.material
     assert found.lobes[0].mx == pytest.approx(0.15, rel=0.05) and found.lobes[0].alpha == 0
     assert found.name == "brass" and found.provenance.source == "brass.txt"
     assert said[-1].startswith("fitted in")
-    editor.edits.undo()
-    assert editor.material.lobes[0].mx == 0.5
+    editor.subject.edits.undo()
+    assert editor.subject.material.lobes[0].mx == 0.5
 
 
 def test_a_cancelled_fit_leaves_the_material(editor, brass_file, said):
     editor.show_measurement(read_measurement(brass_file))
-    editor.options.lobes, editor.options.method = "3", "grid"
-    editor.start_fit()
-    editor.stop_fit(keep=False)
-    until(editor, lambda: editor.fitting is None)
-    assert editor.material == BRASS and not editor.edits.can_undo
+    editor.fit.lobes, editor.fit.method = "3", "grid"
+    editor.fit.start(editor.measurement, editor.metric)
+    editor.fit.stop(keep=False)
+    until(editor, lambda: editor.fit.work is None)
+    assert editor.subject.material == BRASS and not editor.subject.edits.can_undo
     assert "cancelled" in said[-1]
 
 
 def test_a_fit_that_cannot_be_is_said(editor, brass_file, said):
     editor.show_measurement(read_measurement(brass_file))
-    editor.add_lobe("transmission")
-    editor.restrictions.fix("t_mx", True)
-    editor.start_fit()
-    until(editor, lambda: editor.fitting is None)
+    editor.subject.add_lobe("transmission")
+    editor.subject.restrictions.fix("t_mx", True)
+    editor.fit.start(editor.measurement, editor.metric)
+    until(editor, lambda: editor.fit.work is None)
     assert "not fitted" in said[-1] and "does not transmit" in said[-1]
 
 
@@ -161,19 +172,19 @@ def test_what_is_saved_says_that_it_was_edited(editor, brass_file, tmp_path):
     fitted = BRASS.model_copy(
         update={"provenance": Provenance(source="brass.txt", method="gradient", errors={"l1": 9.0})}
     )
-    editor.adopt(fitted)
+    editor.subject.adopt(fitted)
     editor.show_measurement(read_measurement(brass_file))
-    editor.step(moved(fitted, mx=0.3))
-    editor.file_name = "mine.json"
+    editor.subject.step(moved(fitted, mx=0.3))
+    editor.files.name = "mine.json"
     editor.save()
     saved = load_material(tmp_path / "mine.json")
-    assert same_numbers(saved, editor.material) and not editor.unsaved
+    assert same_numbers(saved, editor.subject.material) and not editor.subject.unsaved
     assert saved.provenance.method == "gradient" and "edited by hand after the fit" in saved.provenance.notes[-1]
     assert saved.provenance.errors == pytest.approx(editor.measurement.exact_errors(saved))
-    editor.step(fitted)
+    editor.subject.step(fitted)
     editor.save()
     assert load_material(tmp_path / "mine.json").provenance == fitted.provenance, "as fitted, so no note"
-    editor.step(BRASS)
+    editor.subject.step(BRASS)
     editor.save()
     assert load_material(tmp_path / "mine.json").provenance is None, "as it was before the fit"
 
@@ -188,10 +199,10 @@ def test_another_file_is_replaced_at_the_second_try(editor, tmp_path, said):
 
 @pytest.mark.parametrize("name", ["", ".json", "brass.txt", "nowhere/brass.json"])
 def test_a_bad_file_name_is_said_and_nothing_lost(editor, said, name):
-    editor.step(moved(BRASS, mx=0.3))
-    editor.file_name = name
+    editor.subject.step(moved(BRASS, mx=0.3))
+    editor.files.name = name
     editor.save()
-    assert said[-1].startswith("not saved") and editor.unsaved and editor.material.lobes[0].mx == 0.3
+    assert said[-1].startswith("not saved") and editor.subject.unsaved and editor.subject.material.lobes[0].mx == 0.3
 
 
 def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, said):
@@ -201,21 +212,21 @@ def test_wrong_files_are_said_and_nothing_lost(editor, brass_file, tmp_path, sai
     broken.write_text(json.dumps({"kd": -1}))
     for text in ("", "/no/such/file", str(junk), str(broken), str(tmp_path / "light.hdr"), str(tmp_path)):
         count = len(said)
-        editor.open(text)
+        editor.files.open(text)
         until(editor, lambda count=count: len(said) > count)
         assert said[-1].startswith("not loaded"), text
-    assert editor.measurement is before and editor.material == BRASS
-    editor.open_compared(str(broken))
-    assert editor.document is None and said[-1].startswith("not loaded")
+    assert editor.measurement is before and editor.subject.material == BRASS
+    editor.files.open_compared(str(broken))
+    assert editor.subject.document is None and said[-1].startswith("not loaded")
 
 
 def test_files_are_taken_for_what_they_hold(editor, brass_file, tmp_path):
     FROSTED.save(tmp_path / "frosted.json")
-    editor.open(f" '{tmp_path / 'frosted.json'}' ")
-    assert same_numbers(editor.material, FROSTED) and editor.file_name == str(tmp_path / "frosted.json")
-    editor.edits.undo()
-    assert editor.material == BRASS
-    editor.open(f"file://{brass_file}")
+    editor.files.open(f" '{tmp_path / 'frosted.json'}' ")
+    assert same_numbers(editor.subject.material, FROSTED) and editor.files.name == str(tmp_path / "frosted.json")
+    editor.subject.edits.undo()
+    assert editor.subject.material == BRASS
+    editor.files.open(f"file://{brass_file}")
     until(editor, lambda: editor.measurement is not None)
     assert editor.measurement.path == brass_file
 
@@ -232,7 +243,7 @@ def test_a_table_of_few_tuples_has_an_error_and_no_curves(editor, tmp_path):
     editor.show_measurement(measurement := read_measurement(tmp_path / "few.txt"))
     assert measurement.gathered == ()
     editor.tick()
-    assert editor.shown.error > 0 and editor.shown.measured_curve == {} and editor.shown.curves
+    assert editor.shown.error > 0 and ("measured", False) not in editor.shown.curves and editor.shown.curves
 
 
 def test_work_reports_its_end():

@@ -18,8 +18,9 @@ PIXELS = st.floats(-3000, 3000)
 
 def walked(camera, keys, seconds, steps, **options):
     options = {"bounds": ROOM, "floor_y": 0.0, **options}
+    walker = cameras.Walker.of(options["bounds"])
     for _ in range(steps):
-        camera = cameras.walk(camera, keys, seconds / steps, **options)
+        camera = cameras.walk(camera, walker, keys, seconds / steps, **options)
     return camera
 
 
@@ -112,6 +113,6 @@ def test_who_starts_outside_may_come_in_but_not_go_farther_out():
 
 def test_a_low_model_is_walked_at_its_own_scale():
     box = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    assert cameras.eye_height_m(box) == pytest.approx(0.6)
-    assert cameras.speed_m_s(box, False) == pytest.approx(cameras.WALK_M_S * 0.6 / 1.6)
-    assert cameras.eye_height_m(ROOM) == 1.6
+    assert cameras.Walker.of(box).eye_height_m == pytest.approx(0.6)
+    assert cameras.Walker.of(box).speed_m_s == pytest.approx(cameras.WALK_M_S * 0.6 / 1.6)
+    assert cameras.Walker.of(ROOM).eye_height_m == 1.6

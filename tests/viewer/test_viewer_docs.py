@@ -4,14 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from lambent.viewer import cameras, pacing, picking
+from lambent.viewer import cameras, pacing
 from lambent.viewer.editor import measurement
-from lambent.viewer.input import PREVIEW_SHORTCUTS, SHORTCUTS
+from lambent.viewer.modes.material import mode as material
+from lambent.viewer.modes.walk import input as walk
+from lambent.viewer.modes.walk import walls
 
 TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("shortcut", (*SHORTCUTS, *PREVIEW_SHORTCUTS), ids=lambda s: s[0])
+@pytest.mark.parametrize("shortcut", (*walk.SHORTCUTS, *material.SHORTCUTS), ids=lambda s: s[0])
 def test_every_shortcut_is_documented(shortcut):
     assert f"| {shortcut[0]} | {shortcut[1]} |" in TEXT
 
@@ -21,4 +23,4 @@ def test_the_numbers_are_those_of_the_code():
     assert f"{cameras.EYE_HEIGHT_M} m above" in TEXT
     assert f"{measurement.FEW:,} tuples".replace(",", " ") in TEXT
     assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
-    assert f"{100 * picking.STEP_M:.0f} cm" in TEXT
+    assert f"{100 * walls.STEP_M:.0f} cm" in TEXT

@@ -10,48 +10,60 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.materials.document import load_material
 from lambent.store.views import Views
-from lambent.viewer.lost import keep_walk, kept
-from lambent.viewer.state import ViewerState
-from lambent.viewer.views import SavedViews
+from lambent.viewer.lost import kept
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.state import WalkState
 from tests.viewer.small_store import write_small_store
 from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
 
 
+class Ended(Drawing):
+    """Counts how often it was closed."""
+
+    times = 0
+
+    def close(self):
+        self.times += 1
+
+
 @pytest.fixture
-def state(scene, choices, tmp_path, monkeypatch):
+def mode(scene, screen, geometry, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     (tmp_path / "store").mkdir()
-    state = ViewerState.of(scene, choices, "walk", folder=tmp_path)
-    state.views = SavedViews(scene, tmp_path / "store", state.say)
-    state.now_s = 0.0
-    state.clock = lambda: state.now_s
-    return state
+    state = WalkState.of(scene, "walk", screen, tmp_path / "store")
+    return WalkMode(state, WalkInput(state, geometry), Ended(None))
+
+
+@pytest.fixture
+def state(mode):
+    return mode.state
 
 
 def walk_and_edit(state):
-    state.edits.change("brass", state.scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)}))
-    state.record()
+    state.materials.edits.change("brass", state.scene.materials["brass"].model_copy(update={"kd": (0.3, 0.3, 0.3)}))
+    state.recordings.record()
     for k in range(1, 20):
-        state.now_s = 0.1 * k
-        state.camera = Camera(name="free", position=(0.1 * k, 1.6, 0), target=(0.1 * k, 1.6, -1))
-        state.recorder.take(state.camera, state.now_s)
+        state.screen.clock.now_s = 0.1 * k
+        state.navigation.camera = Camera(name="free", position=(0.1 * k, 1.6, 0), target=(0.1 * k, 1.6, -1))
+        state.recordings.recorder.take(state.navigation.camera, state.screen.clock.now_s)
 
 
-def test_an_error_keeps_the_material_and_the_walk_once(state, tmp_path, capsys):
+def test_an_error_keeps_the_material_and_the_walk_once(mode, state, tmp_path, capsys):
     walk_and_edit(state)
-    ended = []
-    with pytest.raises(ZeroDivisionError), kept(state, end=lambda: ended.append(1)):
+    with pytest.raises(ZeroDivisionError), kept(mode.rescue):
         raise ZeroDivisionError
     assert load_material(tmp_path / "brass-rescued-001.json").kd == (0.3, 0.3, 0.3)
-    assert [path.name for path in state.views.paths] == ["walk 1"] and ended == [1]
+    assert [path.name for path in state.recordings.views.saved.paths] == ["walk 1"] and mode.drawing.times == 1
     assert "brass-rescued-001.json" in capsys.readouterr().err
     assert not (tmp_path / "brass-rescued-002.json").exists()
 
 
-def test_closing_in_order_keeps_nothing_aside(state, tmp_path):
+def test_closing_in_order_keeps_nothing_aside(mode, state, tmp_path):
     walk_and_edit(state)
     before = signal.getsignal(signal.SIGTERM)
-    with kept(state):
+    with kept(mode.rescue):
         assert signal.getsignal(signal.SIGTERM) != before
     assert signal.getsignal(signal.SIGTERM) == before
     assert [p.name for p in tmp_path.iterdir()] == ["store"]
@@ -60,9 +72,9 @@ def test_closing_in_order_keeps_nothing_aside(state, tmp_path):
 def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
     walk_and_edit(state)
     shutil.rmtree(tmp_path / "store")
-    state.save_view()
-    assert "the store is gone" in state.messages[-1].text and not (tmp_path / "store").exists()
-    (said,) = state.rescue_recording()
+    state.recordings.save_view()
+    assert "the store is gone" in state.screen.messages[-1].text and not (tmp_path / "store").exists()
+    (said,) = state.recordings.rescue()
     file = tmp_path / "walk 1-rescued-001.json"
     assert str(file) in said
     assert [p.name for p in Views.model_validate_json(file.read_text()).paths] == ["walk 1"]
@@ -96,13 +108,14 @@ def test_a_window_that_is_lost_keeps_its_material(adapter, tmp_path, how):
     assert "brass-rescued-001.json" in session.log()
 
 
-def test_a_walk_that_can_be_kept_nowhere_is_said(state, capsys, monkeypatch):
+def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     walk_and_edit(state)
     monkeypatch.setattr("tempfile.mkstemp", refused)
-    keep_walk(state)
+    state.materials.edits.undo()
+    mode.close()
     said = capsys.readouterr().err
     assert said.startswith("lambent: note: the recorded walk could not be kept: ") and said.count("\n") == 1
     assert "walk 1-rescued-001.json: cannot be written (Permission denied)" in said

@@ -9,11 +9,10 @@ from lambent.core.metrics import flip_error
 from lambent.core.photometry import LM_PER_W
 from lambent.core.progress import Cancelled, silent
 from lambent.realtime.baked import Probe
-from lambent.viewer.comparison import Comparison, Errors, difference
-from lambent.viewer.filming import film_file
-from lambent.viewer.flip_worker import flip_beside
-from lambent.viewer.markers import Markers, mirror_ball, outline, projected
-from lambent.viewer.metering import KEY, read
+from lambent.viewer.modes.walk.comparison import Comparison, difference, flip_beside
+from lambent.viewer.modes.walk.filming import film_file
+from lambent.viewer.modes.walk.markers import Marks, mirror_ball, outline, projected
+from lambent.viewer.modes.walk.metering import KEY, read
 
 CAMERA = Camera(name="c", position=(0, 1, 5), target=(0, 1, 0), fov_y_deg=90)
 
@@ -60,36 +59,37 @@ def test_flip_can_be_cancelled():
 
 
 def test_figures_and_maps():
-    comparison, errors = Comparison(mode="error map"), Errors()
+    comparison = Comparison()
+    comparison.mode = "error map"
     b = np.random.default_rng(5).random((32, 32, 3)).astype(np.float32)
-    assert errors.due("here", 1)
-    errors.compare(comparison, 1.2 * b, b, "linear", 0.0, 1, 8)
-    assert not errors.due("here", 1) and errors.due("here", 2)
-    errors._work.wait()
-    errors.tick(comparison)
+    assert comparison.due("here", 1)
+    comparison.compare(1.2 * b, b, "linear", 0.0, 1, 8)
+    assert not comparison.due("here", 1) and comparison.due("here", 2)
+    comparison._work.wait()
+    comparison.tick()
     figures = comparison.figures
     assert figures.of == figures.flip_of == 8 and figures.difference_percent > 5
     assert 10 < figures.psnr_db < 40 and 0 < figures.flip_mean < 1
-    by_difference = errors.picture
+    by_difference = comparison.map
     assert by_difference.shape == (32, 32, 4) and (by_difference[..., 3] == 255).all()
     comparison.kind = "FLIP"
-    errors.tick(comparison)
-    assert errors.picture.shape == (32, 32, 4) and (errors.picture != by_difference).any()
-    assert errors.due("elsewhere", 1) and errors.picture is None
+    comparison.tick()
+    assert comparison.map.shape == (32, 32, 4) and (comparison.map != by_difference).any()
+    assert comparison.due("elsewhere", 1) and comparison.map is None
 
 
 def test_places_on_the_screen():
-    places, depths = projected(CAMERA, np.array([[0, 1, 0], [5, 1, 0], [0, 6, 0], [0, 1, 9.0]]), aspect=2.0)
+    places, depths = projected(CAMERA, np.array([[0, 1, 0], [5, 1, 0], [0, 6, 0], [0, 1, 9.0]]), (200, 100))
     np.testing.assert_allclose(places[:3], [[0.5, 0.5], [0.75, 0.5], [0.5, 0.0]], atol=1e-9)
     np.testing.assert_allclose(depths, [5, 5, 5, -4])
 
 
 def test_outlines_are_cut_at_the_eye():
     floor = np.array([[-1, 0, 9], [1, 0, 9], [1, 0, 0], [-1, 0, 0.0]])
-    line = outline("floor", floor, CAMERA, 1.0)
-    assert len(line.points) == 4 and np.isfinite(line.points).all()
-    assert max(y for _, y in line.points) > 1, "it reaches below the picture"
-    assert outline("behind", floor + np.array([0, 0, 20]), CAMERA, 1.0) is None
+    line = outline(floor, CAMERA, (100, 100))
+    assert len(line) == 4 and np.isfinite(line).all()
+    assert max(y for _, y in line) > 1, "it reaches below the picture"
+    assert outline(floor + np.array([0, 0, 20]), CAMERA, (100, 100)) is None
 
 
 def test_a_mirror_ball_shows_what_is_behind_the_viewer_in_its_middle():
@@ -103,18 +103,19 @@ def test_a_mirror_ball_shows_what_is_behind_the_viewer_in_its_middle():
 
 
 def test_balls_of_probes():
-    markers = Markers(
-        {"lamp": Probe((0, 1, 0), np.ones((6, 4, 4, 3))), "gone": Probe((0, 1, 9), np.ones((6, 4, 4, 3)))}
-    )
-    markers.update(CAMERA, 1.5, 600, "filmic", 0.0)
-    (ball,) = markers.balls
+    probes = {"lamp": Probe((0, 1, 0), np.ones((6, 4, 4, 3))), "gone": Probe((0, 1, 9), np.ones((6, 4, 4, 3)))}
+    marks = Marks(probes, ())
+    marks.probes = True
+    marks.update(CAMERA, (900, 600), "filmic", 0.0)
+    (ball,) = marks.balls
     assert (ball.name, ball.x, ball.y) == ("lamp", 0.5, 0.5)
-    assert set(markers.images) == {"probe lamp"} and markers.images["probe lamp"].shape[2] == 4
-    before = markers.images["probe lamp"]
-    markers.update(CAMERA, 1.5, 600, "filmic", 0.0)
-    assert markers.images["probe lamp"] is before
-    markers.clear()
-    assert markers.balls == () and markers.images == {}
+    assert set(marks.images) == {"probe lamp"} and marks.images["probe lamp"].shape[2] == 4
+    before = marks.images["probe lamp"]
+    marks.update(CAMERA, (900, 600), "filmic", 0.0)
+    assert marks.images["probe lamp"] is before
+    marks.probes = False
+    marks.update(CAMERA, (900, 600), "filmic", 0.0)
+    assert marks.balls == () and marks.images == {}
 
 
 @pytest.mark.parametrize(

@@ -99,46 +99,46 @@ def test_full_resolution_on_request():
 def test_the_size_in_motion_meets_the_budget():
     p = pacer()
     p.cost(Plan(1.0, None), 10 * BUDGET_S)
-    assert p.moving_scale == 0.25
+    assert p.moving.scale == 0.25
     p.cost(Plan(0.25, None), BUDGET_S / 8)
-    assert p.moving_scale == 0.5  # larger only when it fits with room to spare
+    assert p.moving.scale == 0.5  # larger only when it fits with room to spare
     p.cost(Plan(0.5, None), BUDGET_S * 0.9)
-    assert p.moving_scale == 0.5
+    assert p.moving.scale == 0.5
     p.cost(Plan(0.5, None), BUDGET_S / 100)
-    assert p.moving_scale == 1.0
+    assert p.moving.scale == 1.0
     p.cost(Plan(1.0, None), 1e3)
-    assert p.moving_scale == SCALES[-1]
+    assert p.moving.scale == SCALES[-1]
 
 
 def test_accumulated_frames_do_not_count_as_motion():
     p = pacer()
     p.cost(Plan(1.0, 3), 10.0)
-    assert p.moving_scale == 1.0
+    assert p.moving.scale == 1.0
 
 
 def test_a_shorter_frame_time_takes_fewer_pixels():
     p = pacer()
     p.aim(0.1)
     p.cost(Plan(1.0, None), 0.09)
-    assert p.moving_scale == 1.0
+    assert p.moving.scale == 1.0
     p.aim(0.02)
     p.cost(Plan(1.0, None), 0.09)
-    assert p.moving_scale == 0.35
+    assert p.moving.scale == 0.35
     p.aim(0.1)
     p.cost(Plan(0.35, None), 0.09 * 0.35**2)
-    assert p.moving_scale > 0.7
+    assert p.moving.scale > 0.7
 
 
 def test_pixels_are_not_given_away_for_what_they_do_not_cost():
     """A frame takes 150 ms whatever its size, and 50 ms per full picture: 66 ms cannot be met, and is not sought."""
     p = pacer()
     for _ in range(30):
-        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
-    assert p.moving_scale >= 0.5
+        p.cost(p.moving, 0.15 + 0.05 * p.moving.scale**2)
+    assert p.moving.scale >= 0.5
     seen = set()
     for _ in range(10):
-        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
-        seen.add(p.moving_scale)
+        p.cost(p.moving, 0.15 + 0.05 * p.moving.scale**2)
+        seen.add(p.moving.scale)
     assert len(seen) == 1, "it does not swing"
 
 
@@ -146,11 +146,11 @@ def test_a_stall_at_the_start_is_forgotten():
     """The first frame waits three seconds for its shaders; then a frame takes 150 ms of itself."""
     p = pacer(slow_adapter=True)
     p.cost(p.moving, 3.0)
-    assert p.moving_scale == SCALES[-1]
+    assert p.moving.scale == SCALES[-1]
     seen = []
     for _ in range(60):
-        p.cost(p.moving, 0.15 + 0.05 * p.moving_scale**2)
-        seen.append(p.moving_scale)
+        p.cost(p.moving, 0.15 + 0.05 * p.moving.scale**2)
+        seen.append(p.moving.scale)
     assert set(seen[-20:]) == {seen[-1]} and seen[-1] >= 0.35
 
 

@@ -10,51 +10,53 @@ from lambent.core.false_colour import Range
 from lambent.materials.document import load_material
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.views import read_views
-from lambent.viewer.comparison import Comparison, Figures
-from lambent.viewer.filming import FilmOptions
-from lambent.viewer.markers import Ball, Line
-from lambent.viewer.metering import read
-from lambent.viewer.state import Statistics, ViewerState
-from lambent.viewer.views import SavedViews
+from lambent.viewer.look import SAMPLE_COUNTS
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.walk.comparison import Figures
+from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.markers import Ball
+from lambent.viewer.modes.walk.metering import read
+from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.screen import Statistics
 from tests.viewer.panel_driver import PanelDriver
 
 
 @pytest.fixture
-def state(scene, choices, tmp_path):
-    return ViewerState.of(scene, choices, "walk", folder=tmp_path)
-
-
-@pytest.fixture
-def panels(monkeypatch, state):
-    driver = PanelDriver(monkeypatch, state)
+def panels(monkeypatch, state, geometry):
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
     yield driver
     driver.close()
 
 
+def walk_mode(state, geometry):
+    return WalkMode(state, WalkInput(state, geometry), Drawing(None))
+
+
 def test_movement_and_cameras(panels, state):
     panels.click("orbit", 0.1)
-    assert state.mode == "orbit"
+    assert state.navigation.movement == "orbit"
     panels.click("walk", 0.1)
     panels.click("fly", 0.1)
-    assert (state.mode, state.flying) == ("walk", True)
+    assert (state.navigation.movement, state.navigation.flying) == ("walk", True)
     panels.click("2  side##1", 0.1)
-    assert state.camera == state.scene.cameras[1]
+    assert state.navigation.camera == state.scene.cameras[1]
 
 
 def test_a_camera_path_plays_pauses_and_is_scrubbed(panels, state):
     panels.click("play")
-    assert state.path.playing
+    assert state.navigation.path.playing
     panels.click("pause")
-    assert not state.path.playing
+    assert not state.navigation.path.playing
     panels.drag("##time", 0.05, 0.5)
-    assert state.path.time_s == pytest.approx(2, abs=0.2) and not state.path.playing
+    assert state.navigation.path.time_s == pytest.approx(2, abs=0.2) and not state.navigation.path.playing
 
 
 def test_view(panels, state):
     panels.drag("exposure", 0.5, 0.75)
-    assert state.exposure_ev == pytest.approx(6, abs=0.5)
+    assert state.look.exposure_ev == pytest.approx(6, abs=0.5)
     for label, field in (("transform", "view_transform"), ("show", "show"), ("integrator", "integrator")):
-        before = getattr(state, field)
+        before = getattr(state.look, field)
         panels.click(label)
         assert panels.popup_open
         x, y = panels.point(label)
@@ -62,50 +64,50 @@ def test_view(panels, state):
         panels.button(True)
         panels.button(False)
         panels.frame()
-        assert getattr(state, field) != before, label
+        assert getattr(state.look, field) != before, label
     panels.click("refine while nothing moves", 0.1)
     panels.click("fewer pixels in motion where needed", 0.1)
-    assert not state.refine and not state.adaptive_resolution
+    assert not state.screen.pace.refine and not state.screen.pace.adaptive
 
 
 def test_samples(panels, state):
     panels.drag("samples", 0.1, 0.9)
-    assert state.n is None  # greyed out while automatic
+    assert state.look.n is None  # greyed out while automatic
     panels.click("samples from roughness", 0.05)
-    assert state.n == 5
+    assert state.look.n == SAMPLE_COUNTS[len(SAMPLE_COUNTS) // 2]
     panels.drag("samples", 0.6, 0.99)
-    assert state.n == 7
+    assert state.look.n == SAMPLE_COUNTS[-1]
     panels.click("samples from roughness", 0.05)
-    assert state.n is None
+    assert state.look.n is None
 
 
 def test_material_sliders(panels, state):
     panels.click("table##1", 0.2)
-    assert state.selected == "table"
+    assert state.selection.name == "table"
     panels.frame()
-    before = state.edits.current("brass").lobes[0]
+    before = state.materials.edits.current("brass").lobes[0]
     panels.drag("mx", 0.5, 0.7)
-    lobe = state.edits.current("brass").lobes[0]
+    lobe = state.materials.edits.current("brass").lobes[0]
     assert lobe.mx > before.mx
     assert lobe.my / lobe.mx == pytest.approx(before.my / before.mx, rel=1e-4)
     panels.click("keep the ratio of mx and my", 0.05)
     panels.drag("my", 0.5, 0.4)
-    assert state.edits.current("brass").lobes[0].my < lobe.my
-    assert state.edits.current("brass").lobes[0].mx == lobe.mx
+    assert state.materials.edits.current("brass").lobes[0].my < lobe.my
+    assert state.materials.edits.current("brass").lobes[0].mx == lobe.mx
     panels.drag("alpha", 0.1, 0.6)
-    assert state.edits.current("brass").lobes[0].alpha == pytest.approx(0.6, abs=0.05)
+    assert state.materials.edits.current("brass").lobes[0].alpha == pytest.approx(0.6, abs=0.05)
     panels.drag("##values", 0.1, 0.2)
     for _ in range(4):
         panels.click("undo")
-    assert state.edits.edited == {}
+    assert state.materials.edits.edited == {}
     panels.click("redo")
-    assert state.edits.current("brass").lobes[0] == lobe
+    assert state.materials.edits.current("brass").lobes[0] == lobe
     panels.click("reset")
-    assert state.edits.edited == {}
+    assert state.materials.edits.edited == {}
 
 
 def test_the_colour_picker_edits_linear_coefficients(panels, state):
-    state.selected = "floor"
+    state.selection.name = "floor"
     panels.frame()
     panels.click("##swatch")
     assert panels.popup_open
@@ -115,25 +117,25 @@ def test_the_colour_picker_edits_linear_coefficients(panels, state):
     panels.button(True)
     panels.button(False)
     panels.frame()
-    kd = state.edits.current("plaster").kd
+    kd = state.materials.edits.current("plaster").kd
     assert kd != (0.6, 0.6, 0.6) and all(0 <= v <= 1 for v in kd)
 
 
 def test_save(panels, state, tmp_path):
-    state.selected = "table"
+    state.selection.name = "table"
     panels.frame(2)
     panels.click("save")
     assert load_material(tmp_path / "brass.json") == state.scene.materials["brass"]
     panels.click("##file", 0.9)
     assert panels.io.want_text_input
     panels.type("x")
-    assert "x" in state.file_names["brass"]
+    assert "x" in state.materials.file_names["brass"]
 
 
 def test_everything_fits_the_column(panels, state):
     """No control or label is cut off at the right edge."""
-    state.selected = "table"
-    state.statistics = Statistics(
+    state.selection.name = "table"
+    state.screen.statistics = Statistics(
         adapter="a rather long name of an adapter (LLVM 15.0.6, 256 bits)", gpu_ms={"shade": 1}
     )
     panels.click("Statistics", 0.3)
@@ -145,24 +147,23 @@ def test_everything_fits_the_column(panels, state):
 
 
 def test_a_message_does_not_end_a_drag(panels, state):
-    state.selected = "table"
+    state.selection.name = "table"
     panels.frame(2)
     panels.move(*panels.point("mx", 0.4))
     panels.button(True)
-    state.say("saved")
+    state.screen.say("saved")
     panels.frame(3)
     panels.move(*panels.point("mx", 0.9))
     panels.button(False)
-    assert state.edits.current("brass").lobes[0].mx > 0.5
+    assert state.materials.edits.current("brass").lobes[0].mx > 0.5
 
 
 @pytest.fixture
-def whole(monkeypatch, scene, choices, tmp_path):
-    """The panels of the walk window, with all that it can do."""
-    state = ViewerState.of(scene, replace(choices, view_transforms=("filmic", "false-colour")), "walk", folder=tmp_path)
-    state.views = SavedViews(scene, tmp_path, state.say)
-    state.comparison, state.film, state.notes = Comparison(), FilmOptions(), ("light map: noise 3.1 %",)
-    driver = PanelDriver(monkeypatch, state, (1400, 2200))
+def whole(monkeypatch, scene, screen, geometry):
+    """The panels in a taller window, with a note on the light map and false colours to choose."""
+    state = WalkState.of(scene, "walk", screen, screen.folder)
+    state.notes = ("light map: noise 3.1 %",)
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (1400, 2200))
     yield driver
     driver.close()
 
@@ -179,19 +180,19 @@ def pick(panels, label, index):
 def test_the_camera_and_the_walker(whole):
     state = whole.state
     whole.drag("field of view", 0.3, 0.8)
-    assert state.camera.fov_y_deg > 80
+    assert state.navigation.camera.fov_y_deg > 80
     whole.drag("speed", 0.5, 0.8)
-    assert state.walker.speed_m_s > 1.5
-    before = state.camera.position[1]
+    assert state.navigation.walker.speed_m_s > 1.5
+    before = state.navigation.camera.position[1]
     whole.drag("eye height", 0.5, 0.7)
-    assert state.camera.position[1] > before
+    assert state.navigation.camera.position[1] > before
     whole.click("near plane by the scene's size", 0.05)
-    assert state.near_m == 0.01
+    assert state.look.near_m == 0.01
     whole.frame()
     whole.drag("near", 0.3, 0.9)
-    assert state.near_m > 0.5
+    assert state.look.near_m > 0.5
     whole.drag("frame", 0.6, 0.2)
-    assert state.target_ms < 40
+    assert state.screen.pace.target_ms < 40
 
 
 def test_views_in_the_panel(whole, tmp_path):
@@ -207,27 +208,27 @@ def test_views_in_the_panel(whole, tmp_path):
     whole.type("!")
     whole.click("rename##new camera name")
     whole.frame()
-    assert state.camera.name == "by/the door!" == state.cameras[-1].name
+    assert state.navigation.camera.name == "by/the door!" == state.recordings.cameras[-1].name
     whole.click("delete##camera")
-    assert len(state.cameras) == 2 and read_views(tmp_path).cameras == ()
+    assert len(state.recordings.cameras) == 2 and read_views(tmp_path).cameras == ()
 
 
 def test_a_walk_is_recorded_in_the_panel(whole, tmp_path):
     state = whole.state
-    state.clock = lambda: state.now_s
-    state.now_s = 0.0
     whole.click("record a walk###record")
-    assert state.recorder.on
+    assert state.recordings.recorder.on
     for k in range(10):
-        state.now_s = 0.2 * k
+        state.screen.clock.now_s = 0.2 * k
         x = 0.1 * k
-        state.recorder.take(replace(state.camera, position=(x, 1.6, 3.0)), state.now_s)
+        state.recordings.recorder.take(
+            replace(state.navigation.camera, position=(x, 1.6, 3.0)), state.screen.clock.now_s
+        )
     whole.frame()
     whole.click(next(label for label in whole.rects if label.endswith("###record")))
     whole.frame()
-    assert state.path.path.name == "recorded"
+    assert state.navigation.path.path.name == "recorded"
     whole.drag("smooth", 0.2, 0.9)
-    assert state.recorder.smooth_s > 1
+    assert state.recordings.recorder.smooth_s > 1
     whole.click("save path##path name")
     whole.frame(2)
     assert [p.name for p in read_views(tmp_path).paths] == ["walk 1"]
@@ -237,11 +238,11 @@ def test_a_walk_is_recorded_in_the_panel(whole, tmp_path):
 
 def test_false_colour_has_a_range(whole):
     state = whole.state
-    pick(whole, "transform", 1)
-    assert state.view_transform == "false-colour"
+    pick(whole, "transform", 3)
+    assert state.look.view_transform == "false-colour"
     whole.frame()
     whole.click("decades", 0.05)
-    assert not state.scale.log
+    assert not state.look.scale.log
     state.meter.fit_wanted = False
     whole.click("fit to the picture")
     assert state.meter.fit_wanted
@@ -262,12 +263,12 @@ def test_comparison_film_and_marks(whole):
     whole.click("readout", 0.1)
     assert state.marks.probes and state.meter.readout_on
     whole.click("make film##film file")
-    assert state.film_wanted == state.scene.paths[0] and state.film.file_name == "tour.mp4"
+    assert state.films.wanted == state.scene.paths[0] and state.films.file_name == "tour.mp4"
     state.meter.reading = read(np.full((8, 8, 3), 0.5))
     whole.click("meter")
     assert state.meter.expose_wanted
     whole.click("save picture")
-    assert state.screenshot_wanted
+    assert state.screen.save_wanted
     assert {label for label, rect in whole.rects.items() if rect[2] > whole.io.display_size.x} == set()
 
 
@@ -275,12 +276,12 @@ def test_what_stands_over_the_picture_is_drawn(whole):
     """Lines, balls, scales, the readout: every call is one that this version of Dear ImGui takes."""
     state = whole.state
     bare = imgui.get_draw_data().total_vtx_count
-    state.marks.lines = (Line("mirror", ((0.1, 0.1), (0.5, 0.2), (0.4, 0.9))),)
+    state.marks.lines = (((0.1, 0.1), (0.5, 0.2), (0.4, 0.9)),)
     state.marks.balls = (Ball("lamp", 0.5, 0.5, 0.1, 2.0),)
     state.meter.cursor, state.meter.under_cursor = (0.99, 0.99), (1.0, 2.0, 3.0)
-    state.record()
+    state.recordings.record()
     for scale in (Range(1, 1000), Range(0, 500, log=False), Range(33, 34)):
-        state.view_transform, state.scale = "false-colour", scale
+        state.look.view_transform, state.look.scale = "false-colour", scale
         whole.frame()
     state.comparison.mode, state.comparison.figures = "error map", Figures(33.3, 1.2, 64)
     for state.comparison.kind in ("difference", "FLIP"):
@@ -288,13 +289,12 @@ def test_what_stands_over_the_picture_is_drawn(whole):
     assert imgui.get_draw_data().total_vtx_count > bare + 300
 
 
-def test_the_way_of_planar_reflectors_is_offered_where_there_are_some(monkeypatch, scene, choices, tmp_path):
+def test_the_method_of_planar_reflectors_is_offered_where_there_are_some(monkeypatch, scene, screen, geometry):
     part = ReflectorPart(object="table", faces=(0, 1), area_m2=4.0)
     plane = ReflectorRecord(plane=(0, 1, 0, -1), outline=((-1, 1, -1), (1, 1, -1), (1, 1, 1)), parts=(part,))
-    state = ViewerState.of(
-        scene.model_copy(update={"reflectors": (plane,)}), replace(choices, planars=("auto", "off")), "walk"
-    )
-    driver = PanelDriver(monkeypatch, state, (1400, 2200))
+    scene = scene.model_copy(update={"reflectors": (plane,)})
+    state = WalkState.of(scene, "walk", screen)
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (1400, 2200))
     pick(driver, "planes", 1)
     driver.close()
-    assert state.planar == "off"
+    assert state.look.planar == "off"

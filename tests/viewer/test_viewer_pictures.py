@@ -14,12 +14,9 @@ from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
-from lambent.viewer.comparison import Comparison
-from lambent.viewer.filming import FilmOptions
-from lambent.viewer.input import Rect
-from lambent.viewer.picture import CHOICES
-from lambent.viewer.pictures import Pictures
-from lambent.viewer.state import ViewerState
+from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.screen import Rect
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
 
 PLACE = Rect(0, 0, 96, 64)
@@ -31,20 +28,17 @@ def renderer(adapter, tmp_path_factory):
 
 
 @pytest.fixture
-def state(renderer, tmp_path):
-    state = ViewerState.of(renderer.scene.record, CHOICES, "walk", folder=tmp_path)
-    state.comparison, state.film, state.adaptive_resolution = Comparison(), FilmOptions(), False
-    state.now_s = 0.0
-    state.clock = lambda: state.now_s
-    return state
+def state(renderer, screen):
+    screen.pace.adaptive = False
+    return WalkState.of(renderer.scene.record, "walk", screen)
 
 
 def drawn(pictures, state, steps=1, dt_s=1.0):
     for _ in range(steps):
-        pictures.update(state, PLACE, 1.0)
+        pictures.update(PLACE, 1.0)
         while pictures.under_way:
-            pictures.work(state)
-        state.now_s += dt_s
+            pictures.work()
+        state.screen.clock.now_s += dt_s
 
 
 def test_false_colour_of_the_shader_is_that_of_numpy(renderer):
@@ -71,19 +65,20 @@ def test_the_noise_of_the_light_map_is_shown_in_percent(renderer):
 
 
 def test_noise_has_a_range_of_its_own(renderer, state):
-    pictures = Pictures(Renderer(renderer.device, replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32))))
-    state.show, state.meter.wanted = "noise", True
+    noisy = replace(renderer.scene, noise=np.full((4, 4), 0.125, np.float32))
+    pictures = Pictures(Renderer(renderer.device, noisy), state)
+    state.look.show, state.meter.wanted = "noise", True
     drawn(pictures, state)
-    before = state.scale
+    before = state.look.scale
     assert state.meter.reading.log_mean == pytest.approx(12.5, rel=1e-3), "black is left out"
-    state.noise_scale, state.meter.fit_wanted, state.meter.expose_wanted = Range(1, 2), True, True
-    exposure_ev = state.exposure_ev
+    state.look.noise_scale, state.meter.fit_wanted, state.meter.expose_wanted = Range(1, 2), True, True
+    exposure_ev = state.look.exposure_ev
     drawn(pictures, state)
-    assert state.noise_scale == state.meter.reading.ranges[0] and state.scale == before
-    assert state.exposure_ev == exposure_ev, "noise sets no exposure"
-    state.show, state.view_transform = "full", "false-colour"
+    assert state.look.noise_scale == state.meter.reading.ranges[0] and state.look.scale == before
+    assert state.look.exposure_ev == exposure_ev, "noise sets no exposure"
+    state.look.show, state.look.view_transform = "full", "false-colour"
     drawn(pictures, state)
-    assert state.scale == state.meter.reading.ranges[0] != before, "that of light is fitted when it is first shown"
+    assert state.look.scale == state.meter.reading.ranges[0] != before, "that of light is fitted when it is first shown"
 
 
 def test_near_things_are_cut_away(renderer):
@@ -93,27 +88,27 @@ def test_near_things_are_cut_away(renderer):
 
 
 def test_the_meter_sets_the_exposure(renderer, state):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     drawn(pictures, state)
     assert state.meter.reading is None, "nobody looks at it"
     state.meter.expose_wanted = True
     drawn(pictures, state)
-    assert state.exposure_ev == pytest.approx(state.meter.reading.exposure_ev)
-    state.view_transform = "false-colour"
+    assert state.look.exposure_ev == pytest.approx(state.meter.reading.exposure_ev)
+    state.look.view_transform = "false-colour"
     drawn(pictures, state)
-    assert state.scale == state.meter.reading.ranges[0] and not state.meter.fit_wanted
+    assert state.look.scale == state.meter.reading.ranges[0] and not state.meter.fit_wanted
 
 
 def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     drawn(pictures, state, 3)
     version, pictures._a._part_s = pictures._a.version, 0.45
-    state.touched_s = state.now_s
+    state.screen.pace.touched_s = state.screen.clock.now_s
     drawn(pictures, state, 2, dt_s=0.2)
     assert pictures._a.version == version
-    assert pictures.wait_s(state) == pytest.approx(0.05)
-    state.camera = SIDE
-    pictures.update(state, PLACE, 1.0)
+    assert pictures.wait_s() == pytest.approx(0.05)
+    state.navigation.camera = SIDE
+    pictures.update(PLACE, 1.0)
     assert pictures._a.version == version + 1, "motion is drawn at once"
     drawn(pictures, state, 2)
     assert pictures._a.version > version + 1
@@ -122,47 +117,47 @@ def test_long_frames_at_rest_wait_while_somebody_works(renderer, state):
 @pytest.fixture
 def at_rest(renderer, state):
     """Pictures of a slow adapter, with a frame at rest begun and a part of it drawn."""
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     drawn(pictures, state, 2)
     pictures._a._whole_s = 1.0
-    state.now_s += 1
-    pictures.update(state, PLACE, 1.0)
-    assert pictures.under_way and not pictures.work(state)
+    state.screen.clock.now_s += 1
+    pictures.update(PLACE, 1.0)
+    assert pictures.under_way and not pictures.work()
     return pictures
 
 
 def test_a_frame_at_rest_is_drawn_in_parts_and_shown_when_it_is_whole(at_rest, state):
     shown, version = at_rest._a.view, at_rest._a.version
-    state.touched_s = state.now_s
-    at_rest.update(state, PLACE, 1.0)  # an event that changes nothing: the frame goes on
-    assert at_rest.wait_s(state) is None
+    state.screen.pace.touched_s = state.screen.clock.now_s
+    at_rest.update(PLACE, 1.0)  # an event that changes nothing: the frame goes on
+    assert at_rest.wait_s() is None
     parts = 1
-    while not at_rest.work(state):
+    while not at_rest.work():
         assert at_rest.under_way and at_rest._a.view is shown and at_rest._a.version == version
         parts += 1
     assert parts > 3 and at_rest._a.view is not shown and at_rest._a.version == version + 1
-    assert not at_rest.under_way and at_rest.wait_s(state) is not None
+    assert not at_rest.under_way and at_rest.wait_s() is not None
 
 
 def test_a_movement_drops_the_frame_at_rest(at_rest, state):
     version = at_rest._a.version
-    state.camera = SIDE
-    at_rest.update(state, PLACE, 1.0)
-    assert not at_rest.under_way and at_rest._a.version == version + 1 and at_rest._a.accumulated == 0
+    state.navigation.camera = SIDE
+    at_rest.update(PLACE, 1.0)
+    assert not at_rest.under_way and at_rest._a.version == version + 1 and at_rest._a.samples == 0
 
 
 def test_a_picture_is_saved_in_the_midst_of_a_frame(at_rest, state):
-    state.camera = replace(state.camera, name="another name is no other picture")
-    at_rest.save(state)
-    assert "saved" in state.messages[-1].text
+    state.navigation.camera = replace(state.navigation.camera, name="another name is no other picture")
+    at_rest.save()
+    assert "saved" in state.screen.messages[-1].text
     drawn(at_rest, state)
     assert not at_rest.under_way
 
 
 def test_what_is_under_the_cursor(renderer, state):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     state.meter.readout_on = True
-    state.show, state.meter.cursor = "light-map", (0.1, 0.95)
+    state.look.show, state.meter.cursor = "light-map", (0.1, 0.95)
     drawn(pictures, state)
     assert state.meter.under_cursor == pytest.approx((2, 2, 2), rel=1e-3)
     state.meter.cursor = (0.5, 0.01)
@@ -174,14 +169,14 @@ def test_what_is_under_the_cursor(renderer, state):
 
 
 def test_side_by_side_with_the_reference(renderer, state):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     state.comparison.mode = "side by side"
     drawn(pictures, state, 24)
     figures = state.comparison.figures
     assert len(pictures.views) == 2 and figures.of >= 8
     assert 20 < figures.psnr_db < 80
-    assert state.comparison.a_label == "rings" and "qmc" in state.comparison.b_label
-    state.camera = SIDE
+    assert state.comparison.divider.a_label == "rings" and "qmc" in state.comparison.divider.b_label
+    state.navigation.camera = SIDE
     drawn(pictures, state, dt_s=0.01)
     assert state.comparison.figures is None, "figures of another place are not shown"
     state.comparison.mode = "off"
@@ -190,53 +185,53 @@ def test_side_by_side_with_the_reference(renderer, state):
 
 
 def test_an_integrator_agrees_with_itself(renderer, state):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     state.comparison.mode, state.comparison.integrator = "error map", "rings"
     drawn(pictures, state, 4)
     assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
-    assert (pictures.images["error map"][..., :3] == 0).all()
-    pictures.save(state)
-    names = sorted(p.name for p in state.folder.iterdir())
+    assert (pictures.images["picture A"][..., :3] == 0).all()
+    pictures.save()
+    names = sorted(p.name for p in state.screen.folder.iterdir())
     assert names == ["small-room-001-error.png", "small-room-001.exr", "small-room-001.png"]
 
 
 def film(pictures, state, name):
-    state.film.file_name, state.film.size = name, "640 x 360"
-    state.film_wanted = CameraPath(name="short", keys=(FRONT, SIDE), seconds=0.1)
+    state.films.file_name, state.films.size = name, "640 x 360"
+    state.films.wanted = CameraPath(name="short", keys=(FRONT, SIDE), seconds=0.1)
     drawn(pictures, state)
 
 
 def test_films_and_rows_of_pictures(renderer, state, tmp_path):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     for name in ("a.mp4", "b-##.png", "c.exr"):
         film(pictures, state, name)
         for _ in range(100):
-            if state.filming is None:
+            if state.films.under_way is None:
                 break
             drawn(pictures, state)
-        assert "3 frames" in state.messages[-1].text
+        assert "3 frames" in state.screen.messages[-1].text
     names = ["a.mp4", "b-01.png", "b-02.png", "b-03.png", "c-0001.exr", "c-0002.exr", "c-0003.exr"]
     assert sorted(p.name for p in tmp_path.iterdir()) == names
     assert read_encoded(tmp_path / "b-01.png").shape == read_image(tmp_path / "c-0001.exr").shape == (360, 640, 3)
 
 
 def test_a_film_can_be_cancelled_and_leaves_nothing(renderer, state, tmp_path):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     film(pictures, state, "a.mp4")
-    assert not state.filming.over and list(tmp_path.iterdir())
-    state.answering = True
-    done = state.filming.done
+    assert not state.films.under_way.over and list(tmp_path.iterdir())
+    state.screen.pace.answering = True
+    done = state.films.under_way.done
     drawn(pictures, state)
-    assert state.filming.done == done, "events come first"
-    state.filming.cancel()
-    state.filming = None
+    assert state.films.under_way.done == done, "events come first"
+    state.films.under_way.cancel()
+    state.films.under_way = None
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     film(pictures, state, "no/such.mp4")
-    assert "no film: " in state.messages[-1].text and state.filming is None
+    assert "no film: " in state.screen.messages[-1].text and state.films.under_way is None
     film(pictures, state, "b.png")
     (tmp_path / "b-0001.png").unlink(missing_ok=True)
     (tmp_path / "b-0002.png").mkdir()
@@ -244,7 +239,7 @@ def test_a_film_that_cannot_be_is_said(renderer, state, tmp_path):
     (tmp_path / "b-0003.png").mkdir()
     for _ in range(5):
         drawn(pictures, state)
-    assert state.filming is None and "is a folder" in state.messages[-1].text
+    assert state.films.under_way is None and "is a folder" in state.screen.messages[-1].text
 
 
 def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
@@ -253,16 +248,17 @@ def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
     def refused(*_, **__):
         raise PermissionError(errno.EACCES, "Permission denied")
 
-    pictures = Pictures(renderer)
+    pictures = Pictures(renderer, state)
     drawn(pictures, state)
     monkeypatch.setattr("tempfile.TemporaryFile", refused)
     monkeypatch.setattr("tempfile.mkstemp", refused)
-    pictures.save(state)
-    assert "picture not saved: " in state.messages[-1].text and "Permission denied" in state.messages[-1].text
+    pictures.save()
+    said = state.screen.messages
+    assert "picture not saved: " in said[-1].text and "Permission denied" in said[-1].text
     for name in ("a.mp4", "a-##.png"):
         film(pictures, state, name)
-        assert "no film: " in state.messages[-1].text and "Permission denied" in state.messages[-1].text
-        assert state.filming is None
-    monkeypatch.setattr("lambent.viewer.filming.check_place", lambda path: None)  # and is refused later
+        assert "no film: " in said[-1].text and "Permission denied" in said[-1].text
+        assert state.films.under_way is None
+    monkeypatch.setattr("lambent.viewer.modes.walk.filming.check_place", lambda path: None)  # and is refused later
     film(pictures, state, "b.mp4")
-    assert "no film: " in state.messages[-1].text and state.filming is None
+    assert "no film: " in state.screen.messages[-1].text and state.films.under_way is None

@@ -6,9 +6,8 @@ import pytest
 from lambent.core.camera import Camera, CameraPath
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.views import read_views
-from lambent.viewer.recording import KEY_S, Recording, smoothed
-from lambent.viewer.state import ViewerState
-from lambent.viewer.views import SavedViews
+from lambent.viewer.modes.walk.recording import KEY_S, Recording, smoothed
+from lambent.viewer.modes.walk.views import SavedViews
 
 
 def at(x):
@@ -21,15 +20,6 @@ def walked(seconds, waited_s=0.0, jitter=0.0):
     for k in range(1, round(30 * seconds) + 1):
         recording.take(at(k / 30 + jitter * rng.normal()), waited_s + k / 30)
     return recording
-
-
-@pytest.fixture
-def state(scene, choices, tmp_path):
-    state = ViewerState.of(scene, choices, "walk", folder=tmp_path)
-    state.views = SavedViews(scene, tmp_path, state.say)
-    state.now_s = 0.0
-    state.clock = lambda: state.now_s
-    return state
 
 
 def test_a_steady_walk_comes_out_as_it_was():
@@ -69,115 +59,124 @@ def test_nothing_moved_is_no_path():
 
 
 def test_record_save_rename_delete(state, tmp_path):
-    state.record()
+    state.recordings.record()
     for k in range(1, 20):
-        state.now_s = 0.1 * k
-        state.camera = at(0.1 * k)
-        assert not state.recorder.take(state.camera, state.now_s)
-    state.record()
-    assert state.path.path == state.recorder.draft in state.paths
-    state.toggle(state.recorder.draft)
-    assert state.playing and state.path.time_s == 0
-    before = state.recorder.draft
-    state.recorder.smooth(1.5)
-    assert state.recorder.draft != before
+        state.screen.clock.now_s = 0.1 * k
+        state.navigation.camera = at(0.1 * k)
+        assert not state.recordings.recorder.take(state.navigation.camera, state.screen.clock.now_s)
+    state.recordings.record()
+    assert state.navigation.path.path == state.recordings.recorder.draft in state.recordings.paths
+    state.navigation.toggle(state.recordings.recorder.draft)
+    assert state.navigation.playing and state.navigation.path.time_s == 0
+    before = state.recordings.recorder.draft
+    state.recordings.recorder.smooth(1.5)
+    assert state.recordings.recorder.draft != before
     for name, word in (("", "a name is missing"), ("tour", "the name is taken"), ("a\tb", "not a name")):
-        state.recorder.name = name
-        state.save_recording()
-        assert word in state.messages[-1].text and state.recorder.draft is not None
-    state.recorder.name = " up/down "
-    state.save_recording()
-    assert state.recorder.draft is None and state.path.path.name == "up/down"
+        state.recordings.recorder.name = name
+        state.recordings.save()
+        assert word in state.screen.messages[-1].text and state.recordings.recorder.draft is not None
+    state.recordings.recorder.name = " up/down "
+    state.recordings.save()
+    assert state.recordings.recorder.draft is None and state.navigation.path.path.name == "up/down"
     assert [p.name for p in read_views(tmp_path).paths] == ["up/down"]
-    assert state.views.rename_path("up/down", "there") and not state.views.rename_path("there", "tour")
-    assert [p.name for p in state.paths] == ["tour", "there"]
-    assert state.views.delete_path("there") and read_views(tmp_path).paths == ()
+    assert state.recordings.views.rename("path", "up/down", "there") and not state.recordings.views.rename(
+        "path", "there", "tour"
+    )
+    assert [p.name for p in state.recordings.paths] == ["tour", "there"]
+    assert state.recordings.views.delete("path", "there") and read_views(tmp_path).paths == ()
 
 
 @pytest.mark.parametrize("stopped", [True, False])
 def test_a_recording_is_kept_when_the_window_closes(state, tmp_path, stopped):
-    assert state.keep_recording() is None
-    state.record()
+    assert state.recordings.keep() is None
+    state.recordings.record()
     for k in range(1, 20):
-        state.now_s, state.camera = 0.1 * k, at(0.1 * k)
-        state.recorder.take(state.camera, state.now_s)
+        state.screen.clock.now_s, state.navigation.camera = 0.1 * k, at(0.1 * k)
+        state.recordings.recorder.take(state.navigation.camera, state.screen.clock.now_s)
     if stopped:
-        state.record()
-        state.recorder.name = "tour"  # taken
-    name = state.keep_recording()
+        state.recordings.record()
+        state.recordings.recorder.name = "tour"  # taken
+    name = state.recordings.keep()
     assert name == "walk 1" and [p.name for p in read_views(tmp_path).paths] == [name]
 
 
 def test_a_recording_ends_by_itself(state):
-    state.record()
-    assert not state.recorder.take(at(1), 1.0)
-    assert state.recorder.take(at(2), 601.0)
+    state.recordings.record()
+    assert not state.recordings.recorder.take(at(1), 1.0)
+    assert state.recordings.recorder.take(at(2), 601.0)
 
 
 def test_standing_still_records_nothing(state):
-    state.record()
-    state.record()
-    assert "did not move" in state.messages[-1].text and state.recorder.draft is None
+    state.recordings.record()
+    state.recordings.record()
+    assert "did not move" in state.screen.messages[-1].text and state.recordings.recorder.draft is None
 
 
 def test_views_are_saved_renamed_and_deleted(state, tmp_path):
-    state.move(at(7))
-    state.save_view()
-    state.view_name = "front"
-    state.save_view()
-    assert "the name is taken" in state.messages[-1].text
-    state.view_name = "door"
-    state.save_view()
-    assert [c.name for c in state.cameras] == ["front", "side", "view 1", "door"]
-    assert state.camera == state.cameras[-1] and state.view_name == ""
-    assert state.views.rename_camera("door", "gate") and state.views.rename_camera("gate", "gate")
-    assert not state.views.rename_camera("gate", "view 1")
-    assert state.views.delete_camera("view 1")
+    state.navigation.move(at(7))
+    state.recordings.save_view()
+    state.recordings.view_name = "front"
+    state.recordings.save_view()
+    assert "the name is taken" in state.screen.messages[-1].text
+    state.recordings.view_name = "door"
+    state.recordings.save_view()
+    assert [c.name for c in state.recordings.cameras] == ["front", "side", "view 1", "door"]
+    assert state.navigation.camera == state.recordings.cameras[-1] and state.recordings.view_name == ""
+    assert state.recordings.views.rename("camera", "door", "gate") and state.recordings.views.rename(
+        "camera", "gate", "gate"
+    )
+    assert not state.recordings.views.rename("camera", "gate", "view 1")
+    assert state.recordings.views.delete("camera", "view 1")
     again = SavedViews(state.scene, tmp_path)
     again.load()
-    assert [c.name for c in again.cameras] == ["gate"]
+    assert [c.name for c in again.saved.cameras] == ["gate"]
 
 
 def test_a_damaged_file_is_said_and_kept(state, tmp_path):
     (tmp_path / "views.json").write_text("{")
-    state.views.load()
-    state.save_view()
-    assert "views.json" in state.messages[0].text and "not saved" in state.messages[1].text
+    state.recordings.views.load()
+    state.recordings.save_view()
+    assert "views.json" in state.screen.messages[0].text and "not saved" in state.screen.messages[1].text
     assert (tmp_path / "views.json").read_text() == "{"
 
 
 def test_two_windows_do_not_lose_views(state, tmp_path):
     other = SavedViews(state.scene, tmp_path)
     other.load()
-    state.save_view()
-    other.add_camera(at(3), "other")
+    state.recordings.save_view()
+    other.add(at(3), "other")
     assert [c.name for c in read_views(tmp_path).cameras] == ["view 1", "other"]
 
 
 def test_two_windows_name_what_they_save_beside_each_other(state, tmp_path):
     other = SavedViews(state.scene, tmp_path)
-    other.add_camera(at(3))
-    other.add_path(CameraPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0)))
-    state.record()
+    other.add(at(3))
+    other.add(CameraPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0)))
+    state.recordings.record()
     for k in range(1, 20):
-        state.now_s, state.camera = 0.1 * k, at(0.1 * k)
-        state.recorder.take(state.camera, state.now_s)
-    state.record()
-    state.save_view()
-    state.save_recording()
-    assert [m.text for m in state.messages[-2:]] == ["saved the view view 2", "saved the path walk 2"]
-    other.add_camera(at(4), "gate")
-    state.view_name = "gate"
-    state.save_view()
-    assert "the name is taken" in state.messages[-1].text and state.cameras[-1].name == "gate", "and is shown"
+        state.screen.clock.now_s, state.navigation.camera = 0.1 * k, at(0.1 * k)
+        state.recordings.recorder.take(state.navigation.camera, state.screen.clock.now_s)
+    state.recordings.record()
+    state.recordings.save_view()
+    state.recordings.save()
+    assert [m.text for m in state.screen.messages[-2:]] == ["saved the view view 2", "saved the path walk 2"]
+    other.add(at(4), "gate")
+    state.recordings.view_name = "gate"
+    state.recordings.save_view()
+    assert "the name is taken" in state.screen.messages[-1].text and state.recordings.cameras[-1].name == "gate", (
+        "and is shown"
+    )
 
 
 def test_what_another_window_deleted_cannot_be_renamed(state, tmp_path):
     way = CameraPath(name="", keys=(at(0), at(1)), seconds=1.0, times_s=(0.0, 1.0))
-    state.views.add_path(way, "walk 1")
-    state.views.add_camera(at(0), "door")
+    state.recordings.views.add(way, "walk 1")
+    state.recordings.views.add(at(0), "door")
     other = SavedViews(state.scene, tmp_path)
-    assert other.delete_path("walk 1") and other.delete_camera("door")
-    assert not state.views.rename_path("walk 1", "there") and "walk 1" in state.messages[-1].text
-    assert not state.views.rename_camera("door", "gate") and "door" in state.messages[-1].text
-    assert [p.name for p in state.paths] == ["tour"] and [c.name for c in state.cameras] == ["front", "side"]
+    assert other.delete("path", "walk 1") and other.delete("camera", "door")
+    assert not state.recordings.views.rename("path", "walk 1", "there") and "walk 1" in state.screen.messages[-1].text
+    assert not state.recordings.views.rename("camera", "door", "gate") and "door" in state.screen.messages[-1].text
+    assert [p.name for p in state.recordings.paths] == ["tour"] and [c.name for c in state.recordings.cameras] == [
+        "front",
+        "side",
+    ]

@@ -1,4 +1,4 @@
-"""Walls stop and guide a walker; nobody gets stuck."""
+"""Floors carry a walker, walls stop and guide; nobody gets stuck."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lambent.viewer.walls import BODY_M, Walls, nearest_points
+from lambent.viewer.modes.walk.walls import BODY_M, Walls, nearest_points
 
 
 def block(low, high):
@@ -27,8 +27,16 @@ def walk(start, heading, metres, walls=ROOM, stride=0.05):
     eye = np.array([start[0], 1.6, start[1]])
     step = stride * np.array([math.cos(heading), 0, math.sin(heading)])
     for _ in range(round(metres / stride)):
-        eye = eye + walls.allowed(eye, step, knee_y=0.35)
+        eye = eye + walls.allowed(eye, step, 1.6)
     return eye
+
+
+def test_floors_and_tables(geometry):
+    ground = Walls(geometry.triangles)
+    assert ground.floor_below((3, 1.6, 3), 1.6) == pytest.approx(0)
+    assert ground.floor_below((0, 1.6, 0), 1.6) == pytest.approx(0)  # the table is no stair
+    assert ground.floor_below((0, 2.4, 0), 1.6) == pytest.approx(1)  # but one can stand on it
+    assert ground.floor_below((9, 1.6, 0), 1.6) is None
 
 
 def test_a_wall_stops():
@@ -53,9 +61,9 @@ def test_a_doorstep_and_a_lamp_do_not():
 def test_who_stands_too_near_may_step_away():
     near = np.array([0, 1.6, -1.99])
     away, along = np.array([0, 0, 0.02]), np.array([0.02, 0, 0])
-    assert ROOM.allowed(near, away, 0.35) == pytest.approx(away)
-    assert ROOM.allowed(near, along, 0.35) == pytest.approx(along)
-    assert np.linalg.norm(ROOM.allowed(near, -away, 0.35)) < 1e-6
+    assert ROOM.allowed(near, away, 1.6) == pytest.approx(away)
+    assert ROOM.allowed(near, along, 1.6) == pytest.approx(along)
+    assert np.linalg.norm(ROOM.allowed(near, -away, 1.6)) < 1e-6
 
 
 @settings(max_examples=200, deadline=None)

@@ -2,6 +2,7 @@
 
 python -m tests.viewer.watched_window STORE OUT WIDTHxHEIGHT [walk | view]
 python -m tests.viewer.watched_window MEASUREMENT OUT WIDTHxHEIGHT edit:MATERIAL
+python -m tests.viewer.watched_window FILE OUT WIDTHxHEIGHT found:FOLDER, with the modes of a further folder
 """
 
 import json
@@ -11,16 +12,13 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.viewer import app, edit
+from lambent.viewer import app, edit, modes, window
 from tests.viewer.panel_driver import recording
-
-store, out, size = Path(sys.argv[1]), Path(sys.argv[2]), tuple(map(int, sys.argv[3].split("x")))
-
 
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
 
 
-class WatchedWindow(app.Window):
+class WatchedWindow(window.Window):
     frames_drawn = marks_seen = 0
 
     def __init__(self, *args, **kwargs):
@@ -35,47 +33,61 @@ class WatchedWindow(app.Window):
     def _schedule(self):
         super()._schedule()
         self.frames_drawn += 1
-        state = self.state
+        screen, state = self.screen, getattr(self.mode, "state", None)
         seen = {
             "frames": self.frames_drawn,
             "marks": self.marks_seen,
             "settled": self._extra_frames == 0,
-            "camera": asdict(state.camera),
-            "mode": state.mode,
-            "selected": state.selected,
-            "edited": {name: material.model_dump(mode="json") for name, material in state.edits.edited.items()},
-            "messages": [m.text for m in state.messages],
-            "resolution": state.statistics.resolution,
-            "integrator": state.statistics.integrator,
-            "accumulated": state.statistics.accumulated,
+            "messages": [m.text for m in screen.messages],
+            "resolution": screen.statistics.resolution,
+            "integrator": screen.statistics.integrator,
+            "accumulated": screen.statistics.accumulated,
             "moving": self._moving,
-            "file_names": state.file_names,
-            "picture": [self._input.picture.width, self._input.picture.height],
+            "picture": [screen.picture.width, screen.picture.height],
             "rects": self.rects,
-            "editor": editor_seen(state.editor),
+            **(seen_of(state) if state is not None else {}),
         }
         write_text(out / "state.json", json.dumps(seen))
+
+
+def seen_of(state):
+    """Of a mode that has a camera and materials."""
+    materials = getattr(state, "materials", None)
+    editor = materials.editor if materials else state.editor
+    edits = materials.edits if materials else editor.subject.edits
+    return {
+        "camera": asdict(state.navigation.camera),
+        "mode": state.navigation.movement,
+        "selected": state.selection.name if materials else None,
+        "edited": {name: material.model_dump(mode="json") for name, material in edits.edited.items()},
+        "file_names": materials.file_names if materials else {},
+        "editor": editor_seen(editor),
+    }
 
 
 def editor_seen(editor):
     if editor is None:
         return None
-    shown = editor.shown
     return {
-        "error": shown.error,
-        "exact": shown.exact,
-        "typed": editor.typed,
+        "error": editor.shown.error,
+        "exact": editor.shown.exact,
+        "typed": editor.files.typed,
         "measured": editor.measurement is not None,
-        "fitting": editor.fitting is not None,
+        "fitting": editor.fit.work is not None,
     }
 
 
-app.Window = edit.Window = WatchedWindow
-mode = sys.argv[4] if len(sys.argv) > 4 else "walk"
-try:
-    if mode.startswith("edit:"):
-        edit.run(store, Path(mode.removeprefix("edit:")), size=size, folder=out)
-    else:
-        app.run(store, mode, size=size, folder=out)
-except UserError as error:
-    sys.exit(f"error: {error}")
+if __name__ == "__main__":
+    file, out, size = Path(sys.argv[1]), Path(sys.argv[2]), tuple(map(int, sys.argv[3].split("x")))
+    window.Window = WatchedWindow
+    how, _, path = (sys.argv[4] if len(sys.argv) > 4 else "walk").partition(":")
+    try:
+        if how == "found":
+            modes.__path__.append(path)
+            edit.run(file, size=size, folder=out)
+        elif how == "edit":
+            edit.run(file, Path(path), size=size, folder=out)
+        else:
+            app.run(file, how, size=size, folder=out)
+    except UserError as error:
+        sys.exit(f"error: {error}")

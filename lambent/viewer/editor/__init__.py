@@ -1,1 +1,1 @@
-"""The material editor without its window: the measurement, what it says of a material, the fit, the documents."""
+"""The material editor without its window: the material, its measurement, the plots of both, the fit, the files."""

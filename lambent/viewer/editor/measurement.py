@@ -10,45 +10,36 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.plain import Triple, triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components, evaluate
-from lambent.materials.document import Material
+from lambent.materials.document import Lobe, Material
+from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import MeasuredSamples
-from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of
+from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, single
 
 Floats = NDArray[np.floating]
 
 FEW = 12_000  # tuples that stand for all while a slider moves
 CHUNK = 100_000  # tuples between two looks at whether to go on
+NEAR = Lobe(mx=0.3, my=0.3)
+FAR = Lobe(side="transmission", mx=0.3, my=0.3, r0=(0.0, 0.0, 0.0), k=(0.1, 0.1, 0.1))
 
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """A measured table.
-
-    Attributes
-    ----------
-    path : Path
-    samples, few : MeasuredSamples
-        All tuples, and at most `FEW` of them whose weights make every metric come out as of all, within a percent.
-    gathered : tuple of Incidence
-        By incident direction, for disks and curves.
-    disks : (K, pixels, 3)
-        Measured brightness as `readings.Disks.measured` of `FINE_PX` gives it.
-    lambertian : mapping
-        Metric name -> E of the best Lambertian surface.
-    """
+    """A measured table. Of `samples`, `few` have weights that make every metric come out within a percent of all."""
 
     path: Path
     samples: MeasuredSamples
-    few: MeasuredSamples
-    gathered: tuple[Incidence, ...]
-    disks: Floats
-    lambertian: Mapping[str, float]
+    few: MeasuredSamples  # at most `FEW`
+    gathered: tuple[Incidence, ...]  # by incident direction, for disks and curves
+    disks: Floats  # (K, pixels, 3) as `readings.Disks.measured` of `FINE_PX` gives it
+    lambertian: Mapping[str, float]  # metric -> E of the best Lambertian surface
 
     @property
     def is_small(self) -> bool:
@@ -57,7 +48,7 @@ class Measurement:
 
     @cached_property
     def _few_directions(self) -> tuple[Vector, Vector]:
-        return _single(self.few.wi), _single(self.few.wo)
+        return single(self.few.wi), single(self.few.wo)
 
     def error(self, material: Material, metric: str) -> float:
         """E of the material over the few tuples: a few milliseconds."""
@@ -78,13 +69,7 @@ class Measurement:
 
 
 def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
-    """Load a measured file in any known format and prepare it.
-
-    Raises
-    ------
-    UserError
-        As `lambent.materials.measured.load`.
-    """
+    """Load a measured file in any known format and prepare it; raises as `lambent.materials.measured.load` does."""
     from lambent.materials.fitting.account import lambertian_errors
 
     progress(0, 5, "reading")
@@ -117,11 +102,21 @@ def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:
     return replace(samples, wi=samples.wi[index], wo=samples.wo[index], f=samples.f[index], weight=weight)
 
 
-def _single(w: Floats) -> Vector:
-    x, y, z = np.ascontiguousarray(w.T, np.float32)
-    return x, y, z
-
-
 def _channels(f: Floats, samples: MeasuredSamples) -> Floats:
     """The model's f (N, 3) in the table's channels: a grey table sees the mean."""
     return f if samples.f.shape[1] == 3 else f.mean(axis=1, keepdims=True)
+
+
+def start_material(measurement: Measurement) -> Material:
+    """A diffuse term read off the measurement, and one plain lobe per side, to be dragged or fitted from."""
+    samples = measurement.few
+    far = samples.transmitted
+    lobes = tuple(lobe for lobe, here in ((NEAR, ~far), (FAR, far)) if here.any())
+    kd, kt_d = _diffuse(samples, ~far), _diffuse(samples, far)
+    return Material(name=Path(samples.info.file).stem, kd=kd, kt_d=kt_d, lobes=lobes)
+
+
+def _diffuse(samples: MeasuredSamples, here: NDArray[np.bool_]) -> Triple:
+    f, weight = samples.f[here], samples.weight[here] * np.abs(samples.wo[here, 2])
+    values = [min(diffuse_mode(f[:, channel], weight), 1.0) for channel in range(f.shape[1])]
+    return triple(values if len(values) == 3 else values * 3)

@@ -1,4 +1,4 @@
-"""What the editor shows of a material, as numbers: disks, curves in the plane of incidence, albedo.
+"""A material in numbers, as the editor plots it: disks, curves in the plane of incidence, albedo.
 
 Everything is evaluated by the material's own BSDF. While a slider moves, disks have fewer pixels and the albedo fewer
 samples, so that a frame stays short.
@@ -20,9 +20,9 @@ from lambent.materials.document import Material
 from lambent.materials.fitting.disks import brightness, disk_directions, in_plane_directions, measured_disk
 from lambent.materials.fitting.incidence import Incidence
 from lambent.materials.lobes import Vector
+from lambent.viewer.mode import Image
 
 Floats = NDArray[np.floating]
-Picture = NDArray[np.uint8]
 
 FINE_PX = 72  # of a disk at rest
 WHITE_PERCENTILE = 99.8
@@ -34,14 +34,17 @@ WITHOUT_MEASUREMENT_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 
 @dataclass(frozen=True)
 class Incident:
-    """Where the light comes from."""
+    """Incident direction: where the light comes from."""
 
     theta_deg: float
     phi_deg: float
 
+    def __str__(self) -> str:
+        return f"theta_i {self.theta_deg:g}°, phi_i {self.phi_deg:g}°"
+
 
 def incidents_of(gathered: Sequence[Incidence]) -> tuple[Incident, ...]:
-    """Those that were measured; without a measurement a few of theta_i alone."""
+    """The measured incident directions; without a measurement a few of theta_i alone."""
     if not gathered:
         return tuple(Incident(theta, 0.0) for theta in WITHOUT_MEASUREMENT_DEG)
     return tuple(Incident(entry.theta_deg, entry.phi_deg) for entry in gathered)
@@ -50,7 +53,7 @@ def incidents_of(gathered: Sequence[Incidence]) -> tuple[Incident, ...]:
 class Disks:
     """Disks of many incident directions in one picture, laid out in rows of `columns`, `pixels` a side.
 
-    `tiles` lists what stands where: (index of the incident direction, far side).
+    `tiles` lists them: (index of the incident direction, far side).
     """
 
     def __init__(self, incidents: Sequence[Incident], transmits: bool, pixels: int) -> None:
@@ -65,7 +68,7 @@ class Disks:
             theta, phi = np.radians([incidents[index].theta_deg, incidents[index].phi_deg])
             wi.append(np.broadcast_to(direction(theta, phi), towards.shape))
             wo.append(towards)
-        self._wi, self._wo = _single(np.concatenate(wi)), _single(np.concatenate(wo))
+        self._wi, self._wo = single(np.concatenate(wi)), single(np.concatenate(wo))
 
     def model(self, material: Material) -> Floats:
         """(K, inside, 3) brightness, float32."""
@@ -80,7 +83,7 @@ class Disks:
         disks = [measured_disk(gathered[index], far, self.pixels)[self._inside] for index, far in self.tiles]
         return np.stack([np.broadcast_to(disk, (len(disk), 3)) for disk in disks]).astype(np.float32)
 
-    def picture(self, values: Floats, white: float) -> Picture:
+    def picture(self, values: Floats, white: float) -> Image:
         """RGBA picture of all disks, black to `white`; off the disks it is transparent."""
         shown = np.clip(values / white, 0, 1) * 255
         unknown = np.isnan(shown[..., :1])
@@ -92,10 +95,10 @@ class Disks:
         grid = cells.reshape(rows, self.columns, side, side, 4).swapaxes(1, 2)
         return np.ascontiguousarray(grid.reshape(rows * side, self.columns * side, 4))
 
-    def place(self, tile: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Texture coordinates of a tile's corners in `picture`."""
+    def place(self, index: int, far: bool) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Texture coordinates of a disk's corners in `picture`."""
         rows = -(-len(self.tiles) // self.columns)
-        row, column = divmod(tile, self.columns)
+        row, column = divmod(self.tiles.index((index, far)), self.columns)
         return (column / self.columns, row / rows), ((column + 1) / self.columns, (row + 1) / rows)
 
 
@@ -131,6 +134,7 @@ def _points(count: int) -> Floats:
     return np.stack([(k + 0.5) / count, radical_inverse(k, 2), radical_inverse(k, 3)], axis=-1)
 
 
-def _single(w: Floats) -> Vector:
+def single(w: Floats) -> Vector:
+    """Components of directions (N, 3), contiguous, float32."""
     x, y, z = components(w)
     return x.astype(np.float32), y.astype(np.float32), z.astype(np.float32)

@@ -1,14 +1,15 @@
-"""What the user fixed or narrowed for a fit, by the fit's names, following the lobes when some come and go."""
+"""Parameters that the user fixed or narrowed for a fit, by the fit's names; they follow lobes that come and go."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from lambent.materials.document import Lobe, Material, Side
+from lambent.core.plain import Triple
+from lambent.materials.document import Material, Side
 from lambent.materials.fitting.parameters import SHAPE, parameter
 
-Value = float | tuple[float, float, float]
+Value = float | Triple
 DIFFUSE = ("kd", "kt_d")
 
 
@@ -73,15 +74,10 @@ def _values(material: Material) -> Iterator[tuple[str, Value]]:
         yield name, _plain(getattr(material, name))
     for lobe, names in zip(material.lobes, lobe_names(material), strict=True):
         for base, name in names.items():
-            yield name, _value(lobe, base)
+            value = getattr(lobe, base)
+            yield name, float(sum(value) / 3) if base == "r0" else _plain(value)  # a fit has one r0 for all channels
 
 
-def _value(lobe: Lobe, base: str) -> Value:
-    value = getattr(lobe, base)
-    if base == "r0":  # a fit has one r0 for all channels
-        return float(sum(value) / 3)
-    return _plain(value) if isinstance(value, tuple) else float(value)
-
-
-def _plain(rgb: tuple[float, float, float]) -> Value:
-    return rgb[0] if rgb[0] == rgb[1] == rgb[2] else rgb
+def _plain(value: Value) -> Value:
+    """One number for three that are equal."""
+    return value[0] if isinstance(value, tuple) and value[0] == value[1] == value[2] else value

@@ -1,29 +1,21 @@
-"""What the editor shows at this moment, brought up to date piece by piece where something has changed."""
+"""The plots of the editor as they are at this moment, brought up to date piece by piece where something has changed."""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from lambent.materials.document import Material
 from lambent.materials.fitting.disks import in_plane_tuples
-from lambent.viewer.editor.readings import (
-    FINE_PX,
-    Disks,
-    Floats,
-    Incident,
-    Picture,
-    albedo,
-    in_plane,
-    incidents_of,
-    white_of,
-)
-from lambent.viewer.editor.work import Work
-
-if TYPE_CHECKING:
-    from lambent.viewer.editor.editor import Editor
+from lambent.viewer.editor import readings
+from lambent.viewer.editor.measurement import Measurement
+from lambent.viewer.editor.readings import FINE_PX, Disks, Floats, incidents_of, white_of
+from lambent.viewer.editor.subject import Subject
+from lambent.viewer.mode import Image
+from lambent.viewer.work import Work, pending
 
 COARSE_PX = 40  # of a disk while a slider moves
 MOVING_VALUES = 30_000  # pixels of disks while a slider moves; with many disks they are smaller still
@@ -31,75 +23,74 @@ LEAST_PX = 12
 REST_S = 0.3
 ALBEDO_SAMPLES, MOVING_ALBEDO_SAMPLES = 1024, 128
 
+Curves = dict[tuple[str, bool], tuple[Floats, Floats]]  # by ("measured", "A" or "B", far)
+Channel = Literal["mean", "RGB", "red", "green", "blue"]
+Scale = Literal["cube root", "log", "linear"]
+CHANNELS: tuple[Channel, ...] = get_args(Channel)
+SCALES: tuple[Scale, ...] = get_args(Scale)
+
+
+@dataclass
+class Plots:
+    """How the material is plotted. `chosen` is the index of the incident direction whose plane is shown."""
+
+    chosen: int = 0
+    channel: Channel = "mean"
+    scale: Scale = "cube root"
+    visible: bool = True
+    fit_axes: bool = True  # the axes have yet to take the extent of what they show
+
+    def choose(self, incident: int) -> None:
+        """Plot the plane of another incident direction."""
+        self.chosen, self.fit_axes = incident, True
+
 
 class Shown:
-    """Disks, curves, albedo and errors of the material A and, where there is one, of B.
+    """Disks, curves, albedo and errors of the material A and, where there is one, of B, beside a measurement."""
 
-    Attributes
-    ----------
-    error, exact : float or None, bool
-        Of A under the chosen metric, and whether over all tuples.
-    compared_error : float or None
-        Of B.
-    images : dict of str to (H, W, 4) uint8
-        "measured", "A" and "B": pictures of all disks; a new array where one has changed.
-    layout : dict of str to Disks
-        How each of them is laid out.
-    measured_curve : dict of bool to (theta_o, p)
-        Per side (far), of the chosen incident direction.
-    curves : dict of (name, far) to p (359, 3)
-    measured_albedo, albedos : as the curves, over theta_i
-    seconds : float
-        What the last update took.
-    """
-
-    def __init__(self) -> None:
-        self.error: float | None = None
-        self.exact = False
+    def __init__(self, measurement: Measurement | None) -> None:
+        self._measurement = measurement
+        self.incidents = incidents_of(measurement.gathered if measurement else ())
+        self.error: float | None = None  # of A under the chosen metric
+        self.exact = False  # whether it is over all tuples
         self.exact_errors: dict[str, float] = {}
-        self.compared_error: float | None = None
-        self.images: dict[str, Picture] = {}
+        self.compared_error: float | None = None  # of B
+        self.images: dict[str, Image] = {}  # "measured", "A" and "B": all disks in one picture
         self.layout: dict[str, Disks] = {}
-        self.incidents: tuple[Incident, ...] = ()
         self.transmits = False
-        self.measured_curve: dict[bool, tuple[Floats, Floats]] = {}
-        self.curves: dict[tuple[str, bool], Floats] = {}
-        self.measured_albedo: dict[bool, tuple[Floats, Floats]] = {}
-        self.albedos: dict[tuple[str, bool], Floats] = {}
-        self.seconds = 0.0
+        self.curves: Curves = {}  # p (N, C) over theta_o (N,) in degrees, in the chosen plane of incidence
+        self.albedos: Curves = {}  # (N, C) over theta_i
         self.moving_seconds = 0.0  # of the last update while a slider moved
         self.exact_work: Work | None = None
         self._white = 1.0
         self._done: dict[str, Any] = {}  # part -> what it was last made of
-        self._disks: dict[tuple[Any, ...], Disks] = {}
+        self._disks: dict[tuple[bool, int], Disks] = {}
         self._exact_of: Material | None = None
         self._changed_s = 0.0
 
-    def update(self, editor: Editor) -> None:
-        """Show the editor's materials as they are now."""
-        began = time.perf_counter()
-        moving = self._moving(editor)
-        a, b, measurement = editor.material, editor.compared, editor.measurement
-        gathered = measurement.gathered if measurement else ()
-        if self._new("incidents", measurement):
-            self.incidents = incidents_of(gathered)
-        self.transmits = (
-            bool(measurement and measurement.samples.info.transmits) or a.transmits or bool(b and b.transmits)
-        )
-        editor.chosen = min(editor.chosen, len(self.incidents) - 1)
-        self._update_measured(editor)
+    def update(self, subject: Subject, metric: str, plots: Plots) -> None:
+        """Show the materials A and B as they are now."""
+        began, measurement = time.perf_counter(), self._measurement
+        a, b = subject.material, subject.compared
+        moving = self._moving(a, subject.edits.in_stroke)
+        measured = measurement is not None and measurement.samples.info.transmits
+        self.transmits = measured or a.transmits or bool(b and b.transmits)
+        if measurement is not None:
+            self._update_measured(measurement, plots.chosen)
         for name, material in (("A", a), ("B", b)):
-            self._update_material(name, material, editor.chosen, moving)
-        self._update_error(editor, moving)
+            self._update_material(name, material, plots.chosen, moving)
+        self.exact_work = pending(self.exact_work)
+        if measurement is not None:
+            self._update_error(measurement, a, b, metric, moving)
         if moving:
             self.moving_seconds = time.perf_counter() - began
 
-    def _moving(self, editor: Editor) -> bool:
+    def _moving(self, material: Material, in_stroke: bool) -> bool:
         """Whether a slider moves: one that is held still counts as at rest after a moment."""
         now_s = time.monotonic()
-        if self._new("moment", editor.material):
+        if self._new("moment", material):
             self._changed_s = now_s
-        return editor.edits.in_stroke and now_s - self._changed_s < REST_S
+        return in_stroke and now_s - self._changed_s < REST_S
 
     def _new(self, part: str, *made_of: Any) -> bool:
         """Whether `part` was last made of something else; it counts as made of this from now on."""
@@ -108,39 +99,36 @@ class Shown:
         self._done[part] = made_of
         return True
 
-    def _update_measured(self, editor: Editor) -> None:
-        measurement = editor.measurement
-        if measurement is None:
-            return
-        if self._new("measured disks", measurement, self.transmits):
+    def _update_measured(self, measurement: Measurement, chosen: int) -> None:
+        if self._new("measured disks", self.transmits):
             disks = self._laid_out(FINE_PX)
             values = measurement.disks
             if len(values) < len(disks.tiles):  # the model transmits, the table does not
                 values = np.concatenate([values, np.full_like(values, np.nan)])
             self._white = white_of(values)
             self.images["measured"], self.layout["measured"] = disks.picture(values, self._white), disks
-        if measurement.gathered and self._new("measured curve", measurement, editor.chosen):
-            entry = measurement.gathered[editor.chosen]
-            self.measured_curve = {far: in_plane_tuples(entry, far) for far in (False, True)}
+        if measurement.gathered and self._new("measured curve", chosen):
+            entry = measurement.gathered[chosen]
             near = [e for e in measurement.gathered if e.phi_deg == entry.phi_deg]
             theta = np.array([e.theta_deg for e in near])
-            self.measured_albedo = {
-                far: (theta, np.stack([np.broadcast_to(e.albedo(far), 3) for e in near])) for far in (False, True)
-            }
+            for far in (False, True):
+                self.curves["measured", far] = in_plane_tuples(entry, far)
+                albedos = np.stack([np.broadcast_to(e.albedo(far), 3) for e in near])
+                self.albedos["measured", far] = (theta, albedos)
 
     def _update_material(self, name: str, material: Material | None, chosen: int, moving: bool) -> None:
         if material is None:
-            for parts in (self.images, self.layout):
-                parts.pop(name, None)
-            for far in (False, True):
-                self.curves.pop((name, far), None)
-                self.albedos.pop((name, far), None)
+            for part in (self.images, self.layout):
+                part.pop(name, None)
+            for curves in (self.curves, self.albedos):
+                curves.pop((name, False), None)
+                curves.pop((name, True), None)
             self._done = {part: made for part, made in self._done.items() if not part.endswith(f" {name}")}
             return
         scatters = material.model_copy(update={"name": "", "provenance": None})
         pixels = self._moving_px() if moving else FINE_PX
         incident = self.incidents[chosen]
-        changed = self._new(f"disks {name}", scatters, self.incidents, self.transmits)
+        changed = self._new(f"disks {name}", scatters, self.transmits)
         if changed or (not moving and self.layout[name].pixels != FINE_PX):
             disks = self._laid_out(pixels)
             values = disks.model(material)
@@ -149,45 +137,38 @@ class Shown:
             self.images[name], self.layout[name] = disks.picture(values, self._white), disks
         if self._new(f"curves {name}", scatters, incident):
             for far in (False, True):
-                self.curves[name, far] = in_plane(material, incident, far)
+                self.curves[name, far] = readings.THETA_O_DEG, readings.in_plane(material, incident, far)
         if self._new(f"albedo {name}", scatters, incident.phi_deg, moving):
             samples = MOVING_ALBEDO_SAMPLES if moving else ALBEDO_SAMPLES
-            near, far_side = albedo(material, incident.phi_deg, samples)
-            self.albedos[name, False], self.albedos[name, True] = near, far_side
+            for far, values in zip((False, True), readings.albedo(material, incident.phi_deg, samples), strict=True):
+                self.albedos[name, far] = readings.ALBEDO_THETA_DEG, values
 
     def _laid_out(self, pixels: int) -> Disks:
-        key = (self.incidents, self.transmits, pixels)
+        key = (self.transmits, pixels)
         if key not in self._disks:
-            self._disks = {k: v for k, v in self._disks.items() if k[:2] == key[:2]}
-            self._disks[key] = Disks(self.incidents, self.transmits, pixels)
+            self._disks = {k: v for k, v in self._disks.items() if k[0] == self.transmits}
+            self._disks[key] = Disks(self.incidents, *key)
         return self._disks[key]
 
     def _moving_px(self) -> int:
         count = len(self.incidents) * (2 if self.transmits else 1)
         return int(np.clip(np.sqrt(MOVING_VALUES / count / (np.pi / 4)), LEAST_PX, COARSE_PX))
 
-    def _update_error(self, editor: Editor, moving: bool) -> None:
-        measurement, material = editor.measurement, editor.material
-        if self.exact_work is not None and self.exact_work.poll():
-            self.exact_work = None
-        if measurement is None:
-            self.error = self.compared_error = None
+    def _update_error(self, measured: Measurement, a: Material, b: Material | None, metric: str, moving: bool) -> None:
+        if self._new("error B", b, metric):
+            self.compared_error = None if b is None else measured.error(b, metric)
+        if measured.is_small and not moving and self._exact_of != a:
+            self._exact_of, self.exact_errors = a, measured.exact_errors(a)
+        if self._exact_of == a:
+            self.error, self.exact = self.exact_errors[metric], True
             return
-        b = editor.compared
-        if self._new("error B", b, editor.metric):
-            self.compared_error = None if b is None else measurement.error(b, editor.metric)
-        if measurement.is_small and not moving and self._exact_of != material:
-            self._exact_of, self.exact_errors = material, measurement.exact_errors(material)
-        if self._exact_of == material:
-            self.error, self.exact = self.exact_errors[editor.metric], True
-            return
-        if self._new("error", material, editor.metric):
-            self.error, self.exact = measurement.error(material, editor.metric), False
+        if self._new("error", a, metric):
+            self.error, self.exact = measured.error(a, metric), False
         if moving and self.exact_work is not None:
             self.exact_work.cancel()
         if not moving and self.exact_work is None:
 
             def take(errors: dict[str, float]) -> None:
-                self._exact_of, self.exact_errors = material, errors
+                self._exact_of, self.exact_errors = a, errors
 
-            self.exact_work = Work(lambda progress: measurement.exact_errors(material, progress), take)
+            self.exact_work = Work(lambda progress: measured.exact_errors(a, progress), take)

@@ -1,1 +1,1 @@
-"""The panels: one file each, with a TITLE and `draw(state)`. They read and write only the state."""
+"""Panels that more than one mode shows. Each draws the parts of a state that it is given."""

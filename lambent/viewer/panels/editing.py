@@ -1,34 +1,30 @@
-"""The material being edited: how far it is from its measurement, its history, its files, and every number of it."""
+"""The panels of the editor: error, history and files; every number and the comparison with B; the fit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Literal, get_args
+from typing import get_args
 
 from imgui_bundle import imgui
 
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Lobe, Material, Side
 from lambent.materials.fitting.metrics import METRICS
-from lambent.viewer.editor.editor import REFERENCES, Editor
+from lambent.viewer.editor.editor import DISTRIBUTIONS, LOBES, METHODS, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
+from lambent.viewer.editor.subject import REFERENCES
 from lambent.viewer.panels import parameters
-from lambent.viewer.panels.widgets import choice, explain, path_field
-from lambent.viewer.state import ViewerState
+from lambent.viewer.panels.widgets import DIM, buttons, choice, coloured, explain, path_field, typed_field, wrapped
 
-TITLE = "Material"
-SIDES: tuple[Literal["reflection", "transmission"], ...] = ("reflection", "transmission")
-DISTRIBUTIONS: tuple[str, ...] = get_args(Lobe.model_fields["distribution"].annotation)
+SIDES: tuple[Side, ...] = ("reflection", "transmission")
+OF_LOBES: tuple[str, ...] = get_args(Lobe.model_fields["distribution"].annotation)
 LABEL_PX = 52
 RANGE_PX = 26
-AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
-def draw_head(state: ViewerState) -> None:
+def draw_head(editor: Editor) -> None:
     """Error, history and files: what stays in sight above the sections."""
-    editor = state.editor
-    assert editor is not None
     _names(editor)
     _error(editor)
     _history(editor)
@@ -36,44 +32,38 @@ def draw_head(state: ViewerState) -> None:
     imgui.separator()
 
 
-def draw(state: ViewerState) -> None:
+def draw(editor: Editor) -> None:
     """Every number of the material, what to do with its lobes, and what to compare it with."""
-    editor = state.editor
-    assert editor is not None
-    material = editor.material
+    subject = editor.subject
+    material = subject.material
     edited, editor.linked_roughness = _numbers(editor, material)
     if edited != material:
-        editor.change(edited)
+        subject.change(edited)
     elif not imgui.is_any_item_active():
-        editor.edits.end_stroke()
+        subject.edits.end_stroke()
     _new_lobes(editor)
     _compare(editor)
 
 
 def _names(editor: Editor) -> None:
-    measurement = editor.measurement
-    info = measurement.samples.info if measurement else None
+    loading, measurement = editor.files.loading, editor.measurement
     imgui.align_text_to_frame_padding()
-    imgui.text_unformatted(f"{editor.material.name}{' *' if editor.unsaved else ''}")
+    imgui.text_unformatted(f"{editor.subject.material.name}{' *' if editor.subject.unsaved else ''}")
     explain("the material; * there is something to save")
     if editor.leave is not None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
         if imgui.button("close##editor", (-1, 0)):
             editor.queue(editor.leave)
-    text = "no measurement" if info is None else f"{len(measurement.samples)} tuples of {info.file}"  # type: ignore[union-attr]
-    imgui.push_style_color(imgui.Col_.text, DIM)
-    imgui.text_unformatted(text if editor.loading is None else f"reading: {editor.loading.what}")
-    imgui.pop_style_color()
-    if info is not None:
+    text = f"{len(measurement.samples)} tuples of {measurement.samples.info.file}" if measurement else "no measurement"
+    coloured(f"reading: {loading.what}" if loading else text, DIM)
+    if measurement is not None:
+        info = measurement.samples.info
         explain("\n".join((info.file, info.format, *info.notes)))
 
 
 def _error(editor: Editor) -> None:
-    shown, measurement = editor.shown, editor.measurement
-    imgui.set_next_item_width(104)
-    names = list(METRICS)
-    _, index = imgui.combo("##metric", names.index(editor.metric), names)
-    editor.metric = names[index]
+    shown, measurement, subject = editor.shown, editor.measurement, editor.subject
+    editor.metric = choice("##metric", editor.metric, tuple(METRICS), 104)
     explain(f"what an error is, here and in a fit: {METRICS[editor.metric].source}, in {METRICS[editor.metric].unit}")
     imgui.same_line()
     if measurement is None or shown.error is None:
@@ -86,38 +76,29 @@ def _error(editor: Editor) -> None:
         "error of the material; its share of the error of the best Lambertian surface; ~: of a choice of the tuples"
     )
     if shown.compared_error is None:
-        imgui.text_disabled("B: nothing to compare with" if editor.compared is None else "B")
+        imgui.text_disabled("B: nothing to compare with" if subject.compared is None else "B")
     else:
         share = 100 * shown.compared_error / flat
-        imgui.text_disabled(f"B ({editor.reference}): {shown.compared_error:.4g}   {share:.1f} % of Lambertian")
+        imgui.text_disabled(f"B ({subject.reference}): {shown.compared_error:.4g}   {share:.1f} % of Lambertian")
 
 
 def _history(editor: Editor) -> None:
-    edits = editor.edits
-    actions: tuple[tuple[str, bool, Callable[[], None], str], ...] = (
-        ("undo", edits.can_undo, edits.undo, "Ctrl+Z"),
-        ("redo", edits.can_redo, edits.redo, "Ctrl+Shift+Z or Ctrl+Y"),
-        ("revert", editor.material != editor.loaded, editor.revert, "the material as it was loaded; can be undone"),
-    )
+    subject, edits = editor.subject, editor.subject.edits
+    changed, revert = subject.material != subject.loaded, partial(subject.step, subject.loaded)
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
-    for index, (label, possible, act, meaning) in enumerate(actions):
-        if index:
-            imgui.same_line()
-        imgui.begin_disabled(not possible)
-        if imgui.button(label, (width, 0)):
-            act()
-        imgui.end_disabled()
-        explain(meaning)
+    undo = ("undo", edits.can_undo, edits.undo, "Ctrl+Z")
+    redo = ("redo", edits.can_redo, edits.redo, "Ctrl+Shift+Z or Ctrl+Y")
+    buttons([undo, redo, ("revert", changed, revert, "the material as it was loaded; can be undone")], width)
 
 
 def _files(editor: Editor) -> None:
-    editor.file_name, wanted = path_field("file", editor.file_name, "save", hint="name.json")
+    files = editor.files
+    files.name, wanted = path_field("file", files.name, "save", hint="name.json")
     if wanted:
         editor.save()
-    typed, wanted = path_field("open", editor.typed.get("open", ""), "load", hint="another measurement or material...")
-    editor.typed["open"] = typed
-    if wanted:
-        editor.open(typed)
+    text = typed_field("open", files.typed, "load", "another measurement or material...")
+    if text is not None:
+        files.open(text)
 
 
 def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
@@ -135,7 +116,7 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     @contextmanager
     def line(lobe: int | None, attribute: str) -> Iterator[None]:
         parameter = attribute if lobe is None else names[lobe][attribute]
-        restrictions = editor.restrictions
+        restrictions = editor.subject.restrictions
         changed, fixed = imgui.checkbox(f"##fix {parameter}", parameter in restrictions.fixed)
         explain(f"a fit keeps {parameter} as it is")
         if changed:
@@ -149,14 +130,13 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
             imgui.same_line(right - RANGE_PX)
             _interval(editor, parameter, attribute)
 
-    return parameters.edited(
-        renamed, editor.linked_roughness, line=line, all_terms=True, heading=lambda i, lobe: _heading(editor, i, lobe)
-    )
+    heading = partial(_heading, editor)
+    return parameters.edited(renamed, editor.linked_roughness, line=line, all_terms=True, heading=heading)
 
 
 def _interval(editor: Editor, parameter: str, attribute: str) -> None:
     """The button that narrows a parameter's interval, and the interval where there is one."""
-    restrictions = editor.restrictions
+    restrictions = editor.subject.restrictions
     model = parameters.LOBE[attribute]
     interval = restrictions.ranges.get(parameter)
     if imgui.small_button(f"{'x' if interval else '<>'}##narrow {parameter}"):
@@ -177,48 +157,72 @@ def _interval(editor: Editor, parameter: str, attribute: str) -> None:
 
 
 def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
+    subject = editor.subject
     imgui.separator()
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted(f"lobe {index + 1}")
     imgui.same_line()
-    imgui.set_next_item_width(112)
-    _, at = imgui.combo("##side", SIDES.index(lobe.side), list(SIDES))
-    if SIDES[at] != lobe.side:
-        editor.queue(lambda: editor.turn_lobe(index, SIDES[at]))
+    side = choice("##side", lobe.side, SIDES, 112)
+    if side != lobe.side:
+        editor.queue(lambda: subject.turn_lobe(index, side))
     imgui.same_line()
-    imgui.set_next_item_width(96)
-    _, kind = imgui.combo("##distribution", DISTRIBUTIONS.index(lobe.distribution), list(DISTRIBUTIONS))
+    kind = choice("##distribution", lobe.distribution, OF_LOBES, 96)
     explain("of the microfacets: beckmann falls off as a bell, ggx has long tails")
     imgui.same_line()
     if imgui.button("remove", (-1, 0)):
-        editor.queue(lambda: editor.remove_lobe(index))
-    return (
-        lobe
-        if DISTRIBUTIONS[kind] == lobe.distribution
-        else lobe.model_copy(update={"distribution": DISTRIBUTIONS[kind]})
-    )
+        editor.queue(lambda: subject.remove_lobe(index))
+    return lobe if kind == lobe.distribution else lobe.model_copy(update={"distribution": kind})
 
 
 def _new_lobes(editor: Editor) -> None:
     imgui.separator()
     width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
-    for side in SIDES:
-        if imgui.button(f"add {side} lobe", (width, 0)):
-            editor.queue(partial(editor.add_lobe, side))
-        if side == SIDES[0]:
-            imgui.same_line()
+    add = editor.subject.add_lobe
+    buttons([(f"add {side} lobe", True, partial(editor.queue, partial(add, side)), "") for side in SIDES], width)
 
 
 def _compare(editor: Editor) -> None:
+    subject, files = editor.subject, editor.files
     imgui.separator_text("compare with B")
-    editor.reference = choice("B", editor.reference, REFERENCES)
-    if editor.reference == "a document":
-        typed, wanted = path_field("B", editor.typed.get("B", ""), "open", hint="material document (.json)")
-        editor.typed["B"] = typed
-        if wanted:
-            editor.open_compared(typed)
-    if editor.reference != "nothing" and editor.compared is None:
+    subject.reference = choice("B", subject.reference, REFERENCES)
+    if subject.reference == "a document":
+        text = typed_field("B", files.typed, "open", "material document (.json)")
+        if text is not None:
+            files.open_compared(text)
+    other = subject.compared
+    if subject.reference != "nothing" and other is None:
         imgui.text_disabled("there is none yet")
-    if editor.compared is not None and imgui.button("take B's numbers", (-1, 0)):
-        other = editor.compared
-        editor.queue(lambda: editor.step(other.model_copy(update={"name": editor.material.name})))
+    if other is not None and imgui.button("take B's numbers", (-1, 0)):
+        named = other.model_copy(update={"name": subject.material.name})
+        editor.queue(lambda: subject.step(named))
+
+
+def draw_fit(editor: Editor) -> None:
+    """Options of a fit, its progress, its warnings."""
+    fit = editor.fit
+    fit.lobes = choice("lobes", fit.lobes, LOBES)
+    explain("per side; auto adds lobes as long as they take off a share of the error")
+    fit.distribution = choice("distribution", fit.distribution, DISTRIBUTIONS)
+    explain("distribution of the microfacets; best tries both")
+    fit.method = choice("method", fit.method, METHODS)
+    explain("gradient: least squares from several starts; grid: the hierarchical search of the thesis")
+    restrictions = editor.subject.restrictions
+    words = [*sorted(restrictions.fixed)]
+    words += [f"{name} {low:.3g}..{high:.3g}" for name, (low, high) in sorted(restrictions.ranges.items())]
+    if words:
+        imgui.push_text_wrap_pos()
+        imgui.text_disabled("fixed or narrowed: " + ", ".join(words))
+        imgui.pop_text_wrap_pos()
+    work = fit.work
+    if work is None:
+        meaning = "under the metric above, with what is fixed and narrowed; the result is one step of undo"
+        start = partial(fit.start, editor.measurement, editor.metric)
+        buttons([("fit from here", editor.measurement is not None, start, meaning)], -1)
+    else:
+        imgui.progress_bar(work.share, (-1, 0), f"{100 * work.share:.0f} %")
+        imgui.text_disabled("stopping" if work.cancelling else work.what)
+        goes_on = not work.cancelling
+        width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+        cancel, stop = partial(fit.stop, keep=False), partial(fit.stop, keep=True)
+        buttons([("cancel##fit", goes_on, cancel, ""), ("stop, keep the best", goes_on, stop, "")], width)
+    wrapped(fit.warnings)

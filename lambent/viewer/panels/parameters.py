@@ -13,24 +13,19 @@ from imgui_bundle import imgui
 from lambent.materials.document import Lobe, Material
 from lambent.materials.models.kurt import Kurt
 from lambent.materials.models.model import Parameter, Value
-from lambent.viewer.panels.widgets import explain, rgb, slider
+from lambent.viewer.panels.widgets import check, explain, rgb, slider
 
 LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
 DIFFUSE = {"kd": "diffuse reflectance", "kt_d": "diffuse transmittance"}
-# What surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
+# Surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
 Line = Callable[[int | None, str], AbstractContextManager[object]]
-
-
-def plain_line(lobe: int | None, name: str) -> AbstractContextManager[object]:
-    """Nothing around the control."""
-    return nullcontext()
 
 
 def edited(
     material: Material,
     linked: bool,
     *,
-    line: Line = plain_line,
+    line: Line = lambda lobe, name: nullcontext(),
     all_terms: bool = False,
     heading: Callable[[int, Lobe], Lobe] | None = None,
 ) -> tuple[Material, bool]:
@@ -44,7 +39,7 @@ def edited(
         with line(None, name):
             changes[name] = rgb(name, getattr(material, name), 1.0, DIFFUSE[name])
     if material.lobes:
-        _, linked = imgui.checkbox("keep the ratio of mx and my", linked)
+        linked = check("keep the ratio of mx and my", linked)
     changes["lobes"] = tuple(_lobe(index, lobe, linked, line, heading) for index, lobe in enumerate(material.lobes))
     return material.model_copy(update=changes), linked
 

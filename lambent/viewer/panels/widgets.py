@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.colour import srgb_decode, srgb_encode
-from lambent.core.plain import triple
+from lambent.core.plain import Triple, triple
 
-RGB = tuple[float, float, float]
+Colour = tuple[float, float, float, float]
 Word = TypeVar("Word", bound=str)
+AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
-def choice(label: str, value: Word, options: Sequence[Word]) -> Word:
+def choice(label: str, value: Word, options: Sequence[Word], width: float | None = None) -> Word:
     """A drop-down list."""
+    if width is not None:
+        imgui.set_next_item_width(width)
     _, index = imgui.combo(label, options.index(value), list(options))
     return options[index]
+
+
+def check(label: str, value: bool) -> bool:
+    """A check box."""
+    return imgui.checkbox(label, value)[1]
 
 
 def slider(label: str, value: float, low: float, high: float, *, log: bool = False, unit: str = "") -> float:
@@ -30,7 +38,7 @@ def slider(label: str, value: float, low: float, high: float, *, log: bool = Fal
     return min(max(moved, low), high) if changed else value
 
 
-def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
+def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     """Three sliders of linear coefficients and a swatch that opens a colour picker; `meaning` explains the label.
 
     The picker works on the colour as the display shows it; a coefficient above 1 keeps its scale.
@@ -41,12 +49,12 @@ def rgb(label: str, value: RGB, high: float, meaning: str) -> RGB:
     changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, "%.3f", imgui.SliderFlags_.always_clamp)
     value = triple(moved) if changed else value
     scale = max(1.0, *value)
-    shown = [float(x) for x in srgb_encode(np.array(value) / scale)]
+    shown = triple(srgb_encode(np.array(value) / scale))
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     if imgui.color_button("##swatch", (*shown, 1.0), imgui.ColorEditFlags_.no_tooltip, (swatch_px, swatch_px)):
         imgui.open_popup("picker")
     if imgui.begin_popup("picker"):
-        picked, colour = imgui.color_picker3("##picker", shown, imgui.ColorEditFlags_.no_side_preview)
+        picked, colour = imgui.color_picker3("##picker", list(shown), imgui.ColorEditFlags_.no_side_preview)
         if picked:
             value = triple(srgb_decode(np.array(colour)) * scale)
         imgui.end_popup()
@@ -68,10 +76,50 @@ def path_field(label: str, text: str, button: str, *, hint: str = "path of a fil
     return text, bool(entered or pressed)
 
 
+def typed_field(label: str, typed: dict[str, str], button: str, hint: str) -> str | None:
+    """A path field whose text stays in `typed`; the text once it is to be opened."""
+    typed[label], wanted = path_field(label, typed.get(label, ""), button, hint=hint)
+    return typed[label] if wanted else None
+
+
 def explain(text: str) -> None:
     """Help that appears while the mouse rests on the control before."""
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
         imgui.set_tooltip(text)
+
+
+def coloured(text: str, colour: Colour) -> None:
+    """A line of text."""
+    imgui.push_style_color(imgui.Col_.text, colour)
+    imgui.text_unformatted(text)
+    imgui.pop_style_color()
+
+
+def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
+    """Texts, each on as many lines as it needs."""
+    imgui.push_text_wrap_pos()
+    for line in lines:
+        coloured(line, colour)
+    imgui.pop_text_wrap_pos()
+
+
+def shadowed(lines: imgui.ImDrawList, at: tuple[float, float], text: str, colour: Colour) -> None:
+    """Text that can be read over any picture."""
+    lines.add_text((at[0] + 1, at[1] + 1), imgui.get_color_u32((0, 0, 0, 0.8)), text)
+    lines.add_text(at, imgui.get_color_u32(colour), text)
+
+
+def buttons(actions: Sequence[tuple[str, bool, Callable[[], None], str]], width: float = 0.0) -> None:
+    """Buttons in a row: (label, whether it can be pressed, action, meaning)."""
+    for index, (label, possible, act, meaning) in enumerate(actions):
+        if index:
+            imgui.same_line()
+        imgui.begin_disabled(not possible)
+        if imgui.button(label, (width, 0)):
+            act()
+        imgui.end_disabled()
+        if meaning:
+            explain(meaning)
 
 
 def rows(pairs: Sequence[tuple[str, str]], name: str) -> None:

@@ -1,0 +1,152 @@
+"""Files of the editor: what a file is, what is loaded, and what is saved, with its provenance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Literal
+
+from lambent.core.errors import UserError
+from lambent.core.plain import plain_name
+from lambent.materials.document import Material, Provenance, load_material
+from lambent.viewer.editor.measurement import Measurement, read_measurement
+from lambent.viewer.editor.subject import Subject, same_numbers
+from lambent.viewer.edits import file_in
+from lambent.viewer.screen import Screen
+from lambent.viewer.work import Work, pending
+
+Kind = Literal["material", "environment", "measurement"]
+
+ENVIRONMENTS = (".hdr", ".exr")
+BY_HAND = "edited by hand"
+
+
+def kind_of(path: Path) -> Kind:
+    """Kind of a file, as far as its beginning and its ending tell; `UserError` where it cannot be read."""
+    if path.suffix.lower() in ENVIRONMENTS:
+        return "environment"
+    try:
+        with path.open("rb") as file:
+            head = file.read(64)
+    except OSError as error:
+        raise UserError(f"cannot be read ({error.strerror})", file=path) from error
+    return "material" if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else "measurement"
+
+
+def with_account(
+    material: Material, origin: Material, measurement: Measurement | None, errors: Mapping[str, float]
+) -> Material:
+    """The material as it is saved: provenance of its `origin`, as fitted or loaded, and a note where numbers changed.
+
+    `errors` are those of the material against the measurement, E by metric; empty without one.
+    """
+    before = origin.provenance
+    if same_numbers(material, origin):
+        return material.model_copy(update={"provenance": before})
+    fitted = before is not None and before.method is not None
+    note = f"{BY_HAND} after the fit" if fitted else BY_HAND
+    account = before or Provenance()
+    if measurement is not None:
+        info = measurement.samples.info
+        note += f"; the errors are of these numbers against {info.file}"
+        source, source_format = account.source or info.file, account.source_format or info.format
+        account = account.model_copy(update={"errors": dict(errors), "source": source, "source_format": source_format})
+    elif account.errors:
+        note += "; the errors are of the numbers before"
+    notes = (*(n for n in account.notes if not n.startswith(BY_HAND)), note)
+    return material.model_copy(update={"provenance": account.model_copy(update={"notes": notes})})
+
+
+def document_file(folder: Path, text: str, *, bare: bool = False) -> Path:
+    """The .json file of a typed name, in `folder` unless it says otherwise, which a `bare` name may not.
+
+    Raises a `UserError` where it is no such name, or nothing can be written there.
+    """
+    name = text.strip()
+    if not name.endswith(".json") or Path(name).name == ".json" or (bare and Path(name).name != name):
+        raise UserError("not a file name", got=text, expected="a name like walnut.json")
+    return file_in(folder, name)
+
+
+def typed_path(text: str) -> Path:
+    """A path as typed or dropped: without blanks and quotes around it, ~ expanded; `UserError` where there is none."""
+    plain = text.strip().removeprefix("file://").strip("'\" ")
+    if not plain:
+        raise UserError("no file named", hint="type its path")
+    return Path(plain).expanduser()
+
+
+class Files:
+    """What is opened and saved is said on the screen; so is what cannot be, and nothing is lost.
+
+    `show` gets a measurement once it is read. The document is saved as `name`.
+    """
+
+    def __init__(self, subject: Subject, screen: Screen, show: Callable[[Measurement], None]) -> None:
+        self._subject, self._screen, self._show = subject, screen, show
+        self.name = f"{plain_name(subject.material.name)}.json"
+        self.typed: dict[str, str] = {}  # fields for paths, by what they are for
+        self.loading: Work | None = None
+        self.open_environment: Callable[[Path], None] | None = None  # where there is a preview
+        self._may_replace: set[Path] = set()
+
+    def open(self, text: str) -> None:
+        """Load what the user named: a measurement, a material document, or an environment."""
+        try:
+            path = typed_path(text)
+            kind = kind_of(path)
+            if kind == "material":
+                self._subject.adopt(load_material(path))
+                self._may_replace.clear()
+                self.came_from(path)
+                self._screen.say(f"material of {path.name}; undo brings back the one before")
+            elif kind == "measurement":
+                self._read(path)
+            elif self.open_environment is None:
+                raise UserError("environments are for `lambent edit`", file=path)
+            else:
+                self.open_environment(path)
+        except UserError as error:
+            self._refuse(error)
+
+    def open_compared(self, text: str) -> None:
+        """Load the document to compare with."""
+        try:
+            self._subject.compare_with(load_material(typed_path(text)))
+        except UserError as error:
+            self._refuse(error)
+
+    def _refuse(self, error: UserError) -> None:
+        self._screen.say(f"not loaded: {error}")
+
+    def _read(self, path: Path) -> None:
+        if self.loading is not None:
+            raise UserError("another file is being read", file=path)
+        self.loading = Work(lambda progress: read_measurement(path, progress), self._show, self._refuse)
+
+    def poll(self) -> None:
+        """Take a measurement that has been read."""
+        self.loading = pending(self.loading)
+
+    def came_from(self, path: Path) -> None:
+        """Save to `path` from now on, without a second try: the material came from there."""
+        self.name = str(path)
+        self._may_replace.add(path.resolve())
+
+    def save(self, measurement: Measurement | None) -> None:
+        """Write the document, with an account of its numbers; an unrelated file is replaced at the second try."""
+        try:
+            path = document_file(self._screen.folder, self.name)
+            if path.exists() and path.resolve() not in self._may_replace:
+                self._may_replace.add(path.resolve())
+                self._screen.say(f"{path.name} exists: save again to replace it")
+                return
+            material = self._subject.material
+            errors = measurement.exact_errors(material) if measurement else {}
+            with_account(material, self._subject.origin, measurement, errors).save(path)
+        except (UserError, OSError) as error:
+            self._screen.say(f"not saved: {error}")
+        else:
+            self._may_replace.add(path.resolve())
+            self._subject.edits.saved[self._subject.name] = material
+            self._screen.say(f"saved {path}")

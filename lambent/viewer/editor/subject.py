@@ -1,0 +1,101 @@
+"""The material being edited: steps that change it, its origins, and the material B that it is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from lambent.materials.document import Lobe, Material, Side
+from lambent.viewer.editor.restrictions import Restrictions
+from lambent.viewer.edits import MaterialEdits
+
+B = Literal["nothing", "as loaded", "as saved", "before the last step", "a document"]
+REFERENCES: tuple[B, ...] = get_args(B)
+
+
+@dataclass
+class Subject:
+    """A material of `edits`, under its `name` there; undo is that of the whole window."""
+
+    edits: MaterialEdits
+    name: str
+    restrictions: Restrictions = field(default_factory=Restrictions)  # of its parameters in a fit
+    reference: B = "nothing"  # what it is compared with
+    document: Material | None = None
+
+    def __post_init__(self) -> None:
+        self.loaded = self.material
+        self._origins = [self.loaded]  # as they were loaded or fitted: what their provenance is about
+
+    @property
+    def material(self) -> Material:
+        return self.edits.current(self.name)
+
+    @property
+    def compared(self) -> Material | None:
+        """The material B, where there is one."""
+        found = {
+            "as loaded": self.loaded,
+            "as saved": self.edits.saved.get(self.name),
+            "before the last step": self.edits.previous(self.name),
+            "a document": self.document,
+        }
+        return found.get(self.reference)
+
+    @property
+    def origin(self) -> Material:
+        """The material as it was loaded or fitted; its provenance, which edits keep, tells."""
+        about = self.material.provenance
+        return next((found for found in reversed(self._origins) if found.provenance == about), self.loaded)
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether there is something that saving would keep."""
+        kept, now = self.edits.saved.get(self.name, self.loaded), self.material
+        return now.name != kept.name or not same_numbers(now, kept)
+
+    def change(self, material: Material) -> None:
+        """One more moment of the stroke that is under way."""
+        self.edits.change(self.name, material)
+
+    def step(self, material: Material) -> None:
+        """A whole step of undo."""
+        self.edits.end_stroke()
+        self.change(material)
+        self.edits.end_stroke()
+
+    def adopt(self, material: Material) -> None:
+        """Take a material that comes with a provenance of its own, as a step."""
+        self._origins.append(material)
+        self.step(material)
+
+    def compare_with(self, document: Material) -> None:
+        """Compare with a document from now on."""
+        self.document, self.reference = document, "a document"
+        self._origins.append(document)
+
+    def add_lobe(self, side: Side) -> None:
+        r0 = (0.04,) * 3 if side == "reflection" else (0.0,) * 3
+        lobe = Lobe(side=side, k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=r0)
+        self.step(self.material.model_copy(update={"lobes": (*self.material.lobes, lobe)}))
+
+    def remove_lobe(self, index: int) -> None:
+        lobes = self.material.lobes
+        kept = [i for i in range(len(lobes)) if i != index]
+        self._with_lobes(tuple(lobes[i] for i in kept), kept)
+
+    def turn_lobe(self, index: int, side: Side) -> None:
+        """Put a lobe on the other side; its restrictions are dropped."""
+        lobes = list(self.material.lobes)
+        lobes[index] = lobes[index].model_copy(update={"side": side})
+        self._with_lobes(tuple(lobes), [i if i != index else -1 for i in range(len(lobes))])
+
+    def _with_lobes(self, lobes: tuple[Lobe, ...], kept: list[int]) -> None:
+        after = self.material.model_copy(update={"lobes": lobes})
+        self.restrictions.follow(self.material, after, kept)
+        self.step(after)
+
+
+def same_numbers(a: Material, b: Material) -> bool:
+    """Whether two materials scatter alike; names and provenance aside."""
+    return a.model_copy(update={"name": b.name, "provenance": b.provenance}) == b

@@ -1,0 +1,79 @@
+"""How the picture is made: exposure, view transform, what of the light is shown, integrator, samples, look-up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from lambent.core.camera import Camera
+from lambent.core.false_colour import Range
+from lambent.core.photometry import Quantity
+from lambent.materials.document import Material
+from lambent.realtime.frame_state import FALSE_COLOUR, LIGHT_MAP_NOISE, SHOW, FrameState, quantity_of
+from lambent.realtime.frame_state import VIEW_TRANSFORMS as ALL_TRANSFORMS
+from lambent.realtime.incident import AUTO, look_ups
+from lambent.realtime.integrators import INTEGRATORS as ALL_INTEGRATORS
+from lambent.realtime.patterns import RINGS
+
+# What the panels offer; every choice starts at its first.
+INTEGRATORS = tuple(name for name, how in ALL_INTEGRATORS.items() if how.specular)
+VIEW_TRANSFORMS = tuple(reversed(ALL_TRANSFORMS))
+SHOWS = tuple(SHOW)
+LOOKUPS = (AUTO, *look_ups())
+SAMPLE_COUNTS = tuple(n for n in RINGS if n <= 19)
+OF_FRAMES = ("exposure_ev", "view_transform", "integrator", "show", "lookup", "planar", "n", "near_m")
+
+
+@dataclass
+class Look:
+    """Settings of a `FrameState`, by its names, and of false colours: `noise_scale` is for the noise, in percent."""
+
+    exposure_ev: float = 0.0
+    view_transform: str = VIEW_TRANSFORMS[0]
+    integrator: str = INTEGRATORS[0]
+    show: str = SHOWS[0]
+    shows: tuple[str, ...] = SHOWS  # to choose from
+    lookup: str = LOOKUPS[0]
+    planar: str = "auto"
+    n: int | None = None  # samples per lobe; None: chosen per material from its roughness
+    near_m: float | None = None  # nearer things are cut away; None: by the scene's size
+    scale: Range = field(default_factory=Range)
+    noise_scale: Range = field(default_factory=lambda: Range(0.5, 50.0))
+
+    @property
+    def quantity(self) -> Quantity:
+        """Of the numbers that the picture shows: luminance, illuminance, or noise."""
+        return quantity_of(self.show)
+
+    @property
+    def shows_noise(self) -> bool:
+        """Whether the picture is the light map's noise, which is in false colours under every view transform."""
+        return self.show == LIGHT_MAP_NOISE
+
+    @property
+    def is_false_coloured(self) -> bool:
+        return self.shows_noise or self.view_transform == FALSE_COLOUR
+
+    @property
+    def display_transform(self) -> str:
+        """The view transform of pictures that are never in false colours: filmic takes their place."""
+        return "filmic" if self.view_transform == FALSE_COLOUR else self.view_transform
+
+    @property
+    def shown_scale(self) -> Range:
+        """The scale of the false colours that are shown."""
+        return self.noise_scale if self.shows_noise else self.scale
+
+    @shown_scale.setter
+    def shown_scale(self, scale: Range) -> None:
+        if self.shows_noise:
+            self.noise_scale = scale
+        else:
+            self.scale = scale
+
+    def frame(self, camera: Camera, size: tuple[int, int], materials: Mapping[str, Material]) -> FrameState:
+        """The frame of `size` (width, height) in pixels that shows this."""
+        settings = {name: getattr(self, name) for name in OF_FRAMES}
+        scale = self.shown_scale if self.is_false_coloured else Range()
+        # Another name of the camera is no other picture.
+        return FrameState(replace(camera, name=""), *size, materials=dict(materials), scale=scale, **settings)

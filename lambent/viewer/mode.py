@@ -1,0 +1,133 @@
+"""The contract between the window and its modes: `Mode`, its panels, and the `Drawing` that fills the picture's place.
+
+A mode is a folder of `lambent.viewer.modes`, see there. The window knows nothing else of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.viewer.input import Input
+from lambent.viewer.screen import Rect, Screen
+
+Image = NDArray[np.uint8]  # (H, W, 4), encoded
+Textures = Mapping[str, Any]  # imgui.ImTextureRef by name: "picture A", "picture B", and the images
+
+
+@dataclass
+class Divider:
+    """The line between the pictures A and B: `share` of the picture's width belongs to A."""
+
+    share: float = 0.5
+    a_label: str = "A"
+    b_label: str = "B"
+
+    def move(self, share: float) -> None:
+        """Put the line elsewhere; a strip of both pictures stays."""
+        self.share = min(max(share, 0.02), 0.98)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A section of the column at the right, under a header that folds it."""
+
+    title: str
+    draw: Callable[[], None]
+    opened: bool = False  # at the start
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Plots right of the picture and below it; `images` are the textures that they need besides the drawing's."""
+
+    right: Callable[[Textures], None]
+    below: Callable[[Textures], None]
+    images: Mapping[str, Image]
+
+
+class Drawing:
+    """Fills the picture's place with `views` of textures: of A and, beside a `divider`, of B.
+
+    `images` are further textures, by name; one called "picture A" takes the place of A's view.
+    """
+
+    def __init__(self, device: Any) -> None:
+        self.device = device
+
+    @property
+    def views(self) -> Sequence[Any]:
+        raise NotImplementedError
+
+    def update(self, place: Rect, pixel_ratio: float) -> None:
+        """Draw what is due into views of the size of `place`, or smaller."""
+        raise NotImplementedError
+
+    @property
+    def images(self) -> Mapping[str, Image]:
+        return {}
+
+    @property
+    def divider(self) -> Divider | None:
+        return None
+
+    def wait_s(self) -> float | None:
+        """Seconds until something is due although nothing changes; None: never."""
+        return None
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a frame is being drawn in parts: `work` goes on with it."""
+        return False
+
+    def work(self) -> bool:
+        """Draw a part of the frame under way; whether there is a new picture to show."""
+        return False
+
+    def save(self) -> None:
+        """Write the picture into the screen's folder, and say so, or why not."""
+
+    def close(self) -> None:
+        """End what goes on in the background; harmless when repeated."""
+
+
+class Mode:
+    """What a window shows, and how it answers; a mode overrides what it does differently."""
+
+    head: Callable[[], None] | None = None  # draws what stays in sight above the panels
+
+    def __init__(self, title: str, screen: Screen, input: Input, drawing: Drawing, panels: Sequence[Panel]) -> None:
+        self.title, self.screen, self.input, self.drawing, self.panels = title, screen, input, drawing, panels
+        self.across, self.down = 0.5, 0.6  # borders of the picture and the plots, as shares of what the column leaves
+
+    @property
+    def beside(self) -> Beside | None:
+        return None
+
+    def draw_over(self, textures: Textures) -> None:
+        """Draw marks, scales and messages over the picture."""
+
+    @property
+    def moving(self) -> bool:
+        """Whether the next frame differs from this one although no event comes."""
+        return False
+
+    def advance(self, dt_s: float) -> None:
+        """Go on for `dt_s` seconds of motion (0 after a sleep), and take what ended in the background."""
+
+    def wait_s(self) -> float | None:
+        """Seconds until `advance` has something to do although nothing moves; None: never."""
+        return None
+
+    def drop(self, path: str) -> None:
+        """Take a file that was dropped onto the window."""
+
+    def rescue(self) -> None:
+        """The window is lost: write what was not saved to files of new names, and say where on stderr."""
+
+    def close(self) -> None:
+        """The window was closed in order: end the work in the background, and say on stderr what was not saved."""

@@ -1,0 +1,24 @@
+"""The material mode: the editor beside a preview, for a measured table or a material document; see `lambent edit`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lambent.viewer.mode import Mode
+from lambent.viewer.screen import Screen
+
+STARTS = ("material",)
+NO_DISPLAY = "the editor needs one: use `lambent fit --plot`"
+
+
+def start(
+    path: Path, name: str, screen: Screen, *, material: Path | None = None, environments: Sequence[Path] = ()
+) -> Mode:
+    """The mode on the file at `path`; for `material` and `environments` see `lambent.viewer.edit.run`."""
+    from lambent.realtime.device import open_device
+    from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
+    from lambent.viewer.modes.material.stage import Stage
+
+    state = MaterialState.of(path, material, environments, screen)
+    return MaterialMode(state, Stage(open_device(), state))

@@ -1,0 +1,79 @@
+"""The preview's pictures: A, and beside it B where two materials are compared; drawn by the renderer of the window."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.materials.document import Material
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.unbaked import unbaked_scene, with_diffuse_light
+from lambent.viewer.mode import Divider
+from lambent.viewer.modes.material.mode import MaterialState
+from lambent.viewer.modes.material.preview import OBJECT, SHAPES, Floats, with_lamp
+from lambent.viewer.picture import Pair, Picture, size_px
+from lambent.viewer.screen import Rect
+
+KEPT = 4  # pictures that were shown last are kept ready
+LAMP_SHAPE = "sheet before a lamp"
+
+
+class Stage(Pair):
+    """Draws the shape and the light of a preview with the materials of its editor."""
+
+    def __init__(self, device: Any, state: MaterialState) -> None:
+        super().__init__(device)
+        self._state = state
+        self._lights: dict[str, Floats] = {}
+        self._pictures: dict[tuple[str, str, str], Picture] = {}
+        self._lit_by: str | None = None  # the environment that could be loaded last
+
+    @property
+    def divider(self) -> Divider | None:
+        return self._state.preview.divider if len(self.shown) == 2 else None
+
+    def update(self, place: Rect, pixel_ratio: float) -> None:
+        """Draw what is due."""
+        state, subject = self._state, self._state.editor.subject
+        self._have_light()
+        materials = {"A": subject.material}
+        if subject.compared is not None:
+            materials["B"] = subject.compared
+        self.shown = tuple(self._picture(which) for which in materials)
+        size, camera = size_px(place, pixel_ratio), state.navigation.camera
+        # A last: its statistics are the window's.
+        for picture, material in reversed(list(zip(self.shown, materials.values(), strict=True))):
+            picture.update(state.look.frame(camera, size, {subject.name: material}))
+
+    def save(self) -> None:
+        """Write the picture of A, and of B where there is one."""
+        for picture in self.shown:
+            picture.save(self._state.editor.subject.name)
+
+    def _have_light(self) -> None:
+        """Load the chosen environment; where that cannot be, say so and keep the one before."""
+        preview = self._state.preview
+        if preview.environment not in self._lights:
+            try:
+                self._lights[preview.environment] = preview.light(preview.environment)
+            except UserError as error:
+                self._state.screen.say(f"environment not loaded: {error}")
+                preview.files.pop(preview.environment, None)
+                preview.environment = self._lit_by or "studio"
+                self._have_light()
+        self._lit_by = preview.environment
+
+    def _picture(self, which: str) -> Picture:
+        preview = self._state.preview
+        key = (which, preview.shape, preview.environment)
+        picture = self._pictures.pop(key, None) or self._made(preview.shape, preview.environment)
+        self._pictures[key] = picture  # the last one shown is the last one in
+        while len(self._pictures) > KEPT:
+            del self._pictures[next(iter(self._pictures))]
+        return picture
+
+    def _made(self, shape: str, environment: str) -> Picture:
+        cube, name = self._lights[environment], self._state.editor.subject.name
+        light = with_lamp(cube) if shape == LAMP_SHAPE else cube
+        scene = unbaked_scene({OBJECT: SHAPES[shape]()}, Material(name=name), light, name=name)
+        return Picture(Renderer(self.device, with_diffuse_light(scene)), self._state.screen)

@@ -1,0 +1,18 @@
+"""The walk mode: a baked store, on foot ("walk") or turning about what the camera looks at ("view")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lambent.viewer.mode import Mode
+from lambent.viewer.screen import Screen
+
+STARTS = ("walk", "view")
+NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
+
+
+def start(path: Path, name: str, screen: Screen) -> Mode:
+    """The mode on the store at `path`."""
+    from lambent.viewer.modes.walk.mode import open_store
+
+    return open_store(path, "walk" if name == "walk" else "orbit", screen)

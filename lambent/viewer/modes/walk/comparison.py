@@ -1,0 +1,181 @@
+"""The picture A beside B, another integrator's, and how far the two are apart.
+
+B is, unless chosen otherwise, the unbiased `qmc`, which accumulates while nothing moves: the error is then that of A's
+few samples. Figures compare what a display shows; the map of differences compares luminances.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.colour import luminance, shown
+from lambent.core.errors import UserError
+from lambent.core.false_colour import STOPS, Range, false_colour, ramp
+from lambent.core.images import to_bytes
+from lambent.core.metrics import psnr
+from lambent.core.progress import Progress
+from lambent.viewer.mode import Divider, Image
+from lambent.viewer.work import POLL_S, Work, pending
+
+Floats = NDArray[np.floating[Any]]
+Mode = Literal["off", "side by side", "error map"]
+Kind = Literal["difference", "FLIP"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+KINDS: tuple[Kind, ...] = get_args(Kind)
+REFERENCE = "qmc"
+PERCENT = Range(1.0, 100.0)  # of the map of differences
+FLOOR = 0.02  # of the mean luminance: below, a difference counts as one of this
+FLIP_PIXELS = 1 << 19  # larger pictures are halved first: the library takes seconds per million
+FLIP_PROGRAM = """
+import sys
+import numpy as np
+from lambent.core.metrics import flip_error
+np.save(sys.argv[2], flip_error(*np.load(sys.argv[1])))
+"""
+_FLIP_STOPS = np.array([(0, 0, 0.02), (0.32, 0.07, 0.48), (0.72, 0.21, 0.47), (0.98, 0.53, 0.38), (0.99, 0.99, 0.75)])
+
+
+@dataclass(frozen=True)
+class Figures:
+    """How far A is from B: dB and the mean difference in percent; mean FLIP as soon as it is there."""
+
+    psnr_db: float
+    difference_percent: float
+    of: int  # samples per pixel and lobe of B, 0 where B does not accumulate
+    flip_mean: float | None = None
+    flip_of: int = 0
+    flip_step: int = 1  # pixels per side that were averaged first
+
+
+class Comparison:
+    """The picture B, how it is compared with A, and what came of it; brought up to date while nothing moves."""
+
+    def __init__(self) -> None:
+        self.mode: Mode = "off"
+        self.integrator = REFERENCE
+        self.kind: Kind = "difference"
+        self.divider = Divider()
+        self.figures: Figures | None = None
+        self.map: Image | None = None  # of errors, where one is to be shown
+        self._difference: Floats | None = None
+        self._flip: Floats | None = None
+        self._work: Work | None = None
+        self._of: object = None
+        self._next = 1  # accumulated frames at which it is worth comparing again
+        self._painted: object = None  # the values that `map` shows
+
+    @property
+    def on(self) -> bool:
+        return self.mode != "off"
+
+    @property
+    def busy(self) -> bool:
+        return self._work is not None
+
+    def due(self, of: object, accumulated: int) -> bool:
+        """Whether to compare the pictures of `of`, B of so many frames: at 1, 2, 4, 8... frames."""
+        if of != self._of:
+            self.forget()
+            self._of, self._next = of, 1
+        return accumulated >= self._next
+
+    def forget(self) -> None:
+        """Drop what was found for other pictures; the figures stay."""
+        if self._work is not None:
+            self._work.cancel()
+        self._work = self._difference = self._flip = self.map = self._painted = self._of = None
+
+    def compare(self, a: Floats, b: Floats, view: str, exposure_ev: float, frames: int, samples: int) -> None:
+        """Compare pictures (H, W, 3) of radiance; FLIP goes on in the background."""
+        self._next = 2 * max(frames, 1)
+        self._difference = difference(a, b)
+        pair = [shown(np.asarray(x, np.float32), view, exposure_ev) for x in (b, a)]
+        figures, before = Figures(psnr(pair[0], pair[1]), float(self._difference.mean()), samples), self.figures
+        if before is not None and self._flip is not None:
+            figures = replace(figures, flip_mean=before.flip_mean, flip_of=before.flip_of, flip_step=before.flip_step)
+        self.figures = figures
+        if self._work is None:
+            self._start_flip(pair, samples)
+
+    def tick(self) -> None:
+        """Take what has ended in the background, and paint the map."""
+        self._work = pending(self._work)
+        values = self._flip if self.kind == "FLIP" else self._difference
+        if self.mode != "error map" or values is None:
+            self.map = self._painted = None
+        elif values is not self._painted:
+            self.map, self._painted = _painted(values, self.kind), values
+
+    def _start_flip(self, pair: list[Floats], samples: int) -> None:
+        step = 1 if pair[0].shape[0] * pair[0].shape[1] <= FLIP_PIXELS else 2
+        reference, test = (_shrunk(picture, step) for picture in pair)
+        of = self._of
+
+        def done(error: Any) -> None:
+            if of == self._of and self.figures is not None:
+                self._flip = error
+                self.figures = replace(self.figures, flip_mean=float(error.mean()), flip_of=samples, flip_step=step)
+
+        def failed(_: object) -> None:
+            self._flip = None  # PSNR and the difference stand without it
+
+        self._work = Work(lambda progress: flip_beside(reference, test, progress), done, failed)
+
+
+def difference(a: Floats, b: Floats) -> Floats:
+    """|A - B| of the luminances (H, W) of two pictures of radiance, in percent of B's."""
+    ya, yb = luminance(np.asarray(a, np.float64)), luminance(np.asarray(b, np.float64))
+    return np.asarray(100 * np.abs(ya - yb) / np.maximum(yb, max(FLOOR * float(yb.mean()), 1e-9)))
+
+
+def error_scale(kind: Kind) -> tuple[list[tuple[float, str]], Floats, str]:
+    """Marks (share of the scale, text), colours from low to high, and the unit of a map."""
+    if kind == "FLIP":
+        return [(x, f"{x:g}") for x in (0.0, 0.25, 0.5, 0.75, 1.0)], _FLIP_STOPS, "FLIP"
+    marks = [(float(PERCENT.share(np.array(x))), f"{x:g}") for x in PERCENT.marks()]
+    return marks, STOPS, "% of B"
+
+
+def _painted(values: Floats, kind: Kind) -> Image:
+    rgba = np.full((*values.shape, 4), 255, np.uint8)
+    rgba[..., :3] = to_bytes(ramp(values, _FLIP_STOPS) if kind == "FLIP" else false_colour(values, PERCENT))
+    return rgba
+
+
+def _shrunk(encoded: Floats, step: int) -> Floats:
+    if step == 1:
+        return encoded
+    height, width = (size - size % step for size in encoded.shape[:2])
+    blocks = encoded[:height, :width].reshape(height // step, step, width // step, step, 3)
+    return np.asarray(blocks.mean(axis=(1, 3)))
+
+
+def flip_beside(reference: Floats, test: Floats, progress: Progress) -> Floats:
+    """FLIP error (H, W) of two encoded pictures (H, W, 3); `progress` may raise `Cancelled`.
+
+    In a process of its own: the library holds the interpreter while it computes, and the window would stand still.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        pair, error, words = (Path(folder) / name for name in ("pair.npy", "error.npy", "words.txt"))
+        np.save(pair, np.stack([reference, test]).astype(np.float32))
+        command = [sys.executable, "-c", FLIP_PROGRAM, str(pair), str(error)]
+        with words.open("w") as log, subprocess.Popen(command, stdout=log, stderr=log) as worker:
+            try:
+                while worker.poll() is None:
+                    progress(0, 1, "FLIP")
+                    time.sleep(POLL_S)
+            except BaseException:
+                worker.kill()
+                raise
+        if worker.returncode != 0:
+            raise UserError(f"FLIP could not be computed ({words.read_text().strip()[-200:]})")
+        return np.asarray(np.load(error))

@@ -1,0 +1,109 @@
+"""A film of a camera path, made while the window goes on: a few frames at a time; it can be cancelled."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from lambent.core.camera import CameraPath
+from lambent.core.errors import UserError
+from lambent.core.files import check_place
+from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted, sequence_file
+from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.scenes.camera_paths import camera_at
+from lambent.viewer.edits import file_in
+from lambent.viewer.picture import scaled
+
+SIZES = {"1280 x 720": (1280, 720), "1920 x 1080": (1920, 1080), "3840 x 2160": (3840, 2160), "640 x 360": (640, 360)}
+FPS = (24, 25, 30, 60)
+QUALITIES = {"as in motion": 0, "refined, 64 samples": 64, "refined, 256 samples": 256}
+SLICE_S = 0.03  # of work between two looks at the events
+LONGEST_FRAMES = 100_000
+
+
+@dataclass
+class Films:
+    """What the Film panel asks for, and the film under way. `quality` names the samples, see `Filming`."""
+
+    size: str = next(iter(SIZES))
+    fps: int = 30
+    quality: str = next(iter(QUALITIES))
+    file_name: str = ""
+    wanted: CameraPath | None = None
+    under_way: Filming | None = None
+
+
+def film_file(folder: Path, text: str) -> Path:
+    """File of a film, or of a sequence of images, for a typed name, in `folder` unless it says otherwise."""
+    name = text.strip()
+    path = Path(name)
+    if path.suffix.lower() not in (FILM, *SEQUENCES) or not path.stem.strip(". ") or not name.isprintable():
+        raise UserError("not the name of a film", got=text, expected="a name like tour.mp4, tour-####.png or .exr")
+    file = file_in(folder, name)
+    check_place(file if file.suffix.lower() == FILM else sequence_file(file, 1))
+    return file
+
+
+class Filming:
+    """One film under way, of frames like `frame` along `path`. `error` says why it ended early.
+
+    The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; with 0 the
+    integrator is that of `frame`.
+    """
+
+    def __init__(
+        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0
+    ) -> None:
+        width, height = even_size(frame.width, frame.height)
+        self.file, self.total, self.done = file, max(2, round(path.seconds * fps)), 0
+        if self.total > LONGEST_FRAMES:
+            raise UserError("the film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
+        self.error: str | None = None
+        self.over = False
+        self._began_s = time.monotonic()
+        frame = replace(frame, width=width, height=height, accumulate=None)
+        self._work = self._run(renderer, path, frame, fps, -(-quality // QMC_N))
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds until the end, as it looks now."""
+        spent_s = time.monotonic() - self._began_s
+        return spent_s / self.done * (self.total - self.done) if self.done else None
+
+    def step(self) -> bool:
+        """Work for about `SLICE_S`; whether it is over."""
+        end_s = time.monotonic() + SLICE_S
+        try:
+            while time.monotonic() < end_s:
+                next(self._work)
+        except StopIteration:
+            self.over = True
+        except (UserError, OSError) as error:
+            self.error, self.over = str(error), True
+        return self.over
+
+    def cancel(self) -> None:
+        """Stop; a film leaves nothing behind, a sequence of images those that are done."""
+        self._work.close()
+        self.over = True
+
+    def _run(
+        self, renderer: Renderer, path: CameraPath, frame: FrameState, fps: int, parts: int
+    ) -> Generator[None, None, None]:
+        """Yields where events can be answered: after each part of a frame."""
+        with pictures_writer(self.file, frame.width, frame.height, fps) as write:
+            for index in range(self.total):
+                view = replace(frame, camera=camera_at(path, index / fps))
+                for part in range(parts):
+                    view = replace(view, integrator="qmc", n=QMC_N, accumulate=part)
+                    if part < parts - 1:  # the last one is drawn below
+                        renderer.draw(view)
+                        renderer.finish()
+                        yield
+                linear = radiance_wanted(self.file)
+                write(renderer.image(view) if linear else scaled(renderer.display_image(view), view))
+                self.done = index + 1
+                yield

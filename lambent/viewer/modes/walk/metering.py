@@ -1,0 +1,74 @@
+"""An exposure meter: mean and log-average luminance of the picture, their histogram, and the exposure that follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.false_colour import Range, fitting_range
+from lambent.core.photometry import LM_PER_W, LUMINANCE, Quantity, photometric
+
+Floats = NDArray[np.floating[Any]]
+KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
+PIXELS = 60_000  # that a reading looks at, evenly spread
+BINS_PER_DECADE = 12
+LIMIT_EV = 12.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Of one picture, in the unit of the quantity that it shows. `counts` (B,) lie between `edges` (B + 1,)."""
+
+    mean: float
+    log_mean: float
+    low: float
+    high: float
+    counts: Floats = field(compare=False)
+    edges: Floats = field(compare=False)
+    ranges: tuple[Range, Range] = (Range(), Range())  # that hold the picture: by decades, by even steps
+
+    @property
+    def exposure_ev(self) -> float:
+        """Exposure that shows the log-average as middle grey."""
+        return min(max(math.log2(KEY * LM_PER_W / self.log_mean), -LIMIT_EV), LIMIT_EV)
+
+
+def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
+    """Reading of a picture (H, W, 3) of radiance, or of another quantity; None where all of it is black."""
+    every = max(1, math.isqrt(radiance.shape[0] * radiance.shape[1] // PIXELS))
+    values = photometric(np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64), quantity).ravel()
+    values = values[np.isfinite(values)]
+    lit = values[values > 0]
+    if not lit.size:
+        return None
+    low, high = float(lit.min()), float(lit.max())
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high) + 1e-9)
+    first = max(first, last - 7)
+    edges = np.logspace(first, last, (last - first) * BINS_PER_DECADE + 1)
+    return Reading(
+        float(values.mean()),
+        float(np.exp(np.log(lit).mean())),
+        low,
+        high,
+        np.histogram(np.clip(lit, edges[0], None), edges)[0].astype(float),
+        edges,
+        (fitting_range(values), fitting_range(values, log=False)),
+    )
+
+
+@dataclass
+class Meter:
+    """The window's meter. The panel sets `wanted` in every frame in which it is seen."""
+
+    wanted: bool = False
+    fit_wanted: bool = False  # the range of false colour follows the next reading
+    expose_wanted: bool = False  # so does the exposure
+    fitted: set[bool] = field(default_factory=set)  # ranges that were fitted: of noise (True), of light (False)
+    reading: Reading | None = None
+    cursor: tuple[float, float] | None = None  # of the mouse, as shares of the picture
+    readout_on: bool = False  # false colour shows it always
+    under_cursor: tuple[float, float, float] | None = None  # radiance there

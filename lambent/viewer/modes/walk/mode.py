@@ -1,0 +1,126 @@
+"""The walk mode put together: its panels, its drawing, its input."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import device_needs
+from lambent.store.store import Store
+from lambent.viewer.lost import rescued
+from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
+from lambent.viewer.modes.walk.comparison import error_scale
+from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
+from lambent.viewer.modes.walk.panels import compare, film, marks, material, metering, scene, view
+from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.navigation import Movement
+from lambent.viewer.panels import overlay, statistics
+from lambent.viewer.panels.plots import beside
+from lambent.viewer.panels.widgets import rows
+from lambent.viewer.picking import Geometry
+from lambent.viewer.screen import Screen
+from lambent.viewer.work import POLL_S
+
+
+def open_store(path: Path, movement: Movement, screen: Screen) -> WalkMode:
+    """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`."""
+    store = Store.open(path)
+    baked = read_baked(store)
+    state = WalkState.of(baked.record, movement, screen, store.folder)
+    state.marks.sources = baked.probes
+    state.missing = (*baked.missing, *state.missing)
+    state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
+    geometry = Geometry(baked.positions, baked.faces, baked.record.objects)
+    pictures = Pictures(Renderer(open_device(device_needs(baked)), baked), state)
+    return WalkMode(state, WalkInput(state, geometry), pictures)
+
+
+def light_map_notes(store: Store) -> tuple[str, ...]:
+    """Noise and samples of the light map, per side, as the bake measured them."""
+    notes = []
+    for name in ("light_map/irradiance", "light_map/irradiance_back"):
+        meta = store.artefact(name).meta if name in store else {}
+        noise, samples = meta.get("noise"), meta.get("samples")
+        if isinstance(noise, float) and isinstance(samples, float):
+            side = "far side" if name.endswith("back") else "light map"
+            notes.append(f"{side}: noise {100 * noise:.1f} % before denoising, {samples:.0f} samples a texel")
+    return tuple(notes)
+
+
+class WalkMode(Mode):
+    """See the module."""
+
+    input: WalkInput
+
+    def __init__(self, state: WalkState, input: WalkInput, drawing: Drawing) -> None:
+        super().__init__(state.scene.name, state.screen, input, drawing, panels(state))
+        self.state = state
+
+    @property
+    def beside(self) -> Beside | None:
+        return beside(self.state.materials.editor)
+
+    @property
+    def moving(self) -> bool:
+        return self.input.walking or self.state.navigation.playing
+
+    def draw_over(self, textures: Textures) -> None:
+        state, place = self.state, self.screen.picture
+        marks.draw(state.marks, state.selection.name, place, textures)
+        comparison, recorder, filming = state.comparison, state.recordings.recorder, state.films.under_way
+        if comparison.mode == "error map" and comparison.figures is not None:
+            overlay.scale_bar(place, *error_scale(comparison.kind))
+        else:
+            overlay.false_colour_bar(place, state.look)
+        metering.draw_readout(state.meter, state.look, place)
+        lines = [] if filming is None else [f"film: frame {filming.done} of {filming.total}"]
+        if recorder.on:
+            lines.append(f"recording {self.screen.clock() - recorder.began_s:.0f} s   (R stops)")
+        overlay.draw(self.screen, lines, refining=filming is None)  # which has the adapter to itself
+
+    def advance(self, dt_s: float) -> None:
+        self.input.walk(dt_s)
+        self.state.navigation.play(dt_s)
+        self.state.recordings.follow()
+        if self.state.materials.editor is not None:
+            self.state.materials.editor.tick()
+
+    def wait_s(self) -> float | None:
+        editor = self.state.materials.editor
+        return POLL_S if self.state.recordings.recorder.on or (editor is not None and editor.busy) else None
+
+    def drop(self, path: str) -> None:
+        if self.state.materials.editor is not None:
+            self.state.materials.editor.files.open(path)
+
+    def rescue(self) -> None:
+        rescued("an unsaved material", self.state.materials.rescue)
+        rescued("the recorded walk", self.state.recordings.rescue)
+        self.drawing.close()  # a film under way leaves nothing behind
+
+    def close(self) -> None:
+        self.state.materials.close_editor()
+        rescued("the recorded walk", self.state.recordings.rescue)
+        if self.state.materials.unsaved:
+            names = ", ".join(self.state.materials.unsaved)
+            sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
+
+
+def panels(state: WalkState) -> tuple[Panel, ...]:
+    """The column, each panel on the parts of the state that it needs."""
+    about = (state.missing, state.scene.warnings)
+    return (
+        Panel("Scene", partial(scene.draw, state.navigation, state.recordings, *about), opened=True),
+        Panel("View", partial(view.draw, state), opened=True),
+        Panel("Material", partial(material.draw, state.selection, state.materials), opened=True),
+        Panel("Light meter", partial(metering.draw, state.meter, state.look)),
+        Panel("Compare", partial(compare.draw, state.comparison)),
+        Panel("Film", partial(film.draw, state.films, state.recordings, state.navigation, state.screen)),
+        Panel("Statistics", lambda: statistics.draw(state.screen, state.materials.editor, state.notes)),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+    )

@@ -1,0 +1,37 @@
+"""The Compare panel: the picture beside another integrator's, or how far the two are apart."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from lambent.viewer.look import INTEGRATORS
+from lambent.viewer.modes.walk.comparison import KINDS, MODES, Comparison
+from lambent.viewer.panels.widgets import choice, explain, rows
+
+
+def draw(comparison: Comparison) -> None:
+    comparison.mode = choice("compare", comparison.mode, MODES)
+    if not comparison.on:
+        imgui.text_wrapped("Off: the picture refines by itself while nothing moves.")
+        return
+    comparison.integrator = choice("with B", comparison.integrator, INTEGRATORS)
+    explain("qmc is unbiased and accumulates while nothing moves; A stays the integrator of motion")
+    if comparison.mode == "error map":
+        comparison.kind = choice("map", comparison.kind, KINDS)
+        explain("the difference of luminance in percent of B's, or what a viewer notices (FLIP)")
+    figures = comparison.figures
+    if figures is None:
+        imgui.text_disabled("figures come while nothing moves")
+        return
+    flip = "being computed" if comparison.busy and figures.flip_mean is None else "-"
+    if figures.flip_mean is not None:
+        half = " at half size" if figures.flip_step > 1 else ""
+        older = f", of {figures.flip_of} samples" if figures.flip_of != figures.of else ""
+        flip = f"{figures.flip_mean:.4f}{half}{older}"
+    table = [
+        ("PSNR", f"{figures.psnr_db:.1f} dB"),
+        ("mean FLIP", flip),
+        ("mean difference", f"{figures.difference_percent:.2f} % of B"),
+        ("B so far", f"{figures.of} samples" if figures.of else "one frame"),
+    ]
+    rows(table, "figures")

@@ -1,0 +1,44 @@
+"""The Film panel: size, rate and quality of a film along a camera path, its progress, and how to cancel it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from lambent.core.plain import plain_name
+from lambent.viewer.modes.walk.filming import FPS, QUALITIES, SIZES, Filming, Films
+from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.navigation import Navigation
+from lambent.viewer.panels.widgets import choice, explain, path_field
+from lambent.viewer.screen import Screen
+
+
+def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: Screen) -> None:
+    if films.under_way is not None:
+        if _progress(films.under_way):
+            films.under_way.cancel()
+            screen.say(f"film cancelled after {films.under_way.done} frames")
+            films.under_way = None
+        return
+    paths, followed = recordings.paths, navigation.path
+    if not paths:
+        imgui.text_wrapped("There is no camera path: record one.")
+        return
+    path = followed.path if followed and followed.path.name in [p.name for p in paths] else paths[0]
+    imgui.text_disabled(f"along {path.name}, {path.seconds:.1f} s (chosen under Scene)")
+    films.size = choice("size", films.size, tuple(SIZES))
+    films.fps = int(choice("frames/s", str(films.fps), tuple(map(str, FPS))))
+    films.quality = choice("quality", films.quality, tuple(QUALITIES))
+    explain("the integrator and samples chosen under View, or the unbiased one: slow, without grain at 256")
+    text = films.file_name or f"{plain_name(path.name)}.mp4"
+    films.file_name, wanted = path_field("film file", text, "make film", hint="tour.mp4, tour-####.png or .exr")
+    explain(".mp4, or pictures in a row: tour-####.png as shown, tour-####.exr as linear radiance")
+    if wanted:
+        films.wanted = path
+
+
+def _progress(film: Filming) -> bool:
+    """Whether the film is to be cancelled."""
+    left = "" if film.left_s is None else f", {int(film.left_s) // 60}:{int(film.left_s) % 60:02} left"
+    imgui.progress_bar(film.done / film.total, (-1, 0), f"frame {film.done} of {film.total}{left}")
+    imgui.text_disabled(film.file.name)
+    return imgui.button("cancel the film", (-1, 0))

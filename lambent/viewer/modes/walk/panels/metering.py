@@ -1,0 +1,56 @@
+"""The exposure meter with its histogram, and what is under the mouse."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui
+
+from lambent.core.false_colour import number
+from lambent.core.photometry import photometric
+from lambent.viewer.look import Look
+from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.panels.overlay import SHADE
+from lambent.viewer.panels.widgets import explain, rows
+from lambent.viewer.screen import Rect
+
+GRAPH_PX = 90
+
+
+def draw(meter: Meter, look: Look) -> None:
+    meter.wanted = True
+    reading, unit = meter.reading, look.quantity.unit
+    if reading is None:
+        imgui.text_disabled("nothing to meter")
+        return
+    table = [
+        ("mean", f"{number(reading.mean)} {unit}"),
+        ("log-average", f"{number(reading.log_mean)} {unit}"),
+        ("darkest, brightest", f"{number(reading.low)}, {number(reading.high)} {unit}"),
+        *([] if look.shows_noise else [("log-average is grey at", f"{reading.exposure_ev:+.2f} EV")]),
+    ]
+    rows(table, "meter")
+    counts = np.asarray(reading.counts, np.float32)
+    width = imgui.get_content_region_avail().x
+    imgui.plot_histogram("##luminances", counts, graph_size=(width, GRAPH_PX), scale_min=0.0)
+    first, last = f"{number(reading.edges[0])}", f"{number(reading.edges[-1])} {unit}"
+    imgui.text_disabled(first)
+    imgui.same_line(width - imgui.calc_text_size(last).x)
+    imgui.text_disabled(last)
+    explain("pixels by luminance, in even steps of its logarithm; what is black is left out")
+
+
+def draw_readout(meter: Meter, look: Look, picture: Rect) -> None:
+    """The light under the mouse, beside it."""
+    if meter.under_cursor is None or meter.cursor is None:
+        return
+    light = float(photometric(np.array(meter.under_cursor), look.quantity))
+    text = f"{number(light)} {look.quantity.unit}"
+    detail = "RGB " + " ".join(f"{value:.3g}" for value in meter.under_cursor)
+    behind = imgui.get_background_draw_list()
+    line = imgui.get_text_line_height()
+    wide = max(imgui.calc_text_size(row).x for row in (text, detail))
+    (x, y), (right, bottom) = picture.point(*meter.cursor), picture.point(1, 1)
+    x, y = min(x + 16, right - wide - 8), min(y + 16, bottom - 2 * line - 8)
+    behind.add_rect_filled((x - 5, y - 3), (x + wide + 5, y + 2 * line + 3), imgui.get_color_u32(SHADE), 3)
+    behind.add_text((x, y), imgui.get_color_u32((1, 1, 1, 1)), text)
+    behind.add_text((x, y + line), imgui.get_color_u32((0.7, 0.72, 0.75, 1)), detail)

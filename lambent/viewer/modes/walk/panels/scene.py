@@ -1,0 +1,139 @@
+"""The Scene panel: walking or orbiting, cameras and saved views, camera paths; and what the store lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from imgui_bundle import imgui
+
+from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.modes.walk.views import Kind
+from lambent.viewer.navigation import Navigation
+from lambent.viewer.panels.widgets import check, explain, path_field, slider, wrapped
+
+LISTED = 6
+SMOOTHEST_S = 2.0
+RED = (1.0, 0.35, 0.3, 1.0)
+WARNINGS = 3  # more are folded away: the panels below them would be out of sight
+
+
+def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str], warnings: Sequence[str]) -> None:
+    """`missing` is what the store lacks, `warnings` are of the scene's loader."""
+    _movement(navigation)
+    if recordings.cameras:
+        _cameras(navigation, recordings)
+    _saving(navigation, recordings)
+    imgui.separator_text("camera path")
+    if recordings.paths:
+        _follow(recordings)
+    _record(recordings)
+    wrapped(missing)
+    if len(warnings) <= WARNINGS:
+        wrapped(warnings)
+    elif imgui.tree_node(f"{len(warnings)} notes on the scene's file###warnings"):
+        wrapped(warnings)
+        imgui.tree_pop()
+
+
+def _movement(navigation: Navigation) -> None:
+    if imgui.radio_button("walk", navigation.movement == "walk"):
+        navigation.movement = "walk"
+    imgui.same_line()
+    if imgui.radio_button("orbit", navigation.movement == "orbit"):
+        navigation.movement = "orbit"
+    if navigation.movement == "walk":
+        imgui.same_line()
+        navigation.flying = check("fly", navigation.flying)
+
+
+def _cameras(navigation: Navigation, recordings: Recordings) -> None:
+    imgui.separator_text("cameras")
+    cameras, own = recordings.cameras, len(recordings.views.scene.cameras)
+    height = min(len(cameras), LISTED) * imgui.get_text_line_height_with_spacing()
+    imgui.begin_child("cameras", (0, height))
+    for index, camera in enumerate(cameras):
+        key = f"{index + 1}  " if index < 9 else "    "
+        mark = "  (saved)" if index >= own else ""
+        if imgui.selectable(f"{key}{camera.name}{mark}##{index}", camera == navigation.camera)[0]:
+            navigation.jump(camera)
+    imgui.end_child()
+
+
+def _saving(navigation: Navigation, recordings: Recordings) -> None:
+    views, hint = recordings.views, "name of this view..."
+    recordings.view_name, wanted = path_field("view name", recordings.view_name, "save view", hint=hint)
+    explain("keeps where you stand, beside the store (V); `lambent render --camera NAME` shows it")
+    if wanted:
+        recordings.save_view()
+    chosen = next((c.name for c in views.saved.cameras if c == navigation.camera), None)
+    if chosen is not None:
+        _rename_or_delete(recordings, "camera", chosen)
+
+
+def _rename_or_delete(recordings: Recordings, kind: Kind, name: str) -> None:
+    """Two buttons, or the field where a new name is typed."""
+    views = recordings.views
+    if views.renaming == (kind, name):
+        views.typed_name, wanted = path_field(f"new {kind} name", views.typed_name, "rename", hint="new name")
+        if imgui.is_key_pressed(imgui.Key.escape):
+            views.renaming = None
+        if wanted:
+            recordings.rename(kind, name)
+        return
+    if imgui.small_button(f"rename...##{kind}"):
+        views.renaming, views.typed_name = (kind, name), name
+    imgui.same_line()
+    if imgui.small_button(f"delete##{kind}"):
+        recordings.delete(kind, name)
+    imgui.same_line()
+    imgui.text_disabled(name)
+
+
+def _follow(recordings: Recordings) -> None:
+    paths, navigation = recordings.paths, recordings.navigation
+    names = [path.name for path in paths]
+    name = navigation.path.path.name if navigation.path else names[0]
+    changed, index = imgui.combo("path", names.index(name) if name in names else 0, names)
+    chosen = paths[index]
+    if changed:
+        navigation.scrub(chosen, 0.0)
+    imgui.begin_disabled(recordings.recorder.on)
+    if imgui.button("pause" if navigation.playing else "play", (64, 0)):
+        navigation.toggle(chosen)
+    imgui.end_disabled()
+    imgui.same_line()
+    imgui.set_next_item_width(-1)
+    time_s = min(navigation.path.time_s, chosen.seconds) if navigation.path else 0.0
+    moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
+    if moved:
+        navigation.scrub(chosen, time_s)
+    if chosen.name in [path.name for path in recordings.views.saved.paths]:
+        _rename_or_delete(recordings, "path", chosen.name)
+
+
+def _record(recordings: Recordings) -> None:
+    recorder, navigation = recordings.recorder, recordings.navigation
+    if recorder.on:
+        imgui.push_style_color(imgui.Col_.text, RED)
+        seconds = recordings.screen.clock() - recorder.began_s
+        pressed = imgui.button(f"stop recording: {seconds:.0f} s###record", (-1, 0))
+        imgui.pop_style_color()
+    else:
+        pressed = imgui.button("record a walk###record", (-1, 0))
+    explain("follows the camera until it is pressed again (R); standing still before the first step is left out")
+    if pressed:
+        recordings.record()
+    if recorder.draft is None:
+        return
+    smooth_s = slider("smooth", recorder.smooth_s, 0.0, SMOOTHEST_S, unit=" s")
+    if smooth_s != recorder.smooth_s:
+        played = navigation.path if navigation.path and navigation.path.path == recorder.draft else None
+        recorder.smooth(smooth_s)
+        if played is not None:
+            navigation.scrub(recorder.draft, played.time_s)
+    explain("how far jerks are averaged out")
+    recorder.name, wanted = path_field("path name", recorder.name, "save path", hint="name of the path")
+    if wanted:
+        recordings.save()
+    if recorder.draft is not None and imgui.button("throw the recording away", (-1, 0)):
+        recordings.drop()

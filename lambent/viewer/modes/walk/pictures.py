@@ -1,0 +1,188 @@
+"""What the walk mode draws: the picture, the one it is compared with, their difference, marks, readings and films."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.camera import CameraPath
+from lambent.core.errors import UserError
+from lambent.core.images import write_shown
+from lambent.core.plain import triple
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.viewer.mode import Divider, Image
+from lambent.viewer.modes.walk.comparison import REFERENCE
+from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
+from lambent.viewer.modes.walk.metering import read
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.picture import Pair, Picture, size_px
+from lambent.viewer.screen import Rect, least
+
+METER_S = 0.2  # between two readings of the meter while something moves
+SHARED = 0.5  # of the frame time that each of two pictures may take
+
+
+class Pictures(Pair):
+    """The picture A; B, its renderer and that of films are made when they are first wanted."""
+
+    def __init__(self, renderer: Renderer, state: WalkState) -> None:
+        super().__init__(renderer.device)
+        self._renderer, self._state = renderer, state
+        self._a = Picture(renderer, state.screen)
+        self._b: Picture | None = None
+        self.shown = (self._a,)
+        self._film_renderer: Renderer | None = None
+        self._read_version, self._read_s = -1, -1e9
+
+    @property
+    def images(self) -> Mapping[str, Image]:
+        """Mirror balls, and the error map in the place of the picture."""
+        error = self._state.comparison.map
+        return self._state.marks.images | ({} if error is None else {"picture A": error})
+
+    @property
+    def divider(self) -> Divider | None:
+        beside = len(self.shown) == 2 and self._state.comparison.mode == "side by side"
+        return self._state.comparison.divider if beside else None
+
+    def update(self, place: Rect, pixel_ratio: float) -> None:
+        """Draw what is due, and read what somebody looks at."""
+        state = self._state
+        self._film()
+        wanted = self._frame(size_px(place, pixel_ratio))
+        if state.comparison.on and state.films.under_way is None:
+            self._compare(wanted)
+        else:
+            state.comparison.forget()
+            state.comparison.figures = None
+            self.shown = (self._a,)
+            self._a.update(wanted, refine=None if state.films.under_way is None else False)
+        look, size = state.look, (max(1, place.width), max(1, place.height))
+        state.marks.update(state.navigation.camera, size, look.display_transform, look.exposure_ev)
+        self._meter()
+
+    def _frame(self, size: tuple[int, int]) -> FrameState:
+        state = self._state
+        return state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
+
+    def wait_s(self) -> float | None:
+        if self._state.films.under_way is not None:
+            return 0.0
+        return least(super().wait_s(), 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
+
+    def save(self) -> None:
+        """Write the picture A, and the error map where one is shown."""
+        name = self._a.save(self._state.scene.name)
+        screen, error_map = self._state.screen, self._state.comparison.map
+        if name is None or error_map is None:
+            return
+        try:
+            write_shown(screen.folder / f"{name}-error.png", np.ascontiguousarray(error_map[..., :3]))
+        except (UserError, OSError) as error:
+            screen.say(f"error map not saved: {error}")
+        else:
+            screen.say(f"saved {name}-error.png")
+
+    def close(self) -> None:
+        """Give FLIP and the film under way up."""
+        self._state.comparison.forget()
+        if self._state.films.under_way is not None:
+            self._state.films.under_way.cancel()
+
+    # comparing
+
+    def _compare(self, wanted: FrameState) -> None:
+        comparison = self._state.comparison
+        if self._b is None:
+            self._b = Picture(self._another_renderer(), self._state.screen)
+        a, b = self._a, self._b
+        self.shown = (a, b)
+        # A looks through the middle of each pixel: so does B where the difference is to be that of the integrators.
+        edges = comparison.mode == "side by side"
+        beside = replace(wanted, integrator=comparison.integrator, antialias=edges)
+        b.update(beside, refine=comparison.integrator == REFERENCE, share=SHARED)
+        a.update(wanted, refine=False, share=SHARED)  # last: its statistics are the window's
+        comparison.divider.a_label = wanted.integrator
+        comparison.divider.b_label = comparison.integrator + (f", {b.samples} samples" if b.samples else "")
+        self._measure(a, b)
+
+    def _another_renderer(self) -> Renderer:
+        return Renderer(self.device, self._renderer.scene, beside=self._renderer)
+
+    def _measure(self, a: Picture, b: Picture) -> None:
+        """Compare A and B where both are whole and at rest."""
+        comparison, look = self._state.comparison, self._state.look
+        done = not a.under_way and a.wait_s() is None
+        at_rest = done and (b.samples > 0 or not (b.under_way or b.wait_s() is not None))
+        if not at_rest or a.radiance is None or b.radiance is None or a.radiance.size != b.radiance.size:
+            comparison.figures = comparison.figures if at_rest else None
+            comparison.forget()
+        elif comparison.due((a.version, comparison.integrator, comparison.mode), max(1, b.pacer.accumulated)):
+            view, exposure_ev = look.display_transform, look.exposure_ev
+            comparison.compare(a.read(), b.read(), view, exposure_ev, b.pacer.accumulated, b.samples)
+        comparison.tick()
+
+    # readings
+
+    def _meter(self) -> None:
+        meter, look, now_s, a = self._state.meter, self._state.look, self._state.screen.clock(), self._a
+        if not a.readable:
+            return
+        wanted, meter.wanted = meter.wanted, False
+        if look.is_false_coloured and look.shows_noise not in meter.fitted:
+            meter.fit_wanted = True  # for the first time
+        asked = meter.expose_wanted or (meter.fit_wanted and look.is_false_coloured)
+        if asked or (wanted and a.version != self._read_version and now_s - self._read_s >= METER_S):
+            meter.reading = read(a.read(), look.quantity)
+            self._read_version, self._read_s = a.version, now_s
+            self._apply()
+        meter.under_cursor = None
+        if meter.cursor is not None and (meter.readout_on or look.is_false_coloured):
+            x, y = meter.cursor
+            beyond = self.divider is not None and x > self.divider.share
+            picture = self.shown[-1] if beyond else a
+            if picture.readable:
+                meter.under_cursor = triple(picture.read((x, y))[0, 0])
+
+    def _apply(self) -> None:
+        """Set the exposure and the range that were to follow the reading."""
+        meter, look, say = self._state.meter, self._state.look, self._state.screen.say
+        if meter.expose_wanted and look.shows_noise:
+            say("nothing to meter: the picture shows noise, not light")
+        elif meter.expose_wanted and meter.reading is not None:
+            look.exposure_ev = meter.reading.exposure_ev
+        elif meter.expose_wanted:
+            say("nothing to meter: the picture is black")
+        if meter.fit_wanted and look.is_false_coloured and meter.reading is not None:
+            look.shown_scale = meter.reading.ranges[0 if look.shown_scale.log else 1]
+            meter.fit_wanted = False
+            meter.fitted.add(look.shows_noise)
+        meter.expose_wanted = False
+
+    # films
+
+    def _film(self) -> None:
+        films, screen = self._state.films, self._state.screen
+        wanted, films.wanted = films.wanted, None
+        if wanted is not None and films.under_way is None:
+            try:
+                films.under_way = self._filming(wanted)
+            except UserError as error:
+                screen.say(f"no film: {error}")
+        film = films.under_way
+        # A frame of a film can be slow: events are answered first, so that it can be cancelled.
+        if film is None or screen.pace.answering or not film.step():
+            return
+        films.under_way = None
+        screen.say(f"no film: {film.error}" if film.error else f"saved {film.file}, {film.done} frames")
+
+    def _filming(self, path: CameraPath) -> Filming:
+        films = self._state.films
+        file = film_file(self._state.screen.folder, films.file_name)
+        if self._film_renderer is None:
+            self._film_renderer = self._another_renderer()
+        frame = self._frame(SIZES[films.size])
+        return Filming(self._film_renderer, file, path, frame, films.fps, QUALITIES[films.quality])

@@ -1,0 +1,234 @@
+"""Recording a walk: the camera and its times, made smooth, as a path that films and the window follow; saving it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.plain import triple
+from lambent.viewer.edits import rescue_file
+from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
+from lambent.viewer.navigation import Navigation, PathPlay
+from lambent.viewer.screen import Screen
+
+Floats = NDArray[np.floating]
+KEY_S = 0.1  # between two keys of a path
+STILL_S = 0.1  # a longer gap between two frames is standing still, not a slow frame
+LONGEST_S = 600.0
+DRAFT = "recorded"
+SMOOTH_S = 0.3  # standard deviation of the bell that takes the jerks out
+
+
+@dataclass
+class Recording:
+    """Cameras and their times in seconds, as they were drawn."""
+
+    times_s: list[float] = field(default_factory=list)
+    cameras: list[Camera] = field(default_factory=list)
+
+    def take(self, camera: Camera, time_s: float) -> None:
+        """The camera at this moment. Frames in which nothing moves need not be told of."""
+        if self.cameras and camera == self.cameras[-1]:
+            return
+        if self.cameras and time_s - self.times_s[-1] > STILL_S:
+            self.times_s.append(time_s - STILL_S / 2)
+            self.cameras.append(self.cameras[-1])
+        if self.times_s and time_s <= self.times_s[-1]:
+            return
+        self.times_s.append(time_s)
+        self.cameras.append(camera)
+
+    @property
+    def seconds(self) -> float:
+        """From the first movement to the last."""
+        return self.times_s[-1] - self._start_s if len(self.times_s) > 1 else 0.0
+
+    @property
+    def _start_s(self) -> float:
+        """When the first movement began: what was waited for before belongs to nobody's walk."""
+        waited = len(self.cameras) > 1 and self.cameras[1] == self.cameras[0]
+        return self.times_s[1] if waited else self.times_s[0]
+
+    def path(self, name: str, smooth_s: float = SMOOTH_S) -> CameraPath | None:
+        """The recorded path; None where nothing moved.
+
+        Keys stand `KEY_S` apart. Positions, lines of sight and angles of view are averaged with a bell of standard
+        deviation `smooth_s`; the ends stay where they were.
+        """
+        if self.seconds < 2 * KEY_S:
+            return None
+        count = round(self.seconds / KEY_S) + 1
+        times = np.linspace(0.0, self.seconds, count)
+        at = np.array(self.times_s) - self._start_s
+        values = np.array([(*camera.position, *camera.target, camera.fov_y_deg) for camera in self.cameras])
+        even = np.stack([np.interp(times, at, column) for column in values.T], axis=-1)
+        smooth = smoothed(even, smooth_s / (times[1] - times[0]))
+        keys = tuple(Camera(name, triple(row[:3]), triple(row[3:6]), fov_y_deg=float(row[6])) for row in smooth)
+        return CameraPath(name=name, keys=keys, seconds=float(times[-1]), times_s=tuple(map(float, times)))
+
+
+@dataclass
+class Recorder:
+    """Follows the camera while `on`; then `draft` is smoothed and tried out, until it is saved or dropped."""
+
+    on: bool = False
+    recording: Recording = field(default_factory=Recording)
+    draft: CameraPath | None = None
+    smooth_s: float = SMOOTH_S
+    began_s: float = 0.0
+    name: str = ""
+    suggested: str = ""  # the name as it stands before anything is typed
+
+    def begin(self, now_s: float) -> None:
+        """Follow the camera from now on; a draft is dropped."""
+        self.drop()
+        self.on, self.began_s = True, now_s
+
+    def take(self, camera: Camera, now_s: float) -> bool:
+        """The camera at this moment; whether the recording has become too long to go on."""
+        if self.on:
+            self.recording.take(camera, now_s - self.began_s)
+        return self.on and now_s - self.began_s > LONGEST_S
+
+    def stop(self) -> CameraPath | None:
+        """Make a draft of what was recorded; None where nothing moved."""
+        self.on = False
+        self.smooth(self.smooth_s)
+        return self.draft
+
+    def smooth(self, smooth_s: float) -> None:
+        """Make the draft anew, smoothed more or less."""
+        self.smooth_s, self.draft = smooth_s, self.recording.path(DRAFT, smooth_s)
+
+    def drop(self) -> None:
+        """Forget the draft."""
+        self.recording, self.draft = Recording(), None
+
+
+@dataclass
+class Recordings:
+    """Saves where the camera stands and how it moves."""
+
+    views: SavedViews
+    navigation: Navigation
+    screen: Screen
+    recorder: Recorder = field(default_factory=Recorder)
+    view_name: str = ""  # typed for the next saved view
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The scene's, and those that were saved."""
+        return self.views.all.cameras
+
+    @property
+    def paths(self) -> tuple[CameraPath, ...]:
+        """The scene's, those that were saved, and the one just recorded."""
+        paths = self.views.all.paths
+        return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
+
+    def save_view(self) -> None:
+        """Save where the camera stands, under the typed name or the next free one."""
+        added = self.views.add(self.navigation.camera, self.view_name if self.view_name.strip() else None)
+        if added is not None:
+            self.view_name, self.navigation.camera = "", added
+            self.screen.say(f"saved the view {added.name}")
+
+    def rename(self, kind: Kind, name: str) -> None:
+        """Call what was saved by the typed name, and show it."""
+        if self.views.rename(kind, name, self.views.typed_name):
+            new, self.views.renaming = self.views.typed_name.strip(), None
+            if kind == "camera":
+                self.navigation.jump(replace(self.navigation.camera, name=new))
+            else:
+                self.navigation.scrub(next(path for path in self.views.saved.paths if path.name == new), 0.0)
+
+    def delete(self, kind: Kind, name: str) -> None:
+        """Delete what was saved; the camera stays where it is."""
+        if self.views.delete(kind, name):
+            self.navigation.path = None
+            if kind == "camera":
+                self.navigation.camera = replace(self.navigation.camera, name="free")
+            self.screen.say(f"deleted the {'view' if kind == 'camera' else kind} {name}")
+
+    def record(self) -> None:
+        """Begin to record the camera's path, or stop."""
+        recorder, navigation = self.recorder, self.navigation
+        if not recorder.on:
+            if navigation.path is not None:
+                navigation.path.playing = False
+            recorder.begin(self.screen.clock())
+        elif (draft := recorder.stop()) is not None:
+            recorder.name = recorder.suggested = self.views.free_name("path")
+            navigation.path = PathPlay(draft, draft.seconds, playing=False)  # chosen, and ready to be played
+            self.screen.say(f"recorded {draft.seconds:.1f} s")
+        else:
+            self.screen.say("nothing recorded: the camera did not move")
+
+    def follow(self) -> None:
+        """Take the camera of this frame into a recording, which ends where it becomes too long."""
+        if self.recorder.take(self.navigation.camera, self.screen.clock()):
+            self.record()
+
+    def save(self) -> None:
+        """Save the draft under the typed name; nobody asked for the suggested one, the next free one is as good."""
+        recorder = self.recorder
+        if recorder.draft is not None:
+            name = None if recorder.name == recorder.suggested else recorder.name
+            self._saved(self.views.add(recorder.draft, name))
+
+    def _saved(self, added: CameraPath | None) -> None:
+        if added is not None:
+            self.recorder.drop()
+            self.navigation.scrub(added, 0.0)
+            self.screen.say(f"saved the path {added.name}")
+
+    def keep(self) -> str | None:
+        """Save what was recorded and not yet saved, because the window closes; returns the path's name."""
+        if self.recorder.on:
+            self.record()
+        draft = self.recorder.draft
+        if draft is None:
+            return None
+        typed = self.recorder.name if self.recorder.name.strip() not in ("", self.recorder.suggested) else None
+        added = self.views.add(draft, typed)
+        if added is None and typed is not None:  # the name is taken, or none: the walk is worth more
+            added = self.views.add(draft)
+        self._saved(added)
+        return added.name if added is not None else None
+
+    def rescue(self) -> tuple[str, ...]:
+        """Where the recording was kept: in the store, or, where that takes nothing, in a file of its own."""
+        name = self.keep()
+        if name is not None:
+            return (f"the store as {name!r}",)
+        draft = self.recorder.draft
+        if draft is None:
+            return ()
+        name = self.recorder.name.strip() or self.views.free_name("path")
+        file = rescue_file(self.screen.folder, name)
+        write_alone(file, replace(draft, name=name))
+        return (f"{file}, a views.json for a store",)
+
+    def drop(self) -> None:
+        """Forget the draft."""
+        path = self.navigation.path
+        if path is not None and path.path == self.recorder.draft:
+            self.navigation.path = None
+        self.recorder.drop()
+
+
+def smoothed(values: Floats, sigma: float) -> Floats:
+    """Columns of (N, C), averaged with a bell of `sigma` rows; the first and last row stay.
+
+    Beyond the ends the values go on mirrored through the end point, so that a straight path stays straight.
+    """
+    reach = min(round(3 * sigma), len(values) - 1)
+    if reach < 1:
+        return values
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    bell /= bell.sum()
+    return np.stack([np.convolve(column, bell, mode="valid") for column in padded.T], axis=-1)

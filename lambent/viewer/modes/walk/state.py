@@ -1,0 +1,129 @@
+"""The state of the walk mode, by what it is about. Panels and input read and write it; the drawing shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.plain import plain_name
+from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.viewer.editor.editor import Editor
+from lambent.viewer.editor.files import document_file, with_account
+from lambent.viewer.edits import MaterialEdits, rescue
+from lambent.viewer.look import Look
+from lambent.viewer.modes.walk.comparison import Comparison
+from lambent.viewer.modes.walk.filming import Films
+from lambent.viewer.modes.walk.markers import Marks
+from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.modes.walk.views import SavedViews
+from lambent.viewer.navigation import Movement, Navigation
+from lambent.viewer.screen import Screen
+
+
+@dataclass
+class Selection:
+    """The selected object, by `name`; `reveal`: the list of objects has yet to scroll to it."""
+
+    objects: tuple[ObjectRecord, ...]
+    name: str | None = None
+    reveal: bool = False
+
+    def choose(self, name: str | None) -> None:
+        self.name, self.reveal = name, name is not None
+
+    @property
+    def material(self) -> str | None:
+        """Name of the selected object's material."""
+        return next((item.material for item in self.objects if item.name == self.name), None)
+
+
+@dataclass
+class Materials:
+    """Edits of the scene's materials, their files, and the editor that is open on one of them, if any."""
+
+    edits: MaterialEdits
+    screen: Screen
+    file_names: dict[str, str] = field(default_factory=dict)  # material -> where it is saved, as typed
+    linked_roughness: bool = True  # mx and my keep their ratio
+    typed_measurement: str = ""  # path of a file to compare the selected material with
+    editor: Editor | None = None
+
+    def file_name(self, material: str) -> str:
+        """Where `material` will be saved: what was typed, else its name."""
+        return self.file_names.get(material, f"{plain_name(material)}.json")
+
+    def save(self, name: str) -> None:
+        """Write the material as it is now into the screen's folder, and say so, or say why not.
+
+        Its provenance stays, with a note where numbers were changed by hand.
+        """
+        file_name, material, folder = self.file_name(name), self.edits.current(name), self.screen.folder
+        try:
+            file = document_file(folder, file_name, bare=True)
+            with_account(material, self.edits.scene[name], None, {}).save(file)
+        except UserError as error:
+            self.screen.say(f"not saved: {error}")
+        except OSError as error:  # its own words name a file that was to become this one
+            self.screen.say(f"not saved: {folder / file_name}: cannot be written ({error.strerror})")
+        else:
+            self.edits.saved[name] = material
+            self.screen.say(f"saved {file_name}")
+
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        """Materials that are neither the scene's nor as they were saved."""
+        saved, scene = self.edits.saved, self.edits.scene
+        return tuple(name for name, now in self.edits.edited.items() if now != saved.get(name, scene[name]))
+
+    def rescue(self) -> Iterator[Path]:
+        """Write what was not saved to files of new names."""
+        return rescue(self.edits, self.unsaved, self.screen.folder)
+
+    def open_editor(self, name: str) -> None:
+        """Open the editor on a material, with the measurement whose path was typed, if any."""
+        self.close_editor()
+        self.editor = Editor(self.edits, name, self.screen)
+        self.editor.files.name, self.editor.leave = self.file_name(name), self.close_editor
+        if self.typed_measurement.strip():
+            self.editor.files.open(self.typed_measurement)
+
+    def close_editor(self) -> None:
+        """Close the editor; the material stays as it is."""
+        if self.editor is not None:
+            self.editor.close()
+        self.editor = None
+
+
+@dataclass
+class WalkState:
+    """Parts that know little of each other; a panel takes those that it needs."""
+
+    scene: SceneRecord
+    screen: Screen
+    look: Look
+    navigation: Navigation
+    selection: Selection
+    materials: Materials
+    recordings: Recordings
+    marks: Marks
+    comparison: Comparison = field(default_factory=Comparison)
+    meter: Meter = field(default_factory=Meter)
+    films: Films = field(default_factory=Films)
+    missing: tuple[str, ...] = ()  # what the store lacks
+    notes: tuple[str, ...] = ()  # on the light map
+    knows_noise: bool = False  # whether the store says how exact its light map is
+
+    @classmethod
+    def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
+        """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
+        navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
+        fault = views.load()
+        return cls(
+            scene, screen, Look(scene.exposure_ev), navigation, Selection(scene.objects),
+            Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen),
+            Marks({}, scene.reflectors),
+            missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
+        )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The views and camera paths that people save while they look at a store, as the window keeps them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.errors import UserError
+from lambent.core.files import write_text
+from lambent.store.contract import SceneRecord
+from lambent.store.views import Views, change_views, checked_name, free_name, read_views, with_views
+
+Kind = Literal["camera", "path"]
+Item = TypeVar("Item", Camera, CameraPath)
+STEMS: dict[Kind, str] = {"camera": "view", "path": "walk"}  # of names that nobody typed
+
+
+@dataclass
+class SavedViews:
+    """Saved cameras and paths of one store; every change is on disk at once, or said not to be."""
+
+    scene: SceneRecord  # whose names are taken
+    folder: Path | None = None  # of the store; without one nothing can be saved
+    say: Callable[[str], None] = lambda text: None
+    saved: Views = field(default_factory=Views)  # as they were read last
+    renaming: tuple[Kind, str] | None = None  # kind and name, while another name is typed
+    typed_name: str = ""
+
+    def load(self) -> str | None:
+        """Read the file, or say, and return, why it cannot be used."""
+        try:
+            self.saved = Views() if self.folder is None else read_views(self.folder)
+        except UserError as error:
+            self.say(str(error))
+            return str(error)
+        return None
+
+    @property
+    def all(self) -> SceneRecord:
+        """The scene record with what was saved."""
+        return with_views(self.scene, self.saved)
+
+    def free_name(self, kind: Kind) -> str:
+        return free_name(STEMS[kind], self._names(kind, self.saved))
+
+    def add(self, item: Item, name: str | None = None) -> Item | None:
+        """Save a camera or path as `name`, or under the next free one; None where that cannot be."""
+        kind: Kind = "camera" if isinstance(item, Camera) else "path"
+        named: list[Item] = []
+
+        def change(views: Views) -> Views:
+            taken = self._names(kind, views)  # another window may have saved some meanwhile
+            free = free_name(STEMS[kind], taken)
+            named.append(replace(item, name=free if name is None else checked_name(name, taken)))
+            return _with(views, kind, (*_of(views, kind), *named))
+
+        return named[0] if self._change(change) else None
+
+    def rename(self, kind: Kind, old: str, new: str) -> bool:
+        """Whether what was saved as `old` is called `new` now."""
+
+        def change(views: Views) -> Views:
+            names = self._names(kind, views)
+            if old not in names:
+                raise UserError("is no longer there: another window deleted or renamed it", got=old)
+            name = checked_name(new, names - {old})
+            return _with(views, kind, (replace(i, name=name) if i.name == old else i for i in _of(views, kind)))
+
+        return self._change(change)
+
+    def delete(self, kind: Kind, name: str) -> bool:
+        """Whether it is gone."""
+        return self._change(lambda views: _with(views, kind, (i for i in _of(views, kind) if i.name != name)))
+
+    def _names(self, kind: Kind, views: Views) -> set[str]:
+        return {item.name for item in (*_of(self.scene, kind), *_of(views, kind))}
+
+    def _change(self, change: Callable[[Views], Views]) -> bool:
+        """Apply a change to the file; whether it is there now."""
+        if self.folder is None:
+            self.say("not saved: there is no store")
+            return False
+        if not self.folder.is_dir():
+            self.say(f"not saved: the store is gone: {self.folder}")  # and a folder with nothing but views is none
+            return False
+
+        def seen(views: Views) -> Views:
+            self.saved = views  # what another window saved is shown even where this change is refused
+            return change(views)
+
+        try:
+            self.saved = change_views(self.folder, seen)
+        except UserError as error:
+            self.say(f"not saved: {error}")
+            return False
+        return True
+
+
+def _of(holder: Views | SceneRecord, kind: Kind) -> tuple[Camera, ...] | tuple[CameraPath, ...]:
+    return holder.cameras if kind == "camera" else holder.paths
+
+
+def _with(views: Views, kind: Kind, items: Iterable[Camera | CameraPath]) -> Views:
+    return views.model_copy(update={f"{kind}s": tuple(items)})
+
+
+def write_alone(file: Path, path: CameraPath) -> None:
+    """A `views.json` of another name that holds one path, for a store that cannot take it."""
+    try:
+        write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")
+    except OSError as error:
+        raise UserError(f"cannot be written ({error.strerror})", file=file) from error

@@ -1,0 +1,98 @@
+"""What carries and what stops a walker: the floor below, and everything between knee and eye, seen from above.
+
+The walker is a circle of `BODY_M` around the eye, obstacles are the triangles' outlines on the floor plan. A step that
+would come nearer than that to one slides along it; whoever stands too near already may always step away.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.geometry import area_vectors
+from lambent.viewer.picking import first_hit
+
+Floats = NDArray[np.floating]
+STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
+BODY_M = 0.22
+SLIDES = 3  # a corner takes two
+_EDGES = ((0, 1), (1, 2), (2, 0))
+
+
+class Walls:
+    """Triangles (T, 3, 3) to stand on and to be stopped by."""
+
+    def __init__(self, triangles: Floats) -> None:
+        self._plan = triangles[:, :, [0, 2]]
+        self._low, self._high = triangles.min(axis=1), triangles.max(axis=1)
+        normals = area_vectors(triangles)
+        # One can stand on what is not steeper than 45 degrees, on either side: some floors are modelled upside down.
+        level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(np.linalg.norm(normals, axis=-1), 1e-20)
+        self._floors, self._floors_low, self._floors_high = triangles[level], self._low[level], self._high[level]
+
+    def floor_below(self, eye: Sequence[float], eye_height_m: float) -> float | None:
+        """Height of the highest floor under the eye that one could step on; None where there is none."""
+        x, y, z = eye
+        reach = y - eye_height_m + STEP_M
+        low, high = self._floors_low, self._floors_high
+        near = (low[:, 0] <= x) & (x <= high[:, 0]) & (low[:, 2] <= z) & (z <= high[:, 2]) & (low[:, 1] <= reach)
+        distance = first_hit(np.array([x, reach, z]), np.array([0.0, -1.0, 0.0]), self._floors[near])
+        return None if math.isinf(distance) else reach - distance
+
+    def allowed(self, eye: Floats, step: Floats, eye_height_m: float) -> Floats:
+        """The part of a horizontal step (3,) from `eye` that can be walked."""
+        knee_y = eye[1] - eye_height_m + STEP_M
+        start, move = eye[[0, 2]], step[[0, 2]]
+        length = float(np.linalg.norm(move))
+        outlines = self._near(start, BODY_M + length, knee_y, eye[1])
+        if not len(outlines):
+            return step
+        pieces = math.ceil(length / (BODY_M / 2))  # shorter than the body, so that none jumps over a wall
+        at = start
+        for _ in range(pieces):
+            at = at + _slid(at, move / pieces, outlines)
+        return np.array([at[0] - start[0], 0.0, at[1] - start[1]])
+
+    def _near(self, centre: Floats, reach: float, knee_y: float, eye_y: float) -> Floats:
+        low, high = self._low, self._high
+        near = (low[:, 1] < eye_y) & (high[:, 1] > knee_y)
+        for axis, c in ((0, centre[0]), (2, centre[1])):
+            near &= (low[:, axis] < c + reach) & (high[:, axis] > c - reach)
+        return np.asarray(self._plan[near], np.float64)
+
+
+def _slid(at: Floats, move: Floats, outlines: Floats) -> Floats:
+    """`move` without what leads into an outline; nothing where a corner leaves no way."""
+    before, _ = nearest_points(at, outlines)
+    for _ in range(SLIDES):
+        distances, points = nearest_points(at + move, outlines)
+        blocking = (distances < BODY_M) & (distances < before - 1e-9)
+        if not blocking.any():
+            return move
+        index = np.flatnonzero(blocking)[np.argmin(distances[blocking])]
+        # Inside an outline the nearest point is ahead: away is where the walker came from.
+        away = at + move - points[index] if distances[index] > 0 else at - points[index]
+        away = away / max(float(np.linalg.norm(away)), 1e-9)
+        move = move - min(float(move @ away), 0.0) * away
+    return np.zeros(2)
+
+
+def nearest_points(p: Floats, outlines: Floats) -> tuple[Floats, Floats]:
+    """Distances (T,) from p (2,) to triangles (T, 3, 2), 0 inside, and the nearest points (T, 2) of their outlines."""
+    best, points = np.full(len(outlines), np.inf), np.zeros((len(outlines), 2))
+    sides = []
+    for i, j in _EDGES:
+        a, edge = outlines[:, i], outlines[:, j] - outlines[:, i]
+        length2 = np.maximum(np.sum(edge * edge, axis=-1), 1e-20)
+        share = np.clip(np.sum((p - a) * edge, axis=-1) / length2, 0, 1)
+        on_edge = a + share[:, None] * edge
+        distance = np.linalg.norm(p - on_edge, axis=-1)
+        nearer = distance < best
+        best, points = np.where(nearer, distance, best), np.where(nearer[:, None], on_edge, points)
+        sides.append(edge[:, 0] * (p[1] - a[:, 1]) - edge[:, 1] * (p[0] - a[:, 0]))
+    low, high = np.min(sides, axis=0), np.max(sides, axis=0)
+    inside = ((low > 0) & (high > 0)) | ((low < 0) & (high < 0))
+    return np.where(inside, 0.0, best), points

@@ -1,0 +1,200 @@
+"""The window: carries events into a mode, draws what is due, sleeps when nothing changes.
+
+Importing this needs a display.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import glfw
+import numpy as np
+import wgpu
+from rendercanvas.glfw import RenderCanvas, loop
+from wgpu.utils.imgui import ImguiRenderer
+
+from lambent.viewer import layout
+from lambent.viewer.mode import Image, Mode
+from lambent.viewer.screen import least
+
+MAX_FPS = 60
+BEFORE_IMGUI = -100  # its own handlers stand at -99 and stop what they use, so that ours would not see a hover
+SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
+FOR_IMGUI_ONLY = ("char", "resize")
+EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
+
+
+class Window:
+    """One window of rendercanvas with Dear ImGui. `run` shows it until it is closed."""
+
+    def __init__(self, mode: Mode, *, size: tuple[int, int], frames: int | None = None) -> None:
+        self.mode, self.screen, self._frames, self._device = mode, mode.screen, frames, mode.drawing.device
+        self.canvas = RenderCanvas(size=size, title=f"Lambent: {mode.title}", max_fps=MAX_FPS)
+        context = self.canvas.get_wgpu_context()
+        # Not an sRGB format: Dear ImGui's colours are meant to be blended as they are, and the picture comes encoded.
+        surface = context.get_preferred_format(self._device.adapter).removesuffix("-srgb")
+        context.configure(device=self._device, format=surface)
+        self._imgui = ImguiRenderer(self._device, self.canvas)
+        self._imgui.set_gui(self._interface)
+        layout.set_style()
+        self._context = context
+        self._textures: dict[str, Any] = {}  # of Dear ImGui, by the names that the layout uses
+        self._made_of: dict[str, Any] = {}  # the view or the array that each of them shows
+        self._popup_open = False
+        self._extra_frames = 0
+        self._drawn_s = self.screen.clock()
+        self._moving = False  # between this frame and the next
+        self._wake_at_s: float | None = None
+        self._working = False  # between two parts of a frame at rest
+        self._error: Exception | None = None
+        self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
+        self._take_dropped_files()
+
+    def run(self) -> None:
+        """Show the window until it is closed; raises what went wrong meanwhile."""
+        self.canvas.request_draw(self._draw)
+        loop.run()
+        if self._error is not None:
+            raise self._error
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Close at the first error, which `run` raises; the event loop would log it and go on."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001
+            self._error = self._error or error
+            loop.call_soon(self.canvas.close)
+
+    def _on_event(self, event: dict[str, Any]) -> None:
+        self._extra_frames, self.screen.pace.touched_s = SETTLE_FRAMES, self.screen.clock()
+        self.canvas.request_draw()
+        if event["event_type"] in FOR_IMGUI_ONLY:
+            return
+        with self._watched():
+            io = self._imgui.backend.io
+            has_keys = io.want_text_input or io.want_capture_keyboard
+            self.mode.input.handle(event, ui_has_mouse=self._popup_open, ui_has_keys=has_keys)
+
+    def _draw(self) -> None:
+        with self._watched():
+            self._advance()
+            self._show()
+            self._schedule()
+
+    def _advance(self) -> None:
+        """Bring the mode to this moment."""
+        now_s = self.screen.clock()
+        since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
+        self.mode.advance(since_last_s if self._moving else 0.0)  # the sleep before a first step is not walked through
+        self.screen.drop_old_messages()
+        self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
+
+    def _show(self) -> None:
+        """Draw the picture where it is out of date, then the interface over it."""
+        screen, drawing = self.screen, self.mode.drawing
+        screen.pace.answering = self._extra_frames > 0
+        screen.picture = layout.regions(self.mode, *self.canvas.get_logical_size()).picture
+        drawing.update(screen.picture, self.canvas.get_pixel_ratio())
+        self._register()
+        if screen.save_wanted:
+            screen.save_wanted = False
+            drawing.save()
+        self._clear()
+        self._imgui.render()
+
+    def _register(self) -> None:
+        """Tell Dear ImGui of the textures that the layout uses, where they are new ones."""
+        drawing, beside = self.mode.drawing, self.mode.beside
+        wanted: dict[str, Any] = {f"picture {'AB'[i]}": view for i, view in enumerate(drawing.views)}
+        wanted |= drawing.images
+        if beside is not None:
+            wanted |= beside.images
+        for name in [name for name in self._textures if self._made_of[name] is not wanted.get(name)]:
+            self._imgui.backend.unregister_texture(self._textures.pop(name))
+            del self._made_of[name]
+        for name, source in wanted.items():
+            if name not in self._textures:
+                view = self._uploaded(source) if isinstance(source, np.ndarray) else source
+                self._textures[name], self._made_of[name] = self._imgui.backend.register_texture(view), source
+
+    def _uploaded(self, image: Image) -> Any:
+        """View of a texture that holds an RGBA picture (H, W, 4)."""
+        height, width = image.shape[:2]
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        texture = self._device.create_texture(size=(width, height, 1), format="rgba8unorm", usage=usage)
+        rows = {"bytes_per_row": 4 * width, "rows_per_image": height}
+        self._device.queue.write_texture({"texture": texture}, image, rows, (width, height, 1))
+        return texture.create_view()
+
+    def _take_dropped_files(self) -> None:
+        """Give files that are dropped onto the window to the mode; the canvas has no event for that."""
+
+        def dropped(_: object, paths: Any) -> None:
+            with self._watched():
+                for path in paths:
+                    self.mode.drop(path)
+            self._extra_frames = SETTLE_FRAMES
+            self.canvas.request_draw()
+
+        glfw.set_drop_callback(self.canvas._window, dropped)  # type: ignore[arg-type]
+
+    def _interface(self) -> None:
+        self._popup_open = layout.draw(self.mode, self._textures)
+
+    def _clear(self) -> None:
+        encoder = self._device.create_command_encoder()
+        view = self._context.get_current_texture().create_view()
+        attachment = {"view": view, "load_op": "clear", "store_op": "store", "clear_value": (0, 0, 0, 1)}
+        encoder.begin_render_pass(color_attachments=[attachment]).end()
+        self._device.queue.submit([encoder.finish()])
+
+    def _schedule(self) -> None:
+        """Ask for the next frame where there will be something new; otherwise sleep."""
+        if self._frames is not None:
+            self._frames -= 1
+            if self._frames <= 0:
+                loop.call_soon(self.canvas.close)
+        # Dear ImGui takes quick typing and clicking up one by one, a frame each.
+        unread = len(self._imgui.imgui_context.input_events_queue) > 0
+        self._extra_frames = SETTLE_FRAMES if unread else max(0, self._extra_frames - 1)
+        self._moving = self.mode.moving
+        if self._moving or self._extra_frames or self._frames is not None:
+            self.canvas.request_draw()
+        if self.mode.drawing.under_way and not self._working:
+            self._working = True
+            loop.call_later(0, self._work)
+        messages = (message.until_s - self.screen.clock() for message in self.screen.messages)
+        due_s = least(self.mode.wait_s(), self.mode.drawing.wait_s(), *messages)
+        if due_s is not None:
+            self._wake_in(max(0.0, due_s))
+
+    def _work(self) -> None:
+        """Draw a part of a frame at rest; the loop looks at the events before the next one."""
+        self._working = False
+        if self.canvas.get_closed():
+            return
+        with self._watched():
+            if self.mode.drawing.work():
+                self.canvas.request_draw()
+            elif self.mode.drawing.under_way:
+                self._working = True
+                loop.call_later(0, self._work)
+
+    def _wake_in(self, seconds: float) -> None:
+        at_s = self.screen.clock() + seconds
+        if self._wake_at_s is not None and self._wake_at_s <= at_s:
+            return  # an earlier frame will look again
+        self._wake_at_s = at_s
+
+        def wake() -> None:
+            if self._wake_at_s == at_s:
+                self._wake_at_s = None
+                self.canvas.request_draw()
+
+        if seconds > 0:
+            loop.call_later(seconds, wake)
+        else:
+            wake()

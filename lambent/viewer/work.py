@@ -1,0 +1,74 @@
+"""Long work in a thread beside the window: its progress, its end, its cancelling."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Cancelled, Progress
+
+POLL_S = 0.1  # between two looks at what goes on in the background
+
+
+class Work:
+    """One piece of work in a thread of its own; `poll` brings its end back to the thread of the window.
+
+    `run` gets a `Progress`, which raises `Cancelled` once `cancel` was called; `done` gets the result, `failed` the
+    `UserError` that `run` raised. Other errors are raised by `poll`.
+    """
+
+    def __init__(
+        self,
+        run: Callable[[Progress], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[UserError], None] | None = None,
+    ) -> None:
+        self._run, self._done, self._failed = run, done, failed
+        self._result: Any = None
+        self._error: Exception | None = None
+        self._cancelled = threading.Event()
+        self.share, self.what = 0.0, "starting"
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    def cancel(self) -> None:
+        """Ask to stop; `run` decides what that leaves."""
+        self._cancelled.set()
+
+    @property
+    def cancelling(self) -> bool:
+        return self._cancelled.is_set()
+
+    def poll(self) -> bool:
+        """Whether it is over. Reports the end: call this until it says so, and not after."""
+        if self._thread.is_alive():
+            return False
+        if self._error is None:
+            self._done(self._result)
+        elif isinstance(self._error, UserError) and self._failed is not None:
+            self._failed(self._error)
+        elif not isinstance(self._error, Cancelled):
+            raise self._error
+        return True
+
+    def wait(self) -> None:
+        """Return when `run` has ended."""
+        self._thread.join()
+
+    def _work(self) -> None:
+        try:
+            self._result = self._run(self._progress)
+        except Exception as error:  # noqa: BLE001 reported by poll, in the thread that can show it
+            self._error = error
+
+    def _progress(self, done: float, total: float, what: str) -> None:
+        if self._cancelled.is_set():
+            raise Cancelled
+        self.share, self.what = (done / total if total else 0.0), what
+
+
+def pending(work: Work | None) -> Work | None:
+    """The work while it goes on; None once its end has been reported."""
+    return None if work is None or work.poll() else work
