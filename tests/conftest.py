@@ -44,8 +44,8 @@ def mi() -> Any:
     from lambent.bake.engine import engine
 
     or_skip(engine)
-    from lambent.bake.material_plugin import register_material_plugin
-    from lambent.bake.table_plugin import register_table_plugin
+    from lambent.bake.bsdfs.material_plugin import register_material_plugin
+    from lambent.bake.bsdfs.table_plugin import register_table_plugin
 
     register_material_plugin()
     register_table_plugin()

@@ -44,7 +44,7 @@ HEAVY = {
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "manager", "misc", "common", "tools"}
 LONGEST, LONGEST_TEST = 400, 500  # lines
 # Files that are still longer, and modules that still import each other: both lists only shrink.
-TOO_LONG = {"bake/bake.py"}
+TOO_LONG: set[str] = set()
 IN_A_CIRCLE: set[str] = set()
 
 

@@ -1,8 +1,8 @@
 """The path tracing engine: the only file that chooses a Mitsuba variant.
 
-Why a subprocess: with LLVM 15 to 18 Dr.Jit loads and then aborts the whole process at its first real kernel, which
-nothing can catch. So each candidate renders a few pixels in a process of its own, and only what rendered is taken.
-A positive answer is kept in the user's cache folder, so that only the first command on a machine pays for it.
+With LLVM 15 to 18 Dr.Jit loads, and aborts the whole process at its first real kernel, which nothing can catch. So
+each candidate renders a few pixels in a subprocess, and only one that has rendered is taken. A positive result is kept
+in the user's cache folder: only the first command on a machine pays for it.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import TypeVar
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 
+T = TypeVar("T")
 LLVM_OLDEST = 19  # 14 is refused by Dr.Jit, 15 to 18 abort
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 VARIANT_VARIABLE = "LAMBENT_VARIANT"
@@ -63,7 +66,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class EngineProbe:
-    """What was tried. `engine` is None where nothing renders; `failures` says why, one line per attempt."""
+    """Result of the search: `engine` is None where nothing renders; `failures` has a reason per attempt."""
 
     engine: Engine | None
     failures: tuple[str, ...]
@@ -95,18 +98,23 @@ def engine() -> Engine:
         mi.set_variant(chosen.variant)
     import drjit as dr
 
-    # Looking for what stays the same in a loop traces its body twice, and a loop within it four times; kernels gain
-    # nothing by it here.
+    # To find loop invariants, Dr.Jit traces a loop twice, and one within it four times; kernels gain nothing here.
     dr.set_flag(dr.JitFlag.OptimizeLoops, False)
     return chosen
 
 
-def probe_engine(*, use_cache: bool = True) -> EngineProbe:
-    """Find an engine without setting anything in this process and without raising; for `lambent doctor`."""
+def once_per_variant(make: Callable[[], T]) -> Callable[[], T]:
+    """A function that is called once for each variant, such as one with a class that derives from the variant's own."""
+    made = functools.cache(lambda variant: make())
+    return functools.wraps(make)(lambda: made(engine().variant))
+
+
+def probe_engine() -> EngineProbe:
+    """Find an engine; sets nothing in this process and raises nothing, for `lambent doctor`."""
     names = _wanted_variants()
     library = find_llvm()
     key = _cache_key(names, library)
-    cached = _read_cache(key) if use_cache else None
+    cached = _read_cache(key)
     if cached is not None:
         return EngineProbe(cached, (), cached=True)
     failures: list[str] = []
@@ -123,9 +131,9 @@ def probe_engine(*, use_cache: bool = True) -> EngineProbe:
 
 
 def find_llvm() -> Path | None:
-    """The LLVM library to use: the user's DRJIT_LIBLLVM_PATH, else the oldest that is new enough in the usual places.
+    """The LLVM library to use: the user's DRJIT_LIBLLVM_PATH, else the oldest in the usual places that is new enough.
 
-    The oldest, because Dr.Jit is tested with it, and a newer one may have changed its C interface.
+    Dr.Jit is tested with the oldest; a newer one may have changed its C interface.
     """
     named = os.environ.get(LIBRARY_VARIABLE)
     if named:
@@ -135,17 +143,12 @@ def find_llvm() -> Path | None:
 
 
 def _llvm_files() -> Iterator[Path]:
-    for folder, pattern in (
-        ("/usr/lib", "*-linux-gnu/libLLVM*.so*"),
-        ("/usr/lib", "llvm-*/lib/libLLVM*.so*"),
-        ("/usr/lib", "llvm*/lib64/libLLVM*.so*"),
-        ("/usr/lib64", "libLLVM*.so*"),
-        ("/usr/lib64", "llvm*/lib*/libLLVM*.so*"),
-        ("/usr/local/lib", "libLLVM*.so*"),
-        ("/opt/homebrew/opt", "llvm*/lib/libLLVM*.dylib"),
-        ("/usr/local/opt", "llvm*/lib/libLLVM*.dylib"),
-    ):
-        yield from sorted(Path(folder).glob(pattern))
+    for pattern in (
+        "usr/lib/*-linux-gnu/libLLVM*.so*", "usr/lib/llvm-*/lib/libLLVM*.so*", "usr/lib/llvm*/lib64/libLLVM*.so*",
+        "usr/lib64/libLLVM*.so*", "usr/lib64/llvm*/lib*/libLLVM*.so*", "usr/local/lib/libLLVM*.so*",
+        "opt/homebrew/opt/llvm*/lib/libLLVM*.dylib", "usr/local/opt/llvm*/lib/libLLVM*.dylib",
+    ):  # fmt: skip
+        yield from sorted(Path("/").glob(pattern))
 
 
 def _llvm_number(path: Path) -> int:
@@ -164,7 +167,7 @@ def _wanted_variants() -> tuple[str, ...]:
 
 @functools.cache
 def _cuda_driver() -> int | None:
-    """Version number of the CUDA driver, or None. Looking spares the machines without one a failing probe."""
+    """Version number of the CUDA driver; None, where there is none, spares a failing probe."""
     try:
         library = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
         number = ctypes.c_int()
@@ -179,14 +182,8 @@ def _try(name: str, library: Path | None) -> Engine | str:
     if library is not None:
         environment[LIBRARY_VARIABLE] = str(library)
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", _PROBE, name],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=PROBE_SECONDS,
-            check=False,
-        )
+        command = [sys.executable, "-c", _PROBE, name]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_SECONDS)
     except subprocess.TimeoutExpired:
         return f"did not render within {PROBE_SECONDS} s"
     except OSError as error:
@@ -207,16 +204,16 @@ def _reason(code: int, stderr: str, library: Path | None) -> str:
 
 
 def _cache_key(names: tuple[str, ...], library: Path | None) -> str:
-    """Everything the answer depends on: a new Mitsuba, LLVM, driver or graphics card asks again."""
+    """Hash of everything the result depends on: Mitsuba, LLVM, driver, graphics card."""
     stamp = library.stat().st_mtime_ns if library is not None and library.exists() else None
     cards = sorted(path.name for path in Path("/dev").glob("nvidia[0-9]*"))
-    facts = [names, version("mitsuba"), version("drjit"), sys.executable, str(library), stamp]
+    facts: list[object] = [names, version("mitsuba"), version("drjit"), sys.executable, str(library), stamp]
     facts += [_cuda_driver(), cards, os.environ.get("CUDA_VISIBLE_DEVICES"), os.cpu_count()]
     return hashlib.sha256(json.dumps(facts).encode()).hexdigest()
 
 
 def _cache_file() -> Path | None:
-    """Where positive answers are kept, or None on an account without a home."""
+    """Where positive results are kept; None on an account without a home."""
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA")
     elif sys.platform == "darwin":
@@ -227,29 +224,22 @@ def _cache_file() -> Path | None:
 
 
 def _read_cache(key: str) -> Engine | None:
-    """The kept engine, or None; a cache that cannot be read or has another shape is simply asked again."""
-    file = _cache_file()
-    if file is None:
-        return None
-    try:
-        kept = json.loads(file.read_text(encoding="utf-8"))
-        return Engine(**kept["engine"]) if kept["key"] == key else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    """The kept engine; None where there is none, or the file cannot be read or has another shape."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        if file := _cache_file():
+            kept = json.loads(file.read_text(encoding="utf-8"))
+            return Engine(**kept["engine"]) if kept["key"] == key else None
+    return None
 
 
 def _write_cache(key: str, found: Engine) -> None:
-    file = _cache_file()
-    if file is None:
-        return
-    try:
-        write_text(file, json.dumps({"key": key, "engine": asdict(found)}))
-    except OSError:
-        return  # a read-only home costs the probe's seconds every time and nothing else
+    with suppress(OSError):  # a read-only home costs the probe's seconds every time, and nothing else
+        if file := _cache_file():
+            write_text(file, json.dumps({"key": key, "engine": asdict(found)}))
 
 
 def _kernel_cache_without_home() -> dict[str, str]:
-    """Dr.Jit keeps compiled kernels below HOME and stops where there is none: the variable that names another place."""
+    """Variable with a folder for compiled kernels, where HOME is missing: Dr.Jit stops without it."""
     if sys.platform == "win32" or "HOME" in os.environ or "DRJIT_CACHE_DIR" in os.environ:
         return {}
     return {"DRJIT_CACHE_DIR": str(Path(tempfile.gettempdir()) / f"drjit-{os.getuid()}")}

@@ -1,4 +1,4 @@
-"""What each artefact was made from, as one hash: where it changes, the artefact is stale."""
+"""Keys of arrays: hashes of everything that an array is made from. Where a key changes, the array is stale."""
 
 from __future__ import annotations
 
@@ -14,61 +14,53 @@ from lambent.core.files import sha256_of
 from lambent.scenes.scene import Environment, ImageEnvironment, Scene
 from lambent.scenes.textures import digest, parts
 
-REVISION = {
-    "geometry": 2,
-    "light_map": 4,
-    "irradiance": 1,
-    "environment": 1,
-    "probe": 4,
-}  # raised when a bake's result changes
+
+def key_of(what: str, revision: int, *inputs: object) -> str:
+    """SHA-256 of inputs: numbers, texts, arrays, nested. Raise `revision` where code changes what is made from them."""
+    result = hashlib.sha256(f"{what} {revision}".encode())
+    for one in inputs:
+        _update(result, one)
+    return result.hexdigest()
 
 
-def key_of(kind: str, *parts: object) -> str:
-    """Hash of an artefact kind and everything its content depends on: numbers, texts, arrays, nested."""
-    digest = hashlib.sha256(f"{kind} {REVISION[kind]}".encode())
-    for part in parts:
-        _update(digest, part)
-    return digest.hexdigest()
-
-
-def _update(digest: Any, part: object) -> None:
-    if isinstance(part, np.ndarray):
-        digest.update(f"{part.dtype} {part.shape}".encode())
-        digest.update(np.ascontiguousarray(part).tobytes())
+def _update(result: Any, one: object) -> None:
+    if isinstance(one, np.ndarray):
+        result.update(f"{one.dtype} {one.shape}".encode())
+        result.update(np.ascontiguousarray(one).tobytes())
     else:
-        digest.update(json.dumps(part, sort_keys=True, default=str).encode())
+        result.update(json.dumps(one, sort_keys=True, default=str).encode())
 
 
-def geometry_parts(scene: Scene) -> list[object]:
-    """All meshes, and how densely they want to be baked."""
-    parts: list[object] = []
+def geometry_inputs(scene: Scene) -> list[object]:
+    """All meshes, and their scale in the light map."""
+    inputs: list[object] = []
     for o in scene.objects:
         m = o.mesh
-        parts += [o.name, o.light_map_scale, m.positions, m.normals, m.tangents, m.uv, m.faces]
-    return parts
+        inputs += [o.name, o.light_map_scale, m.positions, m.normals, m.tangents, m.uv, m.faces]
+    return inputs
 
 
-def material_parts(scene: Scene) -> object:
-    """What the materials and their pictures do to light, by object: neither their names nor their provenance."""
+def material_inputs(scene: Scene) -> object:
+    """How each object scatters light; neither names nor provenance of materials."""
     look: dict[str, object] = {
         n: m.model_dump(mode="json", exclude={"name", "provenance"}) for n, m in scene.materials.items()
     }
     for name, textures in scene.textures.items():
-        pictures = {part: digest(texture) for part, texture in parts(textures).items()}
-        look[name] = [look.get(name), pictures, textures.cutoff]
+        images = {part: digest(texture) for part, texture in parts(textures).items()}
+        look[name] = [look.get(name), images, textures.cutoff]
     for name, file in scene.measured.items():
         look[name] = [look.get(name), sha256_of(file)]
     return [(o.name, look[o.material]) for o in scene.objects]
 
 
-def light_parts(scene: Scene) -> object:
+def light_inputs(scene: Scene) -> object:
     """Everything that emits."""
     emissions = [(o.name, o.emission) for o in scene.objects]
-    return [emissions, [(type(x).__name__, asdict(x)) for x in scene.lights], environment_part(scene.environment)]
+    return [emissions, [(type(x).__name__, asdict(x)) for x in scene.lights], environment_inputs(scene.environment)]
 
 
-def environment_part(environment: Environment | None) -> object:
-    """The environment; of a picture its content, not its place."""
+def environment_inputs(environment: Environment | None) -> object:
+    """The environment; an image counts by its content, wherever its file is."""
     if environment is None:
         return None
     values: Mapping[str, object] = asdict(environment)

@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,17 +42,17 @@ class Effort:
 
 FULL = Effort(quality_named("preview"))
 QUICK = Effort(
-    replace(
-        FULL.quality,
-        name="bench",
-        light_map_texels=96,
-        tile_texels=64,  # several tiles, so that there is a middle to stop in
-        light_map_samples=(8, 8),
-        gather_samples=8,
-        photons_per_texel=8,
-        environment_texels=64,
-        probe_texels=16,
-        probe_samples=4,
+    FULL.quality.changed(
+        "bench",
+        geometry={"texels": 96},
+        light_map={
+            "samples": (8, 8),
+            "gather_samples": 8,
+            "photons_per_texel": 8,
+            "tile_texels": 64,  # several tiles, so that there is a middle to stop in
+        },
+        environment={"texels": 64},
+        probe={"texels": 16, "samples": 4},
     )
 )
 
@@ -97,7 +97,7 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
 
 def row_of(scene: Scene, case: Case, effort: Effort, folder: Path) -> dict[str, Any]:
     """Time, noise and overhead of one artefact, baked in `folder`."""
-    quality = effort.quality if case.gathers else replace(effort.quality, gather_samples=0)
+    quality = effort.quality if case.gathers else effort.quality.changed(light_map={"gather_samples": 0})
     bakes = Bakes(scene, case, quality, folder)
     bakes.timed("whole")  # compiles the kernels
     whole, overhead = [], []
@@ -131,10 +131,10 @@ class Bakes:
     folder: Path
 
     def __post_init__(self) -> None:
-        from lambent.bake.bake import NEEDS
+        from lambent.bake.bake import found
 
-        if NEEDS[self.case.kind]:
-            self._bake("ready", only=NEEDS[self.case.kind])
+        if needs := found()[self.case.kind].NEEDS:
+            self._bake("ready", only=needs)
 
     def _bake(self, name: str, only: Sequence[str] = (), progress: Progress = silent, seed: int = 0) -> Store:
         from lambent.bake.bake import bake
@@ -207,8 +207,11 @@ def _size(store: Store, case: Case) -> tuple[int, int]:
 
 def _scaled(scene: Scene, effort: Effort, factor: float, folder: Path) -> dict[str, Any]:
     """Seconds of the main row at `factor` times its texels."""
+    from lambent.bake.artefacts import geometry
+
     case = next(case for case in CASES if case.artefact == MAIN)
-    texels = round(effort.quality.light_map_texels * factor**0.5)
-    bakes = Bakes(scene, case, replace(effort.quality, gather_samples=0, light_map_texels=texels), folder)
+    texels = round(effort.quality.settings("geometry", geometry.SETTINGS).texels * factor**0.5)
+    quality = effort.quality.changed(geometry={"texels": texels}, light_map={"gather_samples": 0})
+    bakes = Bakes(scene, case, quality, folder)
     runs = [bakes.timed("whole") for _ in range(effort.runs)]
     return {"texels": _size(runs[0][1], case)[0], "seconds": statistics.median(seconds for seconds, _ in runs)}

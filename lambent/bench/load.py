@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,6 @@ def _box(folder: Path, progress: Progress) -> Path:
     from lambent.bake.quality import quality_named
     from lambent.scenes import load_scene
 
-    coarse = replace(quality_named("preview"), name="coarse", light_map_texels=128, light_map_samples=(32, 32))
+    coarse = quality_named("preview").changed("coarse", geometry={"texels": 128})
     bake(load_scene("builtin:box"), folder, quality=coarse, progress=progress)
     return folder

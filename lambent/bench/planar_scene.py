@@ -104,7 +104,7 @@ def exact_reflection(
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.planar_reflection import ReflectionTracer
+    from lambent.bake.reference.planar_reflection import ReflectionTracer
 
     shapes, lamps = meshes(), {"lamp": LAMP}
     objects = tuple(SceneObject(n, mesh, PAINT, lamps.get(n, (0.0, 0.0, 0.0))) for n, mesh in shapes.items())

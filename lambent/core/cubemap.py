@@ -6,6 +6,8 @@ shape (6, N, N, C) uploaded layer by layer is read back by `textureSample(cube, 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,11 +25,14 @@ def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
     return np.asarray(np.take_along_axis(_on_all_faces(s, t), face[None, ..., None], axis=0)[0])
 
 
+def faces_at(s: Any, t: Any) -> list[tuple[Any, Any, Any]]:
+    """By face, x, y and z (the largest 1) at face coordinates s, t in [-1, 1], t downwards: arrays of any library."""
+    return [(1.0, -t, -s), (-1.0, -t, s), (s, 1.0, t), (s, -1.0, -t), (s, -t, 1.0), (-s, -t, -1.0)]
+
+
 def _on_all_faces(s: Floats, t: Floats) -> Floats:
     """(6, ..., 3) directions at s, t (...) of every face."""
-    one = np.ones_like(s)
-    faces = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
-    return np.stack([np.stack(face, axis=-1) for face in faces])
+    return np.stack([np.stack(np.broadcast_arrays(*face), axis=-1) for face in faces_at(s, t)])
 
 
 def texel_solid_angles(n: int) -> Floats:

@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 
 from lambent.bake.bake import bake
-from lambent.bake.goniophotometer import measure
 from lambent.bake.quality import Quality, quality_named
+from lambent.bake.reference.goniophotometer import measure
 from lambent.core.camera import Camera
 from lambent.core.colour import srgb_decode
 from lambent.core.files import write_text
@@ -78,7 +78,13 @@ class Effort:
     moving_frames: int = 16
 
 
-DRAFT = Quality("draft", 192, (16, 16), 0.5, 6, 128, 64, 8, gather_samples=64)
+DRAFT = quality_named("preview").changed(
+    "draft",
+    geometry={"texels": 192},
+    light_map={"samples": (16, 16), "noise": 0.5, "max_depth": 6, "gather_samples": 64},
+    environment={"texels": 128},
+    probe={"texels": 64, "samples": 8},
+)
 FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (720, 450), 5.0, 20, (840, 525), 48, 256)
 QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 3.0, 10, (420, 262), 32, 128, 4)
 
@@ -186,7 +192,9 @@ class Flow:
 
     def compare(self, scene: Scene) -> None:
         """One view by three methods: in motion (`rings`), at rest (`qmc`), and path traced."""
-        from lambent.bake.reference import render_reference  # imports Mitsuba, whose variant the bake has set
+        from lambent.bake.reference.path_traced import (
+            render_reference,  # imports Mitsuba, whose variant the bake has set
+        )
 
         effort, renderer, camera = self.effort, self._renderer, scene.cameras[0]
         state = FrameState(camera, *effort.compared)

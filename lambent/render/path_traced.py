@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from lambent.bake.bake import changed_inputs
 from lambent.bake.engine import engine
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.render.images import Images, Settings
-from lambent.store.source import scene_of
+from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 
 SPP = 64
@@ -33,7 +32,9 @@ class PathTraced(Images):
         engine()
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
-        from lambent.bake.reference import render_reference  # imports Mitsuba, whose variant `engine` has set
+        from lambent.bake.reference.path_traced import (
+            render_reference,  # imports Mitsuba, whose variant `engine` has set
+        )
 
         settings = self.settings
         spp = settings.samples or SPP

@@ -128,7 +128,7 @@ def _previews(
         engine()
     except UserError as error:
         return [page.note("No previews", [f"The measurement and the model are not shown on a ball: {error}"])]
-    from lambent.bake.material_preview import DAYLIGHT, preview
+    from lambent.bake.reference.material_preview import DAYLIGHT, preview
 
     seen = preview(table, material, environment or DAYLIGHT, progress=progress)
     file = getattr(environment, "file", None)

@@ -1,18 +1,84 @@
-"""Where the scene of a store is."""
+"""Where the scene of a store is, and the scene as it was baked."""
 
 from __future__ import annotations
 
+import logging
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
 from lambent.core.errors import UserError
+from lambent.core.files import sha256_of
 from lambent.scenes import load_scene
 from lambent.scenes.scene import Scene
+from lambent.store.contract import ObjectRecord, SceneRecord, scene_record
 from lambent.store.store import Store
+from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
+SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
+log = logging.getLogger(__name__)
+
+
+def inputs_of(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files a scene was read from, by file name."""
+    return {path.name: sha256_of(path) for path in (*scene.sources, *scene.measured.values())}
+
+
+def changed_inputs(store: Store, scene: Scene) -> list[str]:
+    """Names of the scene's files that have changed since the store was baked."""
+    now = inputs_of(scene)
+    return sorted(name for name in now.keys() | store.inputs.keys() if now.get(name) != store.inputs.get(name))
+
+
+def write_source(store: Store, scene: Scene) -> None:
+    """Note where the scene is; nothing where it was made in memory."""
+    place = scene.origin
+    if place is not None and not place.startswith("builtin:"):
+        place = Path(os.path.relpath(place, store.folder)).as_posix()
+    store.set_document(SOURCE, place)
 
 
 def scene_of(store: Store, given: str | None = None) -> Scene:
-    """The scene that a store was baked from: as given, else where it was when it was baked."""
+    """The scene that a store was baked from, with the materials and textures that it was baked with.
+
+    It is loaded from `given`, else from where it was when it was baked. A warning is logged where its geometry no
+    longer fits the store.
+
+    Raises
+    ------
+    UserError
+        Where the store does not know its scene and none is given, or the scene cannot be loaded.
+    """
     place = given or store.documents.get(SOURCE)
     if not isinstance(place, str):
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
-    return load_scene(place if given or place.startswith("builtin:") else str(store.folder / place))
+    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
+    record = scene_record(store)
+    baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
+    if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
+        _fits(parts, o.mesh.bounds, len(o.mesh.faces)) for parts, o in zip(baked.values(), scene.objects, strict=True)
+    ):
+        log.warning("%s: its scene %s has other geometry now than when it was baked", store.folder, place)
+    objects = (
+        replace(o, material=parts[0].material, emission=parts[0].emission) if (parts := baked[o.name]) else o
+        for o in scene.objects
+    )
+    materials = {**scene.materials, **record.materials}
+    return replace(scene, objects=tuple(objects), materials=materials, textures=read_textures(store, record))
+
+
+def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:
+    """What the store has of an object: itself, or the parts that it was cut into for its probes."""
+    return [o for o in record.objects if o.name == name or o.name.startswith(f"{name}.part")]
+
+
+def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int) -> bool:
+    """Whether the parts have so many faces, and these bounds."""
+    if sum(part.face_count for part in parts) != faces or not parts:
+        return False
+    lows, highs = zip(*(part.bounds for part in parts), strict=True)
+    both = np.array([np.min(lows, axis=0), np.max(highs, axis=0)])
+    return bool(np.allclose(both, np.array(bounds, float), rtol=SAME_M, atol=SAME_M))

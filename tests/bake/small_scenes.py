@@ -7,13 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.bake.quality import Quality
+from lambent.bake.quality import quality_named
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 
-TINY = Quality("tiny", 48, (64, 64), 0.0, 32, 16, 16, 16)
+TINY = quality_named("preview").changed(
+    "tiny",
+    geometry={"texels": 48},
+    light_map={"samples": (64, 64), "noise": 0.0, "max_depth": 32, "gather_samples": 0},
+    environment={"texels": 16},
+    probe={"texels": 16, "samples": 16},
+)
 GREY = Material(kd=0.5)
 MIRROR = Material(lobes=(Lobe(mx=0.01, my=0.01, r0=0.9),))
 BLACK = Material()

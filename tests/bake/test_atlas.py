@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.atlas import PIECE_FACES, merged, object_records, separated, unwrap
-from lambent.bake.texels import chart_labels, texels_of
+from lambent.bake.surfaces.atlas import PIECE_FACES, merged, object_records, separated, unwrap
+from lambent.bake.surfaces.texels import chart_labels, texels_of
 from lambent.scenes.geometry import sphere
 from lambent.scenes.scene import Scene, SceneObject
 from tests.bake.small_scenes import plane, room_with_step

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import drjit as dr
 import numpy as np
 
-from lambent.bake import atlas as atlases
-from lambent.bake.light_map import Sides, path_traced, tile_samples
-from lambent.bake.mitsuba_scene import SceneBuilder
-from lambent.bake.planes import _packed
-from lambent.bake.probe import MOST, Surroundings, _blocks_needed, bake_probe
-from lambent.bake.texels import texels_of
-from tests.bake.small_scenes import TINY, coloured_room
+from lambent.bake.light.sampling import path_traced, tile_samples
+from lambent.bake.probes.planes import _packed
+from lambent.bake.probes.probe import MOST, Surroundings, _blocks_needed, bake_probe
+from lambent.bake.surfaces import atlas as atlases
+from lambent.bake.surfaces.texels import Sides, texels_of
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from tests.bake.small_scenes import coloured_room
 
 
 def kernels(work: Callable[[], object]) -> set[str]:
@@ -34,10 +33,10 @@ def test_probes_of_any_centre_share_their_kernels() -> None:
 
 def test_tiles_of_any_number_of_texels_share_their_kernels() -> None:
     scene = coloured_room()
-    atlas = atlases.unwrap(scene, TINY.light_map_texels)
+    atlas = atlases.unwrap(scene, 48)
     texels = texels_of(atlases.merged(atlas), atlas.width, atlas.height)
     sides, built = Sides(texels, 1.0, np.ones(texels.face.shape, bool)), SceneBuilder(scene).build()
-    how = path_traced(replace(TINY, light_map_samples=(4, 4)))
+    how = path_traced((4, 4), 0.0, 32)
 
     def tile(size: int) -> Callable[[], object]:
         region = (slice(0, 2), slice(8, 8 + size), slice(8, 8 + size), slice(0, 4))

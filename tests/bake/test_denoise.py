@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.denoise import denoise, denoise_charts, fill, layers_of
+from lambent.bake.light.denoise import denoise, denoise_charts, fill, layers_of
 
 
 def test_gutters_take_what_is_next_to_them() -> None:

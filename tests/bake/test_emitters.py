@@ -8,9 +8,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from lambent.bake.emitters import FLOOR, balance_emitters
-from lambent.bake.mitsuba_scene import SceneBuilder
-from lambent.bake.reference import render_reference
+from lambent.bake.reference.path_traced import render_reference
+from lambent.bake.tracing.emitters import FLOOR, balance_emitters
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
 from lambent.scenes.scene import PointLight, Scene
 from tests.bake.small_scenes import GREY, plane

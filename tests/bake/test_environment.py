@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.environment import environment_cube
+from lambent.bake.sky.cube import environment_cube
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.images import write_image
@@ -27,7 +27,9 @@ def irradiance(cube: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path) -> None:
     sky = SunSky(tuple(SUN))
-    store = bake(replace(plane(), environment=sky), tmp_path / "s", quality=replace(TINY, light_map_samples=(128, 128)))
+    store = bake(
+        replace(plane(), environment=sky), tmp_path / "s", quality=TINY.changed(light_map={"samples": (128, 128)})
+    )
     raw = store.read("light_map/traced")
     traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum()
     assert irradiance(environment_cube(sky, 128), np.array([0, 1.0, 0])) == pytest.approx(traced, rel=0.02)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.goniophotometer import SPECIMENS, measure
+from lambent.bake.reference.goniophotometer import SPECIMENS, measure
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF

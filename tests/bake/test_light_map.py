@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.texels import texels_of
+from lambent.bake.surfaces.texels import texels_of
 from lambent.materials.document import Material
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight, SceneObject
 from lambent.store.store import Store
@@ -34,7 +34,7 @@ def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
 
 
 def test_gathering_keeps_the_light_and_lowers_its_noise(tmp_path: Path) -> None:
-    gathering = replace(TINY, gather_samples=64)
+    gathering = TINY.changed(light_map={"gather_samples": 64})
     store = bake(furnace(), tmp_path / "furnace", quality=gathering)
     assert known(store, "gathered").mean() == pytest.approx(np.pi, rel=4e-3)
     store = bake(room_with_step(), tmp_path / "room", quality=gathering)
@@ -82,7 +82,7 @@ def test_no_light_is_a_black_map(tmp_path: Path) -> None:
 
 
 def test_texels_within_a_solid_are_not_sampled_and_do_not_darken_their_neighbours(tmp_path: Path) -> None:
-    store = bake(room_with_step(), tmp_path / "s", quality=replace(TINY, light_map_texels=96))
+    store = bake(room_with_step(), tmp_path / "s", quality=TINY.changed(geometry={"texels": 96}))
     raw = store.read("light_map/traced")
     sampled = raw[..., 3].sum(axis=0) > 0
     black = raw[..., :3].sum(axis=(0, 3))[sampled] == 0

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake import material_preview
-from lambent.bake.material_preview import FOV_DEG, preview
+from lambent.bake.reference import material_preview
+from lambent.bake.reference.material_preview import FOV_DEG, preview
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise

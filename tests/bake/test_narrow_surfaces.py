@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.coverage import texel_areas
-from lambent.bake.quality import Quality
-from lambent.bake.texels import texels_of
+from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.texels import texels_of
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
-from tests.bake.small_scenes import BLACK
+from tests.bake.small_scenes import BLACK, TINY
 
 WIDE, LONG, HIGH, BEYOND, RADIANCE = 0.03, 3.0, 0.02, 1.0, 5.0  # metres; W/(sr m^2)
-QUALITY = Quality("narrow", 64, (512, 512), 0.0, 1, 16, 16, 16, photons_per_texel=256)
+QUALITY = TINY.changed(
+    "narrow", geometry={"texels": 64}, light_map={"samples": (512, 512), "max_depth": 1, "photons_per_texel": 256}
+)
 BLOCKS = 16
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.noise_map import noise_map, sampled_halves
+from lambent.bake.light.noise import noise_map
+from lambent.bake.light.sampling import sampled_halves
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, furnace
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.coverage import texel_areas
-from lambent.bake.photon_density import Kernel
-from lambent.bake.texels import Texels, texels_of
+from lambent.bake.photons.density import Kernel
+from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.texels import Texels, texels_of
 
 SIDE = 32  # texels
 FINE = 8  # times finer are the texels of the strip

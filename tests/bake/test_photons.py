@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.coverage import texel_areas
-from lambent.bake.texels import texels_of
+from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.texels import texels_of
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Material
@@ -19,7 +19,7 @@ from lambent.scenes.scene import DirectionalLight, ImageEnvironment, PointLight,
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, constant_picture, furnace, plane
 
-SMALL = replace(TINY, photons_per_texel=512, max_depth=48)
+SMALL = TINY.changed(light_map={"photons_per_texel": 512, "max_depth": 48})
 
 
 def photon_baked(scene: Scene, folder: Path) -> Store:
@@ -98,7 +98,7 @@ def test_low_lamp_far_from_the_origin_lights_the_floor_before_it(tmp_path: Path)
         SceneObject("strip", patch((far, 0, -1), (0, high, 0), (0, 0, 2)), "black", emission=(1, 1, 1)),
     )
     scene = Scene("low lamp", objects, {"black": Material()})
-    store = bake(scene, tmp_path / "s", quality=replace(SMALL, light_map_texels=96), light_map="photons")
+    store = bake(scene, tmp_path / "s", quality=SMALL.changed(geometry={"texels": 96}), light_map="photons")
     flux, area = store.read("light_map/photons")[:, 0, ..., 0].astype(float), areas(store)
     texels = texels_of(geometry_of(store), area.shape[1], area.shape[0])
     near, wanted = np.zeros(area.size, bool), np.zeros(area.size)
@@ -127,7 +127,7 @@ def test_no_light_is_a_black_map(tmp_path: Path) -> None:
 
 
 def test_interrupted_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
-    small = replace(SMALL, photons_per_texel=32)
+    small = SMALL.changed(light_map={"photons_per_texel": 32})
     whole = bake(furnace(), tmp_path / "whole", quality=small, light_map="photons", only=("light_map",))
 
     def stop(done: float, total: float, what: str) -> None:
@@ -144,7 +144,7 @@ def test_interrupted_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None
 
 
 def test_other_integrator_makes_the_map_anew(tmp_path: Path) -> None:
-    small = replace(TINY, photons_per_texel=8, light_map_samples=(4, 4))
+    small = TINY.changed(light_map={"photons_per_texel": 8, "samples": (4, 4)})
     first = bake(plane(), tmp_path / "s", quality=small, only=("light_map",))
     second = bake(plane(), tmp_path / "s", quality=small, light_map="photons", only=("light_map",))
     found = [store.artefact("light_map/irradiance") for store in (first, second)]

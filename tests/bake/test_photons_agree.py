@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.coverage import texel_areas
-from lambent.bake.texels import texels_of
+from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.texels import texels_of
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.gonio_text import write_gonio
@@ -21,7 +21,9 @@ from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY, TINY, turned_inwards
 
-QUALITY = replace(TINY, light_map_texels=40, light_map_samples=(128, 128), max_depth=6, photons_per_texel=512)
+QUALITY = TINY.changed(
+    geometry={"texels": 40}, light_map={"samples": (128, 128), "max_depth": 6, "photons_per_texel": 512}
+)
 SATIN = Material(name="satin", kd=(0.1, 0.05, 0.02), lobes=(Lobe(mx=0.2, my=0.2, k=0.9, r0=(0.8, 0.6, 0.4)),))
 
 
@@ -93,7 +95,7 @@ def test_measured_table_throws_the_same_light_by_photons_and_by_paths(tmp_path: 
 
 
 def test_gathering_counts_the_table_once(tmp_path: Path, table: Path) -> None:
-    quality = replace(QUALITY, light_map_samples=(64, 64), gather_samples=32)
+    quality = QUALITY.changed(light_map={"samples": (64, 64), "gather_samples": 32})
     satin = replace(room(table), materials={"grey": GREY, "black": Material(), "satin": SATIN})
     store = bake(satin, tmp_path / "s", quality=quality, only=("light_map",))
     traced, gathered = (store.read(f"light_map/{stage}").astype(float) for stage in ("traced", "gathered"))

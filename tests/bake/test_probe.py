@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.mitsuba_scene import SceneBuilder
-from lambent.bake.planes import bounding_planes
-from lambent.bake.probe_centre import flat_axis, probe_centre
-from lambent.bake.reference import render_reference
+from lambent.bake.probes.centre import flat_axis, probe_centre
+from lambent.bake.probes.planes import bounding_planes
+from lambent.bake.reference.path_traced import render_reference
+from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
@@ -63,7 +63,7 @@ def test_probe_agrees_with_path_traced_views(tmp_path: Path) -> None:
     scene = room_with_step()
     small = SceneObject("ball", placed(sphere(0.02, 16, 8), (-0.8, 0.5, 0)), "mirror")  # casts next to no shadow
     scene = replace(scene, objects=(*scene.objects[:-1], small))
-    quality = replace(TINY, light_map_texels=128, probe_texels=32, probe_samples=32)
+    quality = TINY.changed(geometry={"texels": 128}, probe={"texels": 32, "samples": 32})
     store = bake(scene, tmp_path / "s", quality=quality)
     radiance = store.read("probe/ball/radiance").astype(float)
     centre = np.array(store.artefact("probe/ball/radiance").meta["centre"])
@@ -168,7 +168,7 @@ def test_a_coupled_wall_darkens_towards_grazing() -> None:
     """The cached light of a wall is kd t(cos_o) E/pi; the other wall's is kd E/pi."""
     import mitsuba as mi
 
-    from lambent.bake.probe import LightMapCache
+    from lambent.bake.light.cache import LightMapCache
 
     walls = tuple(SceneObject(name, patch((x, 0, 0), (1, 0, 0), (0, 1, 0)), name) for x, name in ((0, "a"), (5, "b")))
     uv2 = {wall.name: np.full((len(wall.mesh.positions), 2), 0.5) for wall in walls}

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.probe_modes import Mirrored, basis_of, by_distance, by_planes, error, irradiance_of, open_share
+from lambent.bake.probes.selection import (
+    Mirrored,
+    basis_of,
+    by_distance,
+    by_planes,
+    error,
+    irradiance_of,
+    specular_occlusion,
+)
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
@@ -24,7 +32,7 @@ PAINT = Material(kd=0.5, lobes=(Lobe(distribution="ggx", mx=0.2, my=0.2, r0=0.04
 def rays(**given: object) -> Mirrored:
     one = np.array([[0.0, 0.0, 1.0]])
     values = {"origins": 0 * one, "directions": one, "normals": one, "radiance": one * 0 + 1.0}
-    scalars = {"irradiance": np.ones(1), "share": np.ones(1), "own": np.zeros(1, bool)}
+    scalars = {"irradiance": np.ones(1), "fresnel": np.ones(1), "own": np.zeros(1, bool)}
     return Mirrored(**{**values, **scalars, **given})
 
 
@@ -44,7 +52,9 @@ def test_error_and_share_by_hand() -> None:
     assert error(rays(), np.ones(1)) == pytest.approx(0, abs=1e-4)
     assert error(rays(), np.full(1, 3.0)) == pytest.approx(np.log(2), abs=1e-3)  # log((1 + 3)/(1 + 1))
     whole = np.array([4.0, *[0] * 8])
-    assert open_share(rays(), whole) == pytest.approx(0.25) and open_share(rays(), whole / 100) == pytest.approx(1)
+    assert specular_occlusion(rays(), whole) == pytest.approx(0.25) and specular_occlusion(
+        rays(), whole / 100
+    ) == pytest.approx(1)
 
 
 def test_planes_turn_the_look_up_as_the_renderer_does() -> None:
@@ -94,7 +104,7 @@ def well(folder: Path) -> Scene:
 def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
     scene = well(tmp_path)
     scene = replace(scene, objects=scene.objects[:1])
-    store = bake(scene, tmp_path / "s", quality=replace(TINY, light_map_samples=(256, 256)))
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"samples": (256, 256)}))
     meta = store.artefact("probe/well/radiance").meta
     if meta["object_left_out"]:  # then the probe sees the sky alone
         assert meta["seen_irradiance"][0] == pytest.approx(np.pi, rel=0.01)

@@ -11,7 +11,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
-from lambent.bake.solids import is_closed
+from lambent.bake.tracing.solids import is_closed
 from lambent.core.cubemap import texel_solid_angles
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
@@ -43,7 +43,7 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     colours = {}
     for name in parts:
         radiance = store.read(f"probe/{name}/radiance").astype(float)
-        colours[name] = (radiance * texel_solid_angles(TINY.probe_texels)[..., None]).sum(axis=(0, 1, 2))
+        colours[name] = (radiance * texel_solid_angles(radiance.shape[1])[..., None]).sum(axis=(0, 1, 2))
     red, blue = (max(colours.values(), key=lambda c: c[k] / c.sum()) for k in (0, 2))
     assert red[0] > 5 * red[2] and blue[2] > 2 * blue[0], "each sees its own room"
     ball = store.artefact("probe/ball/radiance").meta
@@ -65,14 +65,14 @@ def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixtur
 
 def test_parts_of_a_solid_are_solid() -> None:
     engine()
-    from lambent.bake.probe_parts import split
-    from lambent.bake.solids import SolidTest
+    from lambent.bake.probes.division import split
+    from lambent.bake.tracing.solids import SolidTest
 
     scene = two_rooms()
     faces = len(scene.object("bar").mesh.faces)
     cut = split(scene, {"bar": "0" * (faces // 2) + "1" * (faces - faces // 2)})
     assert not is_closed(cut.object("bar.part1").mesh)
-    from lambent.bake.mitsuba_scene import SceneBuilder
+    from lambent.bake.tracing.scene_builder import SceneBuilder
 
     builder = SceneBuilder(cut)
     within = SolidTest(builder, builder.build()).embedded(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))
@@ -82,14 +82,14 @@ def test_parts_of_a_solid_are_solid() -> None:
 def test_traced_probe_of_the_furnace_has_radiance_one(tmp_path: Path) -> None:
     ball = SceneObject("ball", sphere(0.03, 16, 8), "mirror")  # takes next to nothing away
     scene = replace(furnace(), objects=(*furnace().objects, ball), materials={"grey": GREY, "mirror": MIRROR})
-    store = bake(scene, tmp_path / "s", quality=replace(TINY, probe_samples=128), probes="traced")
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(probe={"samples": 128}), probes="traced")
     radiance = store.read("probe/ball/radiance").astype(float)
     assert radiance.mean() == pytest.approx(1.0, rel=0.01)
     assert store.artefact("probe/ball/radiance").meta["traced"]
 
 
 def test_traced_and_cached_probes_agree(tmp_path: Path) -> None:
-    quality = replace(TINY, probe_samples=256, light_map_texels=96)
+    quality = TINY.changed(probe={"samples": 256}, geometry={"texels": 96})
     cached = bake(room_with_step(), tmp_path / "s", quality=quality)
     one = cached.read("probe/ball/radiance").astype(float)
     other = bake(room_with_step(), tmp_path / "s", quality=quality, probes="traced").read("probe/ball/radiance")

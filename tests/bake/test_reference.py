@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.reference import render_reference
+from lambent.bake.reference.path_traced import render_reference
 from lambent.core.camera import Camera
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject

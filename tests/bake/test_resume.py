@@ -12,16 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake, changed_inputs
+from lambent.bake.bake import bake
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
 from lambent.store.contract import scene_record
+from lambent.store.source import changed_inputs
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, room_with_step
 
-TILED = replace(TINY, light_map_texels=300, light_map_samples=(32, 32), gather_samples=8)  # 2 x 2 tiles
+TILED = TINY.changed(geometry={"texels": 300}, light_map={"samples": (32, 32), "gather_samples": 8})  # 2 x 2 tiles
 BAKE = """
 import sys
 from dataclasses import replace

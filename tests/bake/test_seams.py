@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.bake.seams import blend_seams
-from lambent.bake.texels import BEYOND, POINTS, Texels
+from lambent.bake.light.seams import blend_seams
+from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
 
 N, GAP = 20, 4
 

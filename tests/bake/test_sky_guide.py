@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from lambent.bake import paths
-from lambent.bake.emitters import balance_emitters
 from lambent.bake.engine import engine
-from lambent.bake.mitsuba_scene import SceneBuilder, environment_dict
-from lambent.bake.sky_bins import BINS, SUB, SkyBins, alias_tables
+from lambent.bake.sky.bins import BINS, SUB, SkyBins, alias_tables
+from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.images import write_image
 from lambent.scenes.geometry import merge, patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, Scene, SceneObject
@@ -63,8 +63,10 @@ def irradiance(scene: object, at: tuple[float, float, float], n: int, seed: int 
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, n)
     up = mi.Vector3f(0, 1, 0) + dr.zeros(mi.Vector3f, n)
-    points = paths.Points(mi.Point3f(*at) + dr.zeros(mi.Point3f, n), up, up)
-    return np.array(paths.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 1))[1].astype(float)
+    points = path_tracer.Points(mi.Point3f(*at) + dr.zeros(mi.Point3f, n), up, up)
+    return np.array(path_tracer.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 1))[1].astype(
+        float
+    )
 
 
 def form_factor(x: float, z: float) -> float:

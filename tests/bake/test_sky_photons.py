@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.photon_map import BATCHES, FEWEST, shot_of
-from lambent.bake.photons import learnt_sky, shoot
+from lambent.bake.photons.maps import BATCHES, FEWEST, shot_of
+from lambent.bake.photons.shooting import learnt_sky, shoot
 from lambent.scenes.scene import ConstantEnvironment
 from lambent.store.store import Store
 from tests.bake.small_scenes import TINY, furnace
 from tests.bake.test_sky_guide import HALF, built, pit, sunny
 
-SMALL = replace(TINY, photons_per_texel=64, max_depth=8)
+SMALL = TINY.changed(light_map={"photons_per_texel": 64, "max_depth": 8})
 
 
 def shot(store: Store) -> np.ndarray:
@@ -38,7 +38,6 @@ def test_window_lets_in_the_flux_of_its_area(tmp_path: Path) -> None:
 
 
 def test_landing_places_bring_the_same_light_as_the_disc(tmp_path: Path) -> None:
-    from lambent.bake.photons import Bins
 
     scene = pit(sunny(tmp_path))
     scene = replace(scene, materials={"black": scene.materials["black"].model_copy(update={"kd": (0.5, 0.5, 0.5)})})
@@ -47,16 +46,16 @@ def test_landing_places_bring_the_same_light_as_the_disc(tmp_path: Path) -> None
     builder.meshes["pit"].add_attribute("vertex_uv2", 3, np.zeros(3 * len(mesh.positions), np.float32))
     sky = learnt_sky(scene, whole, np.ones((1, 1)), 4)
     assert sky is not None
-    bins, flux = Bins(1, 1, 2), {}
+    shape, flux = (2, 1, 1), {}
     for name, drawn_by in (("landing", sky), ("disc", None)):
-        flux[name] = np.array([shoot(whole, bins, 1 << 16, 4, seed, drawn_by)[:, 0, 0, 1] for seed in range(8)])
+        flux[name] = np.array([shoot(whole, shape, 1 << 16, 4, seed, drawn_by)[:, 0, 0, 1] for seed in range(8)])
     means = [f.mean(axis=0) for f in flux.values()]
     error = np.sqrt(sum(f.var(axis=0, ddof=1) / len(f) for f in flux.values()))
     assert np.all(np.abs(means[0] - means[1]) < 4.5 * error), "on either side"
 
 
 def test_photons_stop_at_the_noise(tmp_path: Path) -> None:
-    quality = replace(SMALL, light_map_noise=1.0)
+    quality = SMALL.changed(light_map={"noise": 1.0})
     few = bake(furnace(), tmp_path / "few", quality=quality, light_map="photons", only=["light_map"])
     assert len(shot(few)) == FEWEST
     assert 0 < few.artefact("light_map/irradiance").meta["noise"] <= 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.table_plugin import table_dict
+from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.chi_square import chi_square

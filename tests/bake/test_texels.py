@@ -7,10 +7,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from lambent.bake import paths
-from lambent.bake.coverage import placed, texel_areas
 from lambent.bake.engine import engine
-from lambent.bake.texels import POINTS, Texels, texels_of
+from lambent.bake.surfaces.coverage import placed, texel_areas
+from lambent.bake.surfaces.texels import POINTS, Texels, texels_of
+from lambent.bake.tracing import rays
 from lambent.scenes.geometry import box, patch, sphere
 from lambent.scenes.geometry import placed as moved
 from lambent.scenes.scene import Mesh
@@ -121,7 +121,7 @@ def test_rays_leave_their_surface(name: str) -> None:
     normal = normal[face] / np.linalg.norm(normal[face], axis=1, keepdims=True)
     p, up = (mi.Vector3f(*np.ascontiguousarray(a.T, dtype=np.float32)) for a in (point, normal))
     local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(*rng.random((2, n)).astype(np.float32)))
-    hit = scene.ray_test(paths.leaving(scene, p, up, mi.Frame3f(up).to_world(local)))
+    hit = scene.ray_test(rays.leaving(scene, p, up, mi.Frame3f(up).to_world(local)))
     assert not np.array(hit).any()
-    onto = scene.ray_test(paths.leaving(scene, p + 0.01 * up, up, -up))
+    onto = scene.ray_test(rays.leaving(scene, p + 0.01 * up, up, -up))
     assert np.array(onto).mean() > 0.999 and dr.width(onto) == n

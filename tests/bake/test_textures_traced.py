@@ -34,7 +34,7 @@ def constant(*values: float) -> Texture:
 
 
 def test_pictures_are_seen_unmirrored_and_upright() -> None:
-    from lambent.bake.reference import render_reference
+    from lambent.bake.reference.path_traced import render_reference
 
     picture = Texture(np.repeat(LETTER[..., None], 3, axis=2))
     sun = DirectionalLight((0.0, 0.0, -1.0), (2 * np.pi,) * 3)
@@ -47,7 +47,7 @@ def test_pictures_are_seen_unmirrored_and_upright() -> None:
 
 def test_a_uv_transform_repeats_and_shifts() -> None:
     """The texel shown at (u, v) is the picture's at M (u, v, 1)."""
-    from lambent.bake.reference import render_reference
+    from lambent.bake.reference.path_traced import render_reference
 
     picture = np.zeros((2, 2, 3), np.float16)
     picture[1, 0] = 1  # lower left
@@ -64,7 +64,7 @@ def test_numbers_and_frame_equal_a_material_that_has_them(side: float) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from lambent.bake.material_plugin import material_dict, register_material_plugin
+    from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 
     register_material_plugin()
     material = Material(kd=(0.2, 0.3, 0.4), kt_d=0.1, lobes=(GLOSS,))
@@ -108,7 +108,7 @@ def test_bumpy_samples_follow_their_density(part: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from lambent.bake.material_plugin import material_dict, register_material_plugin
+    from lambent.bake.bsdfs.material_plugin import material_dict, register_material_plugin
 
     register_material_plugin()
     material = Material(kd=0.5) if part == "kd" else Material(lobes=(GLOSS,))
@@ -151,25 +151,25 @@ def test_a_screen_casts_the_shadow_of_its_checks(tmp_path) -> None:
     """Sun from straight above: the floor's irradiance is the sun's, or nothing, check by check."""
     import mitsuba as mi
 
-    from lambent.bake import paths
-    from lambent.bake.mitsuba_scene import SceneBuilder
+    from lambent.bake.tracing import path_tracer
+    from lambent.bake.tracing.scene_builder import SceneBuilder
 
     scene = SceneBuilder(screened(DirectionalLight((0.0, -1.0, 0.0), (3.0, 3.0, 3.0)))).build()
     centre = (np.arange(8) + 0.5) / 8 - 0.5
     x, z = (a.ravel() for a in np.meshgrid(centre, centre))  # rows follow z, which is down the picture
     up = mi.Vector3f(0, 1, 0)
-    points = paths.Points(mi.Vector3f(x, np.zeros(64), z), up, up)
+    points = path_tracer.Points(mi.Vector3f(x, np.zeros(64), z), up, up)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(0, 64)
-    e = paths.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 4)
+    e = path_tracer.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 4)
     np.testing.assert_allclose(np.array(e.x).reshape(8, 8), 3 * (1 - SCREEN[..., 0]), rtol=1e-5)
 
 
 def test_light_through_a_screen_is_half_and_a_whole_one_lets_none_through(tmp_path) -> None:
     """Irradiance of a lamp high above, over the floor's middle: half of what it is without the screen."""
     lamp = PointLight((0.0, 50.0, 0.0), (2500.0,) * 3)
-    _, half = floor_map(screened(lamp), tmp_path / "a", replace(TINY, light_map_samples=(16, 16)))
-    _, none = floor_map(screened(lamp, opaque=1.0), tmp_path / "b", replace(TINY, light_map_samples=(16, 16)))
+    _, half = floor_map(screened(lamp), tmp_path / "a", TINY.changed(light_map={"samples": (16, 16)}))
+    _, none = floor_map(screened(lamp, opaque=1.0), tmp_path / "b", TINY.changed(light_map={"samples": (16, 16)}))
     lit = half[..., 1][half[..., 1] > 0]
     assert none[..., 1].max() == pytest.approx(1.0, rel=0.05)  # the screen's own upper side
     assert (none[..., 1] > 0).mean() < 0.6 * (half[..., 1] > 0).mean() + 0.2
@@ -179,7 +179,7 @@ def test_light_through_a_screen_is_half_and_a_whole_one_lets_none_through(tmp_pa
 def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> None:
     """A wall whose halves' normals lean to the left and to the right, between a lamp and a lit wall."""
     from lambent.bake.bake import bake
-    from lambent.bake.reference import render_reference
+    from lambent.bake.reference.path_traced import render_reference
     from lambent.realtime.device import open_device
     from lambent.realtime.frame_state import FrameState
     from lambent.realtime.renderer import Renderer
@@ -192,7 +192,7 @@ def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> No
     shade = SceneObject("shade", patch((0.52, -0.5, 0), (0, 0, 0.5), (0, 1, 0)), "grey")
     grey = scene.materials | {"grey": Material(kd=0.8)}
     scene = replace(scene, objects=(*scene.objects, shade), materials=grey)
-    store = bake(scene, tmp_path / "s", quality=replace(TINY, gather_samples=64), only={"light_map"})
+    store = bake(scene, tmp_path / "s", quality=TINY.changed(light_map={"gather_samples": 64}), only={"light_map"})
     drawn = Renderer(open_device(), store).image(FrameState(ABOVE, 32, 32))
     traced, _ = render_reference(scene, ABOVE, 32, 32, 256)
     halves = (slice(4, 28), slice(3, 13)), (slice(4, 28), slice(19, 29))
@@ -206,7 +206,7 @@ def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> No
 def test_a_changed_picture_bakes_light_again_and_geometry_not(tmp_path) -> None:
     sun = DirectionalLight((0.0, -1.0, 0.0), (3.0, 3.0, 3.0))
     scene = screened(sun)
-    quality = replace(TINY, light_map_samples=(2, 2))
+    quality = TINY.changed(light_map={"samples": (2, 2)})
     first = {a.name: a.key for a in floor_map(scene, tmp_path, quality)[0].artefacts()}
     changed = replace(scene, textures={"screen": MaterialTextures(opacity=constant(1.0))})
     again = {a.name: a.key for a in floor_map(changed, tmp_path, quality)[0].artefacts()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import mitsuba as mi
@@ -10,9 +9,9 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.bake.mitsuba_scene import SceneBuilder
-from lambent.bake.texels import BEYOND, POINTS, Texels
-from lambent.bake.viewers import seen, viewing_places, without_hidden
+from lambent.bake.surfaces.texels import BEYOND, POINTS, Texels
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
 from lambent.core.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
@@ -61,7 +60,7 @@ def looked_up(store, point: np.ndarray, name: str) -> float:
 
 
 def test_light_from_above_the_ceiling_does_not_leak_down_the_wall(tmp_path: Path) -> None:
-    store = bake(house(tmp_path), tmp_path / "s", quality=replace(TINY, light_map_texels=64))
+    store = bake(house(tmp_path), tmp_path / "s", quality=TINY.changed(geometry={"texels": 64}))
     inner = [np.array([x, SIDE - 1e-3, 0.0]) for x in np.linspace(0.1, 1.9, 13)]
     assert np.allclose([looked_up(store, p, "back") for p in inner], np.pi, rtol=0.1)
     corner = [np.array([x, 0.0, 1e-3]) for x in np.linspace(0.1, 1.9, 13)]

@@ -10,7 +10,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from lambent.bake.quality import Quality
+from lambent.bake.quality import quality_named
 from lambent.core.images import read_encoded
 from lambent.core.progress import Cancelled
 from lambent.demo.flow import SPECIMEN_OF, STILLS, Effort, Flow
@@ -18,7 +18,13 @@ from lambent.materials.document import load_material
 from lambent.store.store import Store
 
 TINY = Effort(
-    quality=Quality("tiny", 64, (4, 4), 1.0, 4, 32, 16, 4, gather_samples=8),
+    quality=quality_named("preview").changed(
+        "tiny",
+        geometry={"texels": 64},
+        light_map={"samples": (4, 4), "noise": 1.0, "max_depth": 4, "gather_samples": 8},
+        environment={"texels": 32},
+        probe={"texels": 16, "samples": 4},
+    ),
     tuples=2000,
     still=(160, 100),
     still_frames=2,

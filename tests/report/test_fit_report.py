@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from lambent.bake import engine as engine_module
-from lambent.bake import material_preview
+from lambent.bake.reference import material_preview
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material

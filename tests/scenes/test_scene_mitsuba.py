@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.engine import engine
-from lambent.bake.mitsuba_scene import SceneBuilder, environment_dict
+from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.camera import camera_axes
 from lambent.core.directions import normalize
 from lambent.core.images import write_image

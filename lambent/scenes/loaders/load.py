@@ -7,6 +7,7 @@ recognise(head), which tells a scene by its first bytes.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -42,8 +43,9 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     UserError
         Where there is no such scene, or its file cannot be used.
     """
-    scene = _load(path_or_builtin)
-    return replace(scene, warnings=(*scene.warnings, *size_warnings(scene)))
+    scene, text = _load(path_or_builtin), str(path_or_builtin)
+    origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
+    return replace(scene, warnings=(*scene.warnings, *size_warnings(scene)), origin=origin)
 
 
 def _load(path_or_builtin: str | Path) -> Scene:

@@ -1,0 +1,43 @@
+"""The environment as a cube map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import environment_inputs, key_of
+from lambent.bake.quality import QualityName
+
+KIND = "environment"
+NEEDS = ()
+REVISION = 1
+RADIANCE = "environment/radiance"
+BLACK_TEXELS = 16  # along a side, where there is no environment
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`texels` along a side of a cube's face."""
+
+    texels: int
+
+
+SETTINGS = {QualityName.preview: Settings(256), QualityName.normal: Settings(512), QualityName.final: Settings(1024)}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    inputs = environment_inputs(context.scene.environment)
+    return {RADIANCE: key_of(KIND, REVISION, context.settings(KIND).texels, inputs)}
+
+
+def bake(context: BakeContext) -> None:
+    environment = context.scene.environment
+    if environment:
+        engine()  # before Mitsuba is imported
+    from lambent.bake.sky.cube import environment_cube
+
+    context.progress(0, 1, "environment")
+    cube = environment_cube(environment, context.settings(KIND).texels if environment else BLACK_TEXELS)
+    context.put(KIND, RADIANCE, cube)
+    context.progress(1, 1, "environment")

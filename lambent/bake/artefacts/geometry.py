@@ -1,0 +1,67 @@
+"""Meshes with the coordinates of their light map, the textures on them, and the scene record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lambent.bake.context import GEOMETRY, BakeContext
+from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.quality import QualityName
+from lambent.bake.surfaces.atlas import merged, object_records, unwrap
+from lambent.core.plain import triple
+from lambent.scenes.reflectors import Reflector, find_reflectors
+from lambent.scenes.scene import Scene
+from lambent.store.contract import ReflectorPart, ReflectorRecord, SceneRecord, write_scene_record
+from lambent.store.plans import plan_record
+from lambent.store.textures import texture_records, write_textures
+
+KIND = "geometry"
+NEEDS = ()
+REVISION = 2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`texels` along a side of the light map, about."""
+
+    texels: int
+
+
+SETTINGS = {QualityName.preview: Settings(448), QualityName.normal: Settings(1024), QualityName.final: Settings(2048)}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    key = key_of(KIND, REVISION, context.settings(KIND).texels, *geometry_inputs(context.scene))
+    return {f"geometry/{name}": key for name in GEOMETRY}
+
+
+def bake(context: BakeContext) -> None:
+    atlas = unwrap(context.scene, context.settings(KIND).texels, context.progress)
+    meta = {"light_map_size": [atlas.width, atlas.height]}
+    for name, array in merged(atlas).items():
+        context.put(KIND, f"geometry/{name}", array, meta)
+
+
+def describe(context: BakeContext) -> None:
+    """Write the textures and the scene record: cameras may change, and geometry stay."""
+    write_textures(context.store, context.scene.textures)
+    write_scene_record(context.store, scene_record_of(context.scene))
+
+
+def scene_record_of(scene: Scene) -> SceneRecord:
+    """The scene but for its arrays."""
+    low, high = scene.bounds
+    return SceneRecord(
+        name=scene.name, objects=object_records(scene), materials=dict(scene.materials), cameras=scene.cameras,
+        paths=scene.paths, reflectors=tuple(map(_reflector_record, find_reflectors(scene))),
+        exposure_ev=scene.exposure_ev, bounds=(triple(low), triple(high)), warnings=scene.warnings,
+        textures=texture_records(scene.textures),
+    )  # fmt: skip
+
+
+def _reflector_record(r: Reflector) -> ReflectorRecord:
+    parts = (ReflectorPart(object=p.object, faces=tuple(map(int, p.faces)), area_m2=p.area_m2) for p in r.parts)
+    return ReflectorRecord(
+        plane=r.plane, outline=tuple(map(triple, r.outline)), deviation_m=r.deviation_m, two_sided=r.two_sided,
+        plan=None if r.plan is None else plan_record(r.plan), parts=tuple(parts),
+    )  # fmt: skip

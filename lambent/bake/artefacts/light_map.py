@@ -1,0 +1,222 @@
+"""The light map: irradiance of both sides of surfaces, its noise, and the dominant direction of its light.
+
+The samples stay in the store as `light_map/traced`, `gathered`, `photons` and `leaning`: an interrupted bake continues
+from them, and the noise is found from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of, light_inputs, material_inputs
+from lambent.bake.methods import LightMapMethod
+from lambent.bake.quality import QualityName
+from lambent.bake.tiles import run_tiles
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
+
+if TYPE_CHECKING:
+    from lambent.bake.light.sampling import Sampling
+    from lambent.bake.photons.maps import PhotonMap
+
+KIND = "light_map"
+NEEDS = ("geometry",)
+REVISION, REVISION_OF_IRRADIANCE = 4, 1
+IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
+NOISE = tuple(noise_name(side) for side in SIDES)
+TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
+PHOTONS, MOMENTS = "light_map/photons", "light_map/leaning"
+SIGNS = (1.0, -1.0)  # of the normal, by side
+Maps = list[tuple[Floats, dict[str, float]]]  # by side: irradiance (H, W, 3), and what to note of it
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Samples per texel, and bounces.
+
+    Tiles get path traced samples until their relative noise (root mean square, before denoising) is below `noise`,
+    within the bounds `samples`. With `gather_samples`, that map only lights the first bounce of a second, final map: it
+    gathers that many samples per texel, or as many as bring a tile below `gather_noise`, at a fraction of the noise.
+    Photons take `photons_per_texel`, on average over the map, and gather nothing.
+    Maps are sampled and kept in tiles of `tile_texels` per side, the most that an interruption costs.
+    """
+
+    samples: tuple[int, int]
+    noise: float
+    max_depth: int
+    gather_samples: int = 0
+    photons_per_texel: int = 64
+    gather_noise: float = 0.0
+    tile_texels: int = 256
+
+
+SETTINGS = {
+    QualityName.preview: Settings((32, 32), 0.30, 8, gather_samples=128),
+    QualityName.normal: Settings((64, 192), 0.15, 12, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
+    QualityName.final: Settings((256, 8192), 0.015, 24, photons_per_texel=4096),
+}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    """Irradiance, its noise and the dominant direction have a key of their own: they are filtered, samples are not."""
+    how: Settings = context.settings(KIND)
+    effort: list[object] = [how.samples, how.noise, how.gather_samples, how.gather_noise]
+    effort += [how.tile_texels, how.max_depth, context.seed]
+    if _by_photons(context):
+        effort.append([LightMapMethod.photons, how.photons_per_texel])
+    geometry = context.keys("geometry")["geometry/positions"]
+    samples = key_of(KIND, REVISION, geometry, material_inputs(context.scene), light_inputs(context.scene), effort)
+    filtered = key_of("irradiance", REVISION_OF_IRRADIANCE, samples)
+    count = _sides(context)
+    names = [*IRRADIANCE[:count], *NOISE[:count]]
+    raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
+    if _bumpy_faces(context).any():
+        names.append(DOMINANT_DIRECTION)
+        raw.append(MOMENTS)
+    return dict.fromkeys(raw, samples) | dict.fromkeys(names, filtered)
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    stale = context.stale(KIND)
+    if stale - {DOMINANT_DIRECTION, MOMENTS, *NOISE}:
+        maps = _photon_maps(context) if _by_photons(context) else _sampled_maps(context)
+        for name, (irradiance, meta) in zip(IRRADIANCE, maps, strict=False):
+            note = context.provenance(integrator=context.methods["light_map"], **meta)
+            context.put(KIND, name, irradiance, note)
+    if stale & {DOMINANT_DIRECTION, MOMENTS}:
+        _dominant_direction(context)
+    if stale & set(NOISE):
+        _noise(context)
+
+
+def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
+    """The light map (H, W, 3) of both sides in the store; None where no surface is two-sided."""
+    front, *back = (context.store.read(name) for name in IRRADIANCE[: _sides(context)])
+    return front, back[0] if back else None
+
+
+def _by_photons(context: BakeContext) -> bool:
+    return context.methods["light_map"] == LightMapMethod.photons
+
+
+def _sides(context: BakeContext) -> int:
+    return 2 if any(context.two_sided) else 1
+
+
+def _stages(how: Settings) -> tuple[str, ...]:
+    """The samples of path traced maps, the last being those of the final one."""
+    return (TRACED, GATHERED) if how.gather_samples else (TRACED,)
+
+
+def _of_side(stage: str, side: int) -> str:
+    return f"{stage}_back" if side else stage
+
+
+def _bumpy_faces(context: BakeContext) -> Flags:
+    """(T,) faces with a normal map."""
+    bumpy = {name for name, textures in context.scene.textures.items() if textures.normal}
+    objects = context.scene.objects
+    return np.repeat([o.material in bumpy for o in objects], [len(o.mesh.faces) for o in objects])
+
+
+def _sampled_maps(context: BakeContext) -> Maps:
+    from lambent.bake.light.cache import LightMapCache
+    from lambent.bake.light.sampling import finished, gathered, path_traced
+
+    def maps(stage: str, sampling: Sampling) -> Maps:
+        found = []
+        for side in range(_sides(context)):
+            raw, labels = _samples(context, stage, side, sampling)
+            context.progress(0, 1, "denoising")
+            found.append(finished(raw, context.traced.texels, labels))
+        return found
+
+    how: Settings = context.settings(KIND)
+    first = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth))
+    if not how.gather_samples:
+        return first
+    back = first[1][0] if len(first) > 1 else None
+    cache = LightMapCache(context.traced.builder(diffuse=False), first[0][0], back)
+    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache))
+
+
+def _samples(
+    context: BakeContext, stage: str, side: int, how: Sampling, faces: Flags | None = None
+) -> tuple[Floats, Indices]:
+    """The samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W)."""
+    from lambent.bake.light.sampling import tile_samples
+
+    tile, texels = context.settings(KIND).tile_texels, context.traced.texels
+    writer = context.samples(KIND, _of_side(stage, side), (2, texels.height, texels.width, 4), (2, tile, tile, 4))
+    scene = context.traced.whole(diffuse=how.cache is None)
+    sides, labels = context.traced.in_view(SIGNS[side])
+    if faces is not None:
+        sides = replace(sides, valid=sides.valid & faces[texels.face])
+    if writer.missing:
+        covered = np.zeros(texels.width * texels.height, bool)
+        covered[texels.index[sides.valid.any(axis=1)]] = True
+        of_map = covered.reshape(texels.height, texels.width)
+        run_tiles(
+            writer,
+            lambda region, seed: tile_samples(scene, sides, region, seed, how),
+            seed=context.seed,
+            progress=context.progress,
+            what=f"light map, {stage.removeprefix('light_map/')}" + (", far sides" if side else ""),
+            cost=lambda region: 1 + float(of_map[region[1], region[2]].sum()),
+        )
+    writer.finish()
+    return context.store.read(writer.artefact.name), labels
+
+
+def _photon_maps(context: BakeContext) -> Maps:
+    from lambent.bake.photons.maps import Shots
+
+    how: Settings = context.settings(KIND)
+    whole = context.traced.whole(diffuse=True, photons=True)
+    photon_map = _photon_map(context)
+    writer = context.samples(KIND, PHOTONS, photon_map.shape, photon_map.chunk)
+    if writer.missing:
+        shots = Shots(how.photons_per_texel, how.noise, how.max_depth, context.seed)
+        photon_map.shoot(writer, context.traced.scene, whole, shots, context.progress)
+    writer.finish()
+    context.progress(0, 1, "denoising")
+    return photon_map.finished(context.store.read(PHOTONS), context.traced.labels)
+
+
+def _photon_map(context: BakeContext) -> PhotonMap:
+    from lambent.bake.photons.maps import PhotonMap
+
+    return PhotonMap(context.geometry, [context.traced.lit_sides(sign) for sign in SIGNS[: _sides(context)]])
+
+
+def _dominant_direction(context: BakeContext) -> None:
+    from lambent.bake.light.cache import LightMapCache
+    from lambent.bake.light.dominant_direction import dominant_direction, moments
+
+    front, back = finished_maps(context)
+    how = moments(LightMapCache(context.traced.builder(diffuse=False), front, back), context.settings(KIND).max_depth)
+    raw, _ = _samples(context, MOMENTS, 0, how, _bumpy_faces(context))
+    context.put(KIND, DOMINANT_DIRECTION, dominant_direction(raw, front, context.traced.labels), context.provenance())
+
+
+def _noise(context: BakeContext) -> None:
+    """Noise by texel, from the samples in the store."""
+    from lambent.bake.light.noise import noise_map
+    from lambent.bake.light.sampling import sampled_halves
+
+    context.progress(0, 1, "noise of the light map")
+    halves: Iterable[tuple[Floats, Flags]]
+    if _by_photons(context):
+        halves = _photon_map(context).halves(context.store.read(PHOTONS))
+    else:
+        raw = (_of_side(_stages(context.settings(KIND))[-1], side) for side in range(_sides(context)))
+        halves = (sampled_halves(context.store.read(name)) for name in raw)
+    for name, (both, known) in zip(NOISE, halves, strict=False):
+        context.put(KIND, name, noise_map(both, known, context.traced.labels), context.provenance())

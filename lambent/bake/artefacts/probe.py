@@ -1,0 +1,88 @@
+"""Probes: what objects mirror, from one point each, with planes that stand for it."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of
+from lambent.bake.methods import ProbeMethod
+from lambent.bake.probes.division import HIDDEN
+from lambent.bake.quality import QualityName
+from lambent.bake.tiles import seed_of
+from lambent.store.contract import needs_probe, probe_name
+
+KIND = "probe"
+NEEDS = ("geometry", "light_map")
+REVISION = 4
+PARTS = ("radiance", "distance", "planes")
+TOO_FEW = "%s: its probe has not seen %.0f %% of what it mirrors; a tenth is looked up %.0f degrees or more off"
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Cube maps of `texels` along a side of a face.
+
+    Texels get `samples` paths, and up to sixteen times as many until their noise is below `noise`.
+    """
+
+    texels: int
+    samples: int
+    noise: float = 0.14
+
+
+SETTINGS = {
+    QualityName.preview: Settings(128, 16),
+    QualityName.normal: Settings(256, 16, 0.1),
+    QualityName.final: Settings(256, 64, 0.05),
+}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    how: Settings = context.settings(KIND)
+    scene, light = context.scene, context.keys("light_map")["light_map/irradiance"]
+    found: dict[str, str] = {}
+    for name in _objects(context):
+        inputs = [light, name, scene.probe_centres.get(name), how.texels, how.samples, how.noise, context.seed]
+        if not _cached(context):
+            inputs += [context.methods["probes"], context.settings("light_map").max_depth]
+        key = key_of(KIND, REVISION, *inputs)
+        given = scene.probe_planes.get(name)
+        of_planes = key_of(KIND, REVISION, key, None if given is None else np.asarray(given, float))
+        found |= {probe_name(name, part): of_planes if part == "planes" else key for part in PARTS}
+    return found
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.probes.probe_set import ProbeSet
+
+    stale, how = context.stale(KIND), context.settings(KIND)
+    missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in PARTS}]
+    front, back = finished_maps(context)
+    front_or_none = front if _cached(context) else None
+    probes = ProbeSet(context.traced, front_or_none, back, context.settings("light_map").max_depth)
+    for i, name in enumerate(missing):
+        context.progress(i, len(missing), f"probe of {name}")
+        seed = seed_of(context.seed, "probe", name)
+        result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed)
+        if meta["hidden_share"] > HIDDEN:
+            log.warning(TOO_FEW, name, 100 * meta["hidden_share"], meta["parallax_deg"])
+        for part in PARTS:
+            context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
+    context.progress(1, 1, "probes")
+
+
+def _cached(context: BakeContext) -> bool:
+    return context.methods["probes"] == ProbeMethod.cached
+
+
+def _objects(context: BakeContext) -> list[str]:
+    """Names of the objects that want a probe."""
+    return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]

@@ -1,0 +1,186 @@
+"""The material as a Mitsuba BSDF: the path tracer renders exactly the BSDF of materials/bsdf.py.
+
+    register_material_plugin()
+    scene["floor"]["bsdf"] = material_dict(material)
+
+Conventions: Mitsuba's `si.wi` is the viewer's side (our wo) and its sampled `wo` is our wi; its eval includes the
+cosine. A material is a thin two-sided sheet without refraction, so radiance and importance scatter alike.
+
+Brushing direction: if the shape has a mesh attribute `vertex_tangent` (3 floats, world space, need not be exactly
+perpendicular to the normal), t is its projection onto the shading plane and b = n x t. Without it, t is the s axis of
+`si.sh_frame`, which Mitsuba derives from the uv's (dp/du), or arbitrarily for a mesh that has none.
+Isotropic materials without a normal map do not use it.
+
+Where a texture says that there is no surface, `eval_null_transmission` is 1 and the flag Null is set: `tracing.rays` go
+on there. Mitsuba's own integrators do not: for them the surface is whole.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lambent.bake.bsdfs.textured import SurfaceTextures, textures_dict
+from lambent.bake.engine import once_per_variant
+from lambent.materials import bsdf
+from lambent.materials.document import Material, material_from
+from lambent.scenes.scene import MaterialTextures
+
+PLUGIN = "lambent_material"
+TANGENT_ATTRIBUTE = "vertex_tangent"
+DIFFUSE_ATTRIBUTE = "diffuse"  # of the BSDF: the texture that multiplies kd and kt_d
+
+
+def material_dict(
+    material: Material, textures: MaterialTextures | None = None, *, diffuse: bool = True
+) -> dict[str, Any]:
+    """The dictionary for `mi.load_dict`, of the lobes alone where `diffuse` is false.
+
+    Surfaces without textures that scatter light alike have equal dictionaries, whatever their materials' names.
+    """
+    scattering = material if diffuse else bsdf.specular_only(material)
+    result = {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
+    if textures is not None:
+        result |= textures_dict(textures)
+    return result
+
+
+@once_per_variant
+def register_material_plugin() -> None:
+    """Choose the engine and make `lambent_material` known to it; further calls cost nothing."""
+
+    class MaterialBSDF(mi.BSDF):  # type: ignore[misc]
+        """Diffuse terms and lobes; component i of Mitsuba is component i of `bsdf.selection`."""
+
+        def __init__(self, props: Any) -> None:
+            mi.BSDF.__init__(self, props)
+            self.material = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
+            self.textures = SurfaceTextures(props)
+            self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
+            self.framed = "normal" in self.textures or (self.anisotropic and "direction" in self.textures)
+            flags, lobes = mi.BSDFFlags, self.material.lobes
+            glossy = {"reflection": flags.GlossyReflection, "transmission": flags.GlossyTransmission}
+            self.kinds = [flags.DiffuseReflection, flags.DiffuseTransmission, *(glossy[lobe.side] for lobe in lobes)]
+            turned = [0, 0, *(int(flags.Anisotropic) * (lobe.mx != lobe.my) for lobe in lobes)]
+            # A black component is none: emitters are not sampled for a material without any.
+            shown = [any(self.material.kd), any(self.material.kt_d), *(any(lobe.k) for lobe in lobes)]
+            both = int(flags.FrontSide) | int(flags.BackSide)
+            parts = zip(self.kinds, turned, shown, strict=True)
+            self.m_components = [both | (int(kind) | turn if is_shown else 0) for kind, turn, is_shown in parts]
+            self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
+            if "opacity" in self.textures:
+                self.m_flags |= int(mi.BSDFFlags.Null)
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            material, frame = self._enabled(ctx, si, active), self._frame(si, active)
+            wo = frame.to_local(si.wi)
+            wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, dr)
+            density = bsdf.pdf(wi, wo, material, dr)
+            bs = mi.BSDFSample3f()
+            bs.wo = mi.Vector3f(frame.to_world(mi.Vector3f(*wi)))
+            active &= (density > 0) & self._is_possible(bs.wo, wi)
+            value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
+
+            bs.pdf = dr.select(active, density, 0.0)
+            bs.eta = 1.0
+            bs.sampled_component, bs.sampled_type = self._component(sample1, wo, material)
+            return bs, dr.select(active, value * (dr.abs(wi[2]) / density), 0.0)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            material, frame = self._enabled(ctx, si, active), self._frame(si, active)
+            viewer, light = frame.to_local(si.wi), frame.to_local(wo)
+            value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
+            density = bsdf.pdf(light, viewer, material, dr)
+            active &= self._is_possible(wo, light)
+            return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
+
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            seen = bsdf.under_fresnel(dr.abs(si.wi.z), dr) if self.material.kd_coupled else 1.0
+            kd = mi.Color3f(self.material.kd) * self.textures.diffuse(si, active)
+            return dr.select(active, kd * seen, 0.0)
+
+        def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
+            return dr.select(self.textures.is_hole(si, active), mi.Color3f(1.0), mi.Color3f(0.0))
+
+        def has_attribute(self, name: str, active: Any = True) -> Any:
+            return mi.Bool(name == DIFFUSE_ATTRIBUTE)
+
+        def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
+            """The diffuse texture, whatever the coefficients it multiplies."""
+            return self.textures.diffuse(si, active)
+
+        def to_string(self) -> str:
+            return f"{PLUGIN}[{self.material.model_dump_json()}]"
+
+        def _enabled(self, ctx: Any, si: Any, active: Any) -> Material:
+            """The material at `si` with the components that `ctx` leaves out at coefficient zero."""
+            on = [ctx.is_enabled(kind, i) for i, kind in enumerate(self.kinds)]
+            return self.textures.material(self.material if all(on) else _masked(self.material, on), si, active)
+
+        def _frame(self, si: Any, active: Any) -> Any:
+            tangent = brushing_angle(si, active, self.anisotropic or self.framed)
+            return self.textures.frame(tangent, si, active) if self.framed else Turned(*tangent)
+
+        def _is_possible(self, wi: Any, in_frame: Any) -> Any:
+            """False for light from behind the surface that a bent normal would let in."""
+            return wi.z * in_frame[2] > 0 if "normal" in self.textures else mi.Bool(True)
+
+        def _component(self, sample1: Any, wo: Any, material: Material) -> tuple[Any, Any]:
+            """Index and flags of the component that `bsdf.sample` chose."""
+            index, flags = mi.UInt32(0), mi.UInt32(self.m_components[0])
+            up_to = mi.Float(0)
+            for i, share in enumerate(bsdf.selection(wo, material, dr)):
+                here = sample1 >= up_to
+                index = dr.select(here, mi.UInt32(i), index)
+                flags = dr.select(here, mi.UInt32(self.m_components[i]), flags)
+                up_to += share
+            return index, flags
+
+    mi.register_bsdf(PLUGIN, MaterialBSDF)
+
+
+def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
+    """Cosine and sine of the angle from the s axis of the shading frame to the brushing direction."""
+
+    if not anisotropic:
+        return 1.0, 0.0
+    brushed = active & si.shape.has_attribute(TANGENT_ATTRIBUTE)
+    t = si.to_local(si.shape.eval_attribute_3(TANGENT_ATTRIBUTE, si, brushed))
+    length = dr.sqrt(t.x * t.x + t.y * t.y)
+    brushed &= length > 1e-6
+    return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A frame turned about n by the angle of this cosine and sine; its methods are those of mi.Frame3f."""
+
+    c: Any
+    s: Any
+
+    def to_local(self, w: Any) -> tuple[Any, Any, Any]:
+        return self.c * w[0] + self.s * w[1], self.c * w[1] - self.s * w[0], w[2]
+
+    def to_world(self, w: Any) -> tuple[Any, Any, Any]:
+        return self.c * w[0] - self.s * w[1], self.c * w[1] + self.s * w[0], w[2]
+
+
+def _masked(material: Material, on: list[bool]) -> Material:
+    black = (0.0, 0.0, 0.0)
+    lobes = [
+        lobe if keep else lobe.model_copy(update={"k": black})
+        for lobe, keep in zip(material.lobes, on[2:], strict=True)
+    ]
+    update = {"kd": material.kd if on[0] else black, "kt_d": material.kt_d if on[1] else black, "lobes": tuple(lobes)}
+    return material.model_copy(update=update)

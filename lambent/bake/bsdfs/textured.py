@@ -1,0 +1,119 @@
+"""Textures in the path tracer: the parameters of a material and its shading frame where a ray hits.
+
+Texels are interpolated bilinearly and not filtered further: many paths per pixel do that. The interpolated quantities
+are the renderer's (scenes.textures): slopes for normals, doubled angles for directions.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.scene import MaterialTextures
+from lambent.scenes.textures import doubled_angle, parts, slopes
+
+INTERPOLATED = {"normal": slopes, "direction": doubled_angle}  # other parts as they are
+LAYOUT = "textures"
+IMAGE = "picture_"
+GRAZING = 0.1  # least cos_o of a normal, as in realtime/shaders/shade.wgsl: one that faces away is bent to the viewer
+SMALLEST_M, LARGEST_M = 0.001, 4.0  # of materials.document
+
+
+def textures_dict(textures: MaterialTextures) -> dict[str, Any]:
+    """Textures for `material_dict`: their transforms as JSON, the images as tensors."""
+    said: dict[str, Any] = {"cutoff": textures.cutoff, "parts": {}}
+    result: dict[str, Any] = {}
+    for part, texture in parts(textures).items():
+        values = INTERPOLATED.get(part, np.asarray)(texture.texels.astype(np.float32))
+        said["parts"][part] = np.asarray(texture.uv_transform, float).tolist()
+        result[IMAGE + part] = mi.TensorXf(np.ascontiguousarray(values))
+    return {LAYOUT: json.dumps(said), **result}
+
+
+class SurfaceTextures:
+    """The textures of one material on the device; `part in textures` is whether there is one for a part."""
+
+    def __init__(self, props: Any) -> None:
+        said: dict[str, Any] = json.loads(str(props[LAYOUT])) if LAYOUT in props else {"cutoff": 0.5, "parts": {}}
+        self.cutoff: float = said["cutoff"]
+        self._transforms: dict[str, Any] = said["parts"]
+        wrap = dr.WrapMode.Repeat
+        self._images = {part: mi.Texture2f(props[IMAGE + part], wrap_mode=wrap) for part in self._transforms}
+
+    def __contains__(self, part: str) -> bool:
+        return part in self._images
+
+    def at(self, part: str, si: Any, active: Any) -> list[Any]:
+        """Channels of a texture at `si`."""
+        (a, b, c), (d, e, f) = self._transforms[part]
+        u, v = a * si.uv.x + b * si.uv.y + c, d * si.uv.x + e * si.uv.y + f
+        return list(self._images[part].eval(mi.Point2f(u, 1 - v), active))
+
+    def is_hole(self, si: Any, active: Any) -> Any:
+        """Whether there is no surface."""
+        if "opacity" not in self:
+            return mi.Bool(False)
+        return self.at("opacity", si, active)[0] < self.cutoff
+
+    def diffuse(self, si: Any, active: Any) -> Any:
+        """Factor (mi.Color3f) of kd and kt_d."""
+        return mi.Color3f(*self.at("diffuse", si, active)) if "diffuse" in self else mi.Color3f(1.0)
+
+    def material(self, material: Material, si: Any, active: Any) -> Material:
+        """The material with its parameters at `si`."""
+        update: dict[str, Any] = {}
+        if "diffuse" in self and (any(material.kd) or any(material.kt_d)):
+            factor = self.at("diffuse", si, active)
+            for name in ("kd", "kt_d"):
+                value = getattr(material, name)
+                if any(value):
+                    update[name] = tuple(x * y for x, y in zip(value, factor, strict=True))
+        if material.lobes and ("specular" in self or "roughness" in self):
+            colour = self.at("specular", si, active) if "specular" in self else [1.0] * 3
+            rough = self.at("roughness", si, active)[0] if "roughness" in self else None
+            update["lobes"] = tuple(_lobe(lobe, colour, rough) for lobe in material.lobes)
+        return material.model_copy(update=update) if update else material
+
+    def frame(self, tangent: tuple[Any, Any], si: Any, active: Any) -> Any:
+        """mi.Frame3f (t, b, n) within `si.sh_frame`; `tangent` is the cosine and sine of t without textures."""
+        c, s = tangent
+        t, b = mi.Vector3f(c, s, 0.0), mi.Vector3f(-s, c, 0.0)
+        n = mi.Vector3f(0.0, 0.0, 1.0)
+        along = t
+        if "direction" in self:
+            cos2, sin2 = self.at("direction", si, active)
+            half = _half_angle(cos2, sin2)
+            along = half[0] * t + half[1] * b
+        if "normal" in self:
+            x, y = self.at("normal", si, active)
+            n = _bent(dr.normalize(x * t + y * b + n), si.wi)
+        along = dr.normalize(along - n * dr.dot(n, along))
+        return mi.Frame3f(along, dr.cross(n, along), n)
+
+
+def _lobe(lobe: Lobe, colour: list[Any], rough: Any) -> Lobe:
+    update: dict[str, Any] = {"k": tuple(x * y for x, y in zip(lobe.k, colour, strict=True))}
+    if rough is not None:
+        scale = dr.clip(rough, SMALLEST_M / min(lobe.mx, lobe.my), LARGEST_M / max(lobe.mx, lobe.my))
+        update |= {"mx": lobe.mx * scale, "my": lobe.my * scale}
+    return lobe.model_copy(update=update)
+
+
+def _half_angle(cos2: Any, sin2: Any) -> tuple[Any, Any]:
+    """Cosine and sine of half the angle of (cos2, sin2), a vector that interpolation has shortened."""
+    length = dr.sqrt(cos2 * cos2 + sin2 * sin2)
+    c2 = dr.select(length > 1e-6, cos2 / dr.maximum(length, 1e-6), 1.0)
+    c, s = dr.safe_sqrt((1 + c2) / 2), dr.safe_sqrt((1 - c2) / 2)
+    return c, dr.select(sin2 < 0, -s, s)
+
+
+def _bent(n: Any, wo: Any) -> Any:
+    """The normal on the +z side, bent to a cosine of at least GRAZING to the viewer, on either side."""
+    side = dr.select(wo.z < 0, -1.0, 1.0)
+    n = n * side
+    return dr.normalize(n + dr.maximum(GRAZING - dr.dot(n, wo), 0.0) * wo) * side

@@ -1,0 +1,118 @@
+"""What artefacts are baked from and with, each thing made once: the bake context.
+
+A kind of artefact is a module of `artefacts/`, found by its file:
+
+    KIND = "light_map"           the file's name, and that of the kind in the store
+    NEEDS = ("geometry",)        kinds whose arrays it reads, baked before it
+    SETTINGS = {...}             optional: a dataclass for each QualityName
+    def keys(context)            {array name: key} of every array it writes, samples kept for a later bake included
+    def bake(context)            writes those of them that are stale
+    def describe(context)        optional: writes documents and whatever else is no part of a key; called by every bake
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+from numpy.typing import NDArray
+
+from lambent.bake.engine import engine
+from lambent.bake.quality import Quality
+from lambent.bake.surfaces.atlas import Atlas, separated
+from lambent.core.progress import Progress, silent
+from lambent.scenes.scene import Scene
+from lambent.store.contract import is_two_sided
+from lambent.store.store import Store, Writer
+
+if TYPE_CHECKING:
+    from lambent.bake.tracing.traced_scene import TracedScene
+
+Array = NDArray[Any]
+GEOMETRY = ("positions", "normals", "tangents", "uv", "uv2", "faces")
+
+
+class Artefact(Protocol):
+    """A module of `artefacts/`."""
+
+    KIND: str
+    NEEDS: tuple[str, ...]
+
+    def keys(self, context: BakeContext) -> dict[str, str]: ...
+    def bake(self, context: BakeContext) -> None: ...
+
+
+@dataclass
+class BakeContext:
+    """One bake: the scene as it is baked, the store that it goes to, and what several artefacts share.
+
+    `scene` has its textures as they are stored, and objects in the parts that have probes of their own.
+    """
+
+    scene: Scene
+    store: Store
+    artefacts: Mapping[str, Artefact]
+    quality: Quality
+    methods: Mapping[str, str]
+    seed: int = 0
+    progress: Progress = silent
+    _keys: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    def settings(self, kind: str) -> Any:
+        """The settings of a kind of artefact at this bake's quality, of its own dataclass."""
+        return self.quality.settings(kind, getattr(self.artefacts[kind], "SETTINGS", {}))
+
+    def keys(self, kind: str) -> dict[str, str]:
+        """The key of every array that a kind of artefact writes, by the array's name."""
+        if kind not in self._keys:
+            self._keys[kind] = self.artefacts[kind].keys(self)
+        return self._keys[kind]
+
+    def begun(self, kind: str) -> set[str]:
+        """Names of the arrays of a kind that the store holds, or holds chunks of, under their present keys."""
+        keys = self.keys(kind)
+        return {a.name for a in self.store.artefacts() if keys.get(a.name) == a.key}
+
+    def stale(self, kind: str) -> set[str]:
+        """Names of the arrays of a kind that are absent, partial or made from something else."""
+        return self.keys(kind).keys() - {name for name in self.begun(kind) if name in self.store}
+
+    def put(self, kind: str, name: str, array: Array, meta: Mapping[str, Any] | None = None) -> None:
+        """Write an array of a kind."""
+        self.store.put(name, kind, array, key=self.keys(kind)[name], meta=meta)
+
+    def samples(self, kind: str, name: str, shape: Sequence[int], chunks: Sequence[int]) -> Writer:
+        """Writer of float32 samples, which stay in the store, so that an interrupted bake continues from them."""
+        key = self.keys(kind)[name]
+        return self.store.begin(name, "raw", shape, chunks, "float32", key=key, meta=self.provenance())
+
+    def provenance(self, **more: Any) -> dict[str, Any]:
+        """What to note of an array: quality, seed, engine."""
+        return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
+
+    @cached_property
+    def geometry(self) -> dict[str, Array]:
+        """The arrays geometry/* of the store."""
+        return {name: self.store.read(f"geometry/{name}") for name in GEOMETRY}
+
+    @cached_property
+    def atlas(self) -> Atlas:
+        """The scene with the vertices and light map coordinates of `geometry`."""
+        width, height = self.store.artefact("geometry/uv2").meta["light_map_size"]
+        return separated(self.scene, self.geometry, width, height)
+
+    @cached_property
+    def two_sided(self) -> list[bool]:
+        """By object, whether light crosses it, so that its back has a light map too."""
+        masked = {name for name, textures in self.scene.textures.items() if textures.opacity}
+        materials = self.scene.materials
+        return [is_two_sided(materials[o.material], masked=o.material in masked) for o in self.scene.objects]
+
+    @cached_property
+    def traced(self) -> TracedScene:
+        """The scene for Mitsuba, and the points of its light map."""
+        from lambent.bake.tracing.traced_scene import TracedScene
+
+        return TracedScene(self.atlas, self.geometry, self.two_sided, self.progress)

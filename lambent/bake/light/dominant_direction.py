@@ -1,0 +1,44 @@
+"""The dominant direction of the light at a texel, from which the renderer shades normals that a normal map bends.
+
+It is the mean of the directions w of incident light, weighted by their luminous share of the irradiance E:
+
+    D = integral of L(w) cos w dw / E
+
+2/3 n under a uniform sky, of length 1 from a single lamp. It is baked where materials have normal maps, in world space.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.denoise import fill
+from lambent.bake.light.noise import chart_means
+from lambent.bake.light.sampling import Sampling
+from lambent.bake.tracing import path_tracer
+from lambent.core.arrays import Floats, Indices
+from lambent.core.colour import luminance
+
+SAMPLES = 64  # per texel, then averaged with its neighbours
+
+
+def moments(cache: path_tracer.Cache, max_depth: int) -> Sampling:
+    """First moments of incident light, sampled like irradiance; surfaces show the finished light map."""
+    return Sampling((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, cache, path_tracer.moment)
+
+
+def dominant_direction(raw: Floats, irradiance: Floats, labels: Indices) -> NDArray[np.float16]:
+    """(H, W, 3) D from sums of moments (2, H, W, 4) and irradiance (H, W, 3); 0 on charts without moments.
+
+    Moments and irradiance are averaged over the same texels of a chart, then divided: a gradient of the light across
+    the texels does not tilt the direction.
+    """
+    count = raw[..., 3].sum(axis=0)
+    known = count > 0
+    moment = raw[..., :3].sum(axis=0) / np.maximum(count, 1)[..., None]
+    light = np.where(known, luminance(np.asarray(irradiance, np.float32)), 0)
+    means = chart_means(np.concatenate([moment, light[..., None]], axis=-1), known, labels)
+    direction = means[..., :3] / np.maximum(means[..., 3:], 1e-12)
+    direction /= np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1)
+    bumpy = np.isin(labels, np.unique(labels[known])) & (labels >= 0)
+    return np.where(bumpy[..., None], fill(direction, known, labels), 0).astype(np.float16)

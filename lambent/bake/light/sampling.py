@@ -1,0 +1,165 @@
+"""Irradiance at every texel of the light map, path traced through the true materials.
+
+A tile is sampled in pairs of passes, traced at once and summed apart: half their difference is an estimate of the
+noise. The raw sums stay in the store, and a bake continues from them after any interruption.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.denoise import denoise_charts, fill
+from lambent.bake.light.seams import blend_seams
+from lambent.bake.surfaces.texels import POINTS, Sides, Texels
+from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.rays import block_sums, independent, vectors
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.sequences import hammersley, r2
+
+GATHER_PASS = 64  # samples of a texel that are stratified among themselves
+SMOOTH = 8  # rounds of averaging before texels grow into gutters: some 4 texels wide
+
+
+Estimate = Callable[..., Any]  # one sample of three numbers at each point, called as `path_tracer.irradiance` is
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How texels are sampled: `samples` (at least, at most) times, until the relative noise is reached.
+
+    With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must be without diffuse terms.
+    """
+
+    samples: tuple[int, int]
+    noise: float
+    max_depth: int
+    per_pass: int
+    cache: path_tracer.Cache | None = None
+    estimate: Estimate = path_tracer.irradiance
+
+
+def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
+    """All bounces, for the whole scene."""
+    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
+
+
+def gathered(samples: int, noise: float, max_depth: int, cache: path_tracer.Cache) -> Sampling:
+    """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
+    per_pass = max(1, min(GATHER_PASS, samples // 2))
+    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
+
+
+def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
+    """Raw content of one tile: (2, h, w, 4) float32, the two halves' sums of irradiance and their sample counts."""
+    rows, columns = region[1], region[2]
+    height, width = rows.stop - rows.start, columns.stop - columns.start
+    row, column = np.divmod(sides.texels.index, sides.texels.width)
+    inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
+    mine = np.flatnonzero(inside & sides.valid.any(axis=1))
+    raw = np.zeros((2, height * width, 4), np.float32)
+    if not len(mine):
+        return raw.reshape(2, height, width, 4)
+    points = _points(sides, mine)
+    sums = np.zeros((2, len(mine), 3))
+    fewest, most = how.samples
+    passes = 0
+    while passes * how.per_pass < most:
+        sums += _sums_of_pass(scene, points, len(mine), (seed, passes), how)
+        passes += 2
+        samples = passes * how.per_pass
+        if samples >= fewest and relative_noise(sums * 2 / samples) <= how.noise:
+            break
+    place = (row[mine] - rows.start) * width + column[mine] - columns.start
+    raw[:, place, :3] = sums
+    raw[:, place, 3] = passes * how.per_pass / 2
+    return raw.reshape(2, height, width, 4)
+
+
+def relative_noise(halves: Floats, share: Floats | None = None) -> float:
+    """Root mean square error of the mean of two estimates (2, ..., 3), over its mean; 0 for black, or nothing.
+
+    All count the same, or by their `share` (...), such as their areas.
+    """
+    if not halves.size:
+        return 0.0
+    squares, light = (luminance(halves[0] - halves[1]) / 2) ** 2, luminance(halves)
+    if share is not None and share.any():
+        mean_square, mean = np.average(squares, weights=share), np.average(light.mean(axis=0), weights=share)
+        return float(np.sqrt(mean_square) / mean) if mean > 0 else 0.0
+    mean = light.mean()
+    return float(np.sqrt(np.mean(squares)) / mean) if mean > 0 else 0.0
+
+
+def _points(sides: Sides, mine: Indices) -> path_tracer.Points:
+    """POINTS of each of some texels on the device, invalid ones replaced by valid ones of the same texel."""
+    valid = sides.valid[mine]
+    ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, taken in turn
+    turn = np.arange(POINTS) % valid.sum(axis=1)[:, None]
+    choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
+    t = sides.texels
+    chosen = (np.take_along_axis(values[mine], choice, axis=1) for values in (t.positions, t.normals, t.flat))
+    position, normal, flat = (
+        vectors(mi.Vector3f, v * s) for v, s in zip(chosen, (1, sides.sign, sides.sign), strict=True)
+    )
+    return path_tracer.Points(position, normal, flat)
+
+
+def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tuple[int, int], how: Sampling) -> Floats:
+    """Sums (2, n, 3) of the irradiance samples of a pair of passes per texel.
+
+    In both, every texel takes the same two stratified point sets, shifted by random offsets of its own (Cranley &
+    Patterson 1976).
+    """
+    n, samples = 2 * count, how.per_pass
+    rng = np.random.default_rng(seed)
+    shifts = rng.random((4, n), dtype=np.float32)
+    thread = dr.arange(mi.UInt32, n * samples)
+    texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
+    first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
+    # the low bit already steers the azimuth of Hammersley points; a constant count would compile every tile anew
+    point = texel % dr.opaque(mi.UInt32, count) * POINTS + (k // 2 + first) % POINTS
+    at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
+    u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
+    u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
+    sampler = independent(int(rng.integers(1 << 32)), n * samples)
+    e = how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
+    e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
+    dr.eval(e)
+    return block_sums(e, samples).reshape(2, count, 3)
+
+
+def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:
+    both = zip(points.T.astype(np.float32), shifts, strict=True)
+    u = [dr.gather(mi.Float, mi.Float(p), k) + dr.gather(mi.Float, mi.Float(shift), texel) for p, shift in both]
+    return mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1]))
+
+
+def finished(raw: Floats, texels: Texels, labels: Indices) -> tuple[Floats, dict[str, float]]:
+    """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and its noise and samples, to note."""
+    halves, known = sampled_halves(raw)
+    samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
+    meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
+    return cleaned(halves.mean(axis=0), known, texels, labels), meta
+
+
+def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
+    """Irradiance (2, H, W, 3) of both halves of path traced sums (2, H, W, 4), and where there is any (H, W)."""
+    count = raw[..., 3:]
+    return raw[..., :3] / np.maximum(count, 1), count[0, ..., 0] > 0
+
+
+def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices) -> NDArray[np.float16]:
+    """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended."""
+    if not known.any():
+        return np.zeros(irradiance.shape, np.float16)
+    clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
+    clean = fill(blend_seams(clean, known, texels, labels), known, labels)
+    return np.minimum(clean, HALF_MAX).astype(np.float16)

@@ -1,0 +1,59 @@
+"""Seams of the light map: where charts meet in the scene, their texels are averaged across.
+
+Charts are denoised apart, so two that share an edge in the scene disagree a little along it. Near the border of its
+chart a texel therefore takes the mean of the texels around it in the scene, whichever chart they belong to: both sides
+of a seam take the same mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.bake.surfaces.texels import BEYOND, Texels
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import normalize
+
+BORDER = 4.0  # texels from the border, beyond which nothing is averaged
+RADIUS = 1.0  # texels: standard deviation of the weight along the surface
+LIFT = 0.3  # texels: standard deviation off the surface, so that a rug does not light the floor below
+NEIGHBOURS = 24
+
+
+def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indices) -> Floats:
+    """(H, W, 3) irradiance with seams blended; hidden parts of charts (`texels.BEYOND`) only among themselves.
+
+    `known` (H, W) are the texels that were sampled.
+    """
+    from scipy.ndimage import distance_transform_edt
+    from scipy.spatial import cKDTree
+
+    lit = known.reshape(-1)[texels.index]
+    index, position = texels.index[lit], texels.positions[lit].mean(axis=1).astype(float)
+    normal = normalize(texels.normals[lit].mean(axis=1).astype(float))
+    share = np.clip(1 - distance_transform_edt(~_borders(labels)).reshape(-1)[index] / BORDER, 0, 1)
+    # a triangle without area, in the scene or in the map, has no metres per texel, and its neighbours no distance
+    near = np.flatnonzero((share > 0) & (texels.spacing[lit] > 0))
+    if len(index) < NEIGHBOURS or not len(near):
+        return irradiance
+    values = irradiance.reshape(-1, 3)[index].astype(float)
+    spacing = np.repeat(texels.spacing[lit][near, None], NEIGHBOURS, axis=1)
+    others = cKDTree(position).query(position[near], k=NEIGHBOURS)[1]
+    offset = position[others] - position[near, None]
+    lift = np.einsum("nkx,nx->nk", offset, normal[near]) / (LIFT * spacing)
+    along = np.linalg.norm(offset, axis=2) / (RADIUS * spacing)
+    facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[near]), 0) ** 8
+    weight = np.exp(-(lift**2 + along**2) / 2) * facing
+    beyond = labels.reshape(-1)[index] >= BEYOND
+    weight *= beyond[others] == beyond[near][:, None]
+    weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing
+    mean = np.einsum("nk,nkx->nx", weight, values[others]) / weight.sum(axis=1, keepdims=True)
+    blended = irradiance.reshape(-1, 3).copy()
+    blended[index[near]] += share[near, None] * (mean - values[near])
+    return blended.reshape(irradiance.shape)
+
+
+def _borders(labels: Indices) -> Flags:
+    """Texels next to another chart or a gutter."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    return np.asarray((maximum_filter(labels, 3) != labels) | (minimum_filter(labels, 3) != labels))

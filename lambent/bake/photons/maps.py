@@ -1,0 +1,108 @@
+"""The light map by photons: batches of photons in the store, and the irradiance from all of them.
+
+Every batch is an estimate of the whole map with a seed of its own, `light_map/photons[batch]`, in W per texel: a bake
+continues from the finished ones after any interruption. The difference of their halves is an estimate of the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.sampling import cleaned, relative_noise
+from lambent.bake.photons.density import Kernel, shares
+from lambent.bake.photons.shooting import learnt_sky, shoot
+from lambent.bake.surfaces.coverage import texel_areas
+from lambent.bake.surfaces.texels import Sides, Texels
+from lambent.bake.tiles import run_tiles
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.progress import Progress
+from lambent.scenes.scene import Scene
+from lambent.store.store import Writer
+
+BATCHES, FEWEST = 16, 4  # FEWEST: batches from which the noise is estimated
+SMALL = 0.5  # of the median size of a texel
+
+
+@dataclass(frozen=True)
+class Shots:
+    """How a light map is shot: at most `per_texel` photons, until the relative noise is reached."""
+
+    per_texel: int
+    noise: float
+    max_bounces: int
+    seed: int
+
+
+class PhotonMap:
+    """A light map of one side or both; `geometry` as in `atlas.merged`."""
+
+    def __init__(self, geometry: dict[str, Floats], sides: list[Sides]) -> None:
+        self.texels = sides[0].texels
+        areas = texel_areas(geometry, self.texels.width, self.texels.height)
+        self._kernels = [Kernel(areas, self.texels, side.valid.mean(axis=1)) for side in sides]
+        self._shares = shares(areas, self.texels)
+        self.chunk = (1, len(sides), self.texels.height, self.texels.width, 3)
+        self.shape = (BATCHES, *self.chunk[1:])
+
+    def shoot(self, writer: Writer, scene: Scene, whole: Any, how: Shots, progress: Progress) -> None:
+        """Fill the missing batches until the noise is reached; the rest stay black."""
+        photons = -(-how.per_texel * len(self.texels.index) // BATCHES)
+        sky = learnt_sky(scene, whole, _over_area(self.texels), how.max_bounces)
+        halves, reached = np.zeros((2, *self.chunk[1:])), False
+
+        def add(number: int, batch: Floats) -> None:
+            nonlocal reached
+            halves[number % 2] += batch
+            if number % 2 and number + 1 >= FEWEST:
+                reached = self._noise(halves / ((number + 1) / 2)) <= how.noise
+
+        def batch(region: tuple[slice, ...], seed: int) -> Floats:
+            if reached:
+                return np.zeros(self.chunk, np.float32)
+            found = shoot(whole, self.chunk[1:4], photons, how.max_bounces, seed, sky).astype(np.float32)
+            add(region[0].start, found)
+            return found[None]
+
+        for number in range(BATCHES - len(writer.missing)):
+            if not reached:
+                add(number, writer.read_chunk((number, 0, 0, 0, 0))[0])
+        run_tiles(writer, batch, seed=how.seed, progress=progress, what="light map, photons")
+
+    def _noise(self, flux: Floats) -> float:
+        """The larger relative noise, by area, of the sides, from halves (2, sides, H, W, 3) of the photons."""
+        halves = (np.stack([kernel.irradiance(half[i]) for half in flux]) for i, kernel in enumerate(self._kernels))
+        known = [kernel.known for kernel in self._kernels]
+        return max(relative_noise(both[:, k], self._shares[k]) for both, k in zip(halves, known, strict=True))
+
+    def halves(self, batches: Floats) -> Iterator[tuple[Floats, Flags]]:
+        """Per side irradiance (2, H, W, 3) of both halves of the batches, and where there is any (H, W)."""
+        shot = shot_of(batches)
+        for i, kernel in enumerate(self._kernels):
+            yield np.stack([kernel.irradiance(shot[half::2, i].mean(axis=0)) for half in (0, 1)]), kernel.known
+
+    def finished(self, batches: Floats, labels: Indices) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
+        """Per side the light map (H, W, 3), and its noise before denoising, of texels counted equally and by area."""
+        maps = []
+        for halves, known in self.halves(batches):
+            noise = relative_noise(halves[:, known]), relative_noise(halves[:, known], self._shares[known])
+            clean = cleaned(halves.mean(axis=0), known, self.texels, labels)
+            maps.append((clean, dict(zip(("noise", "noise_by_area"), noise, strict=True))))
+        return maps
+
+
+def _over_area(texels: Texels) -> Floats:
+    """(H, W) 1/area of a texel, m^-2, 0 in the gutters; bounded, lest the smallest decide where photons go."""
+    found = np.zeros(texels.height * texels.width)
+    found[texels.index] = 1 / np.maximum(texels.spacing, SMALL * np.median(texels.spacing)) ** 2
+    return found.reshape(texels.height, texels.width)
+
+
+def shot_of(batches: Floats) -> Floats:
+    """The batches that were shot until the noise was reached; the rest are black."""
+    last = np.flatnonzero(batches.any(axis=(1, 2, 3, 4)))
+    return batches[: last[-1] + 1 + (last[-1] + 1) % 2] if len(last) else batches

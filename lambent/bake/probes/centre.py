@@ -1,0 +1,113 @@
+"""Where an object's probe stands.
+
+- Where the scene says so; else
+- above a flat object (floor, mirror, table top), on the side that faces the middle of the scene: half the object's
+  length, half the free distance and EYE_HEIGHT_M are upper bounds of the height. Over its middle, or, where something
+  hides from there much of what viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
+- in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.tracing.rays import array_of, distances, rays_from
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.tracing.solids import SolidTest
+from lambent.core.arrays import Floats
+from lambent.core.cubemap import face_directions
+from lambent.core.directions import basis, normalize
+from lambent.core.geometry import triangle_areas, triangle_normals
+from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
+
+GRID = 5  # points along each side of a flat object that a probe may stand over
+FLAT_SHARE = 0.9  # of an object's area with normals along one axis
+CONTACT_M = 1e-3  # over a flat object: what lies closer to it does not limit the height of its probe
+CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of
+MOVES = 4
+ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides
+
+
+def probe_centre(builder: SceneBuilder, name: str, without: Any, solids: SolidTest | None = None) -> Floats:
+    """(3,) float64 world position; `without` is the Mitsuba scene without the object, `solids` its own if given."""
+    scene = builder.scene
+    if name in scene.probe_centres:
+        return np.asarray(scene.probe_centres[name], float)
+    solids = solids or SolidTest(builder, without)
+    return centre_of(scene.object(name).mesh, np.mean(scene.bounds, axis=0), solids, without)
+
+
+def centre_of(mesh: Mesh, middle: Floats, solids: SolidTest, without: Any) -> Floats:
+    """The centre for a mesh of a scene with this middle, or for a part of one; `solids` are those of `without`."""
+    centre = _middle(mesh)
+    axis = flat_axis(mesh)
+    if axis is not None:
+        return _above(mesh, centre, axis, middle, without)
+    return _moved_out(centre, solids, without)
+
+
+def _middle(mesh: Mesh) -> Floats:
+    low, high = (np.asarray(corner, float) for corner in mesh.bounds)
+    return np.asarray((low + high) / 2)
+
+
+def flat_axis(mesh: Mesh) -> Floats | None:
+    """Unit normal of a flat object, None of any other."""
+    corners = mesh.corners
+    area = triangle_areas(corners)
+    if area.sum() <= 0:
+        return None
+    n = triangle_normals(corners)
+    values, vectors = np.linalg.eigh(np.einsum("t,ti,tj->ij", area / area.sum(), n, n))
+    return np.asarray(vectors[:, 2]) if values[2] > FLAT_SHARE else None
+
+
+def _above(mesh: Mesh, centre: Floats, axis: Floats, middle: Floats, without: Any) -> Floats:
+    axis = axis if axis @ (middle - centre) >= 0 else -axis
+    top = centre + axis * ((mesh.positions - centre) @ axis).max()
+    size = float(np.ptp(mesh.positions, axis=0).max())
+    free = float(distances(without, rays_from(top + axis * CONTACT_M, axis[None]))[0])
+    return np.asarray(top + axis * min(EYE_HEIGHT_M, size / 2, free / 2))
+
+
+def places_above(mesh: Mesh, middle: Floats, without: Any) -> Floats:
+    """(n, 3) where the probe of a flat object may stand: over its middle, then over points all over it."""
+    axis, centre = flat_axis(mesh), _middle(mesh)
+    if axis is None:
+        return np.asarray(centre[None])
+    steps = (np.arange(GRID) + 0.5) / GRID
+    across = np.stack([aside.reshape(3) for aside in basis(axis[None])], axis=1)
+    flat = mesh.positions @ across
+    at = flat.min(axis=0) + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * np.ptp(flat, axis=0)
+    over = at @ across.T + axis * (axis @ centre)
+    return np.stack([_above(mesh, place, axis, middle, without) for place in (centre, *over)])
+
+
+def _moved_out(centre: Floats, solids: SolidTest, without: Any) -> Floats:
+    directions = normalize(face_directions(5).reshape(-1, 3))
+    for _ in range(MOVES):
+        up = np.array([[0.0, 1.0, 0.0]])
+        both = solids.embedded(np.stack([centre, centre]), np.concatenate([up, -up]))
+        if not both.all():
+            break
+        t = distances(without, rays_from(centre, directions))
+        centre = centre + directions[np.argmin(t)] * (t.min() + CLEARANCE_M)
+    return centre
+
+
+def encloses(builder: SceneBuilder, name: str, centre: Floats, whole: Any) -> bool:
+    """Whether the object surrounds its probe and most of the scene, as a room of one mesh does: then it stays in."""
+    low, high = builder.scene.object(name).mesh.bounds
+    others = [np.mean(o.mesh.bounds, axis=0) for o in builder.scene.objects if o.name != name]
+    within = [bool(((middle > low) & (middle < high)).all()) for middle in others]
+    if not others or np.mean(within) < ENCLOSING_SHARE:
+        return False
+    w = normalize(face_directions(8).reshape(-1, 3))
+    si = whole.ray_intersect(rays_from(centre, w), mi.RayFlags.Minimal, True)
+    facing = (array_of(si.n) * w).sum(axis=1) < 0
+    own = np.array(dr.reinterpret_array(mi.UInt32, si.shape)) == builder.shape_number(name)
+    return bool((facing & own).mean() > ENCLOSING_SHARE)

@@ -1,0 +1,80 @@
+"""What a surface sees, and what of that is hidden from its probe.
+
+A probe shows what its centre sees; a surface mirrors what it sees itself. Rays from points all over an object, which is
+left out as in its probe, find what its surface sees; other things hide a share of these hits from the centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.tracing.rays import array_of, cosine_directions, distances, leaving, rays_from
+from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import normalize
+from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
+from lambent.core.probe_lookups import planes_lookup
+from lambent.scenes.scene import Mesh
+
+RAYS = 4096  # per object
+OFTEN = 0.9
+SHORT = 1e-3  # metres, and share of the distance, by which a hit may be missed: it hides nothing
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What points of a surface see: origins, unit directions, hits (n, 3), and whether there is a hit (n,)."""
+
+    origins: Floats
+    directions: Floats
+    hits: Floats
+    valid: Flags
+
+
+def seen_from(mesh: Mesh, without: Any, count: int = RAYS) -> Seen:
+    """Cosine distributed rays from points evenly spread over a mesh; `without` is the Mitsuba scene without it."""
+    points, normals = spread(mesh, count)
+    directions = cosine_directions(normals)
+    return seen_along(array_of(leaving(without, points, normals, directions).o).astype(float), directions, without)
+
+
+def seen_along(origins: Floats, directions: Floats, without: Any) -> Seen:
+    """What rays (n, 3) meet first in a Mitsuba scene."""
+    distance = distances(without, rays_from(origins, directions))
+    valid = np.isfinite(distance)
+    return Seen(origins, directions, origins + directions * np.where(valid, distance, 0.0)[:, None], valid)
+
+
+def hidden_share(seen: Seen, centre: Floats, without: Any) -> float:
+    """Share of the hits that something hides from the centre; 0 where nothing is hit."""
+    if not seen.valid.any():
+        return 0.0
+    offset = seen.hits[seen.valid] - centre
+    distance = np.linalg.norm(offset, axis=1)
+    t = distances(without, rays_from(centre, offset / np.maximum(distance, 1e-9)[:, None]))
+    return float((t < distance * (1 - SHORT) - SHORT).mean())
+
+
+def parallax_deg(seen: Seen, centre: Floats, planes: Floats) -> float:
+    """Angle in degrees, not exceeded by OFTEN of the rays, from the hit as the centre sees it to the look-up.
+
+    `planes` (P, 4) are those about the centre.
+    """
+    if not seen.valid.any():
+        return 0.0
+    origins, w, hits = (a[seen.valid] for a in (seen.origins, seen.directions, seen.hits))
+    cosine = (normalize(planes_lookup(origins - centre, w, planes)) * normalize(hits - centre)).sum(axis=1)
+    return float(np.degrees(np.quantile(np.arccos(cosine.clip(-1, 1)), OFTEN)))
+
+
+def spread(mesh: Mesh, count: int) -> tuple[Floats, Floats]:
+    """Points and normals (count, 3), evenly over the area."""
+    corners = mesh.corners
+    up_to = np.cumsum(triangle_areas(corners))
+    rng = np.random.default_rng(0)
+    face = np.searchsorted(up_to, (np.arange(count) + 0.5) / count * up_to[-1]).clip(0, len(corners) - 1)
+    points = points_on_triangles(corners, face, rng)
+    order = rng.permutation(count)  # so that a point's place on the object says nothing of its ray's direction
+    return points[order], triangle_normals(corners)[face][order]

@@ -1,0 +1,155 @@
+"""Probes: what an object would mirror, as cube maps of radiance and distance from one point.
+
+Rays from the centre pass the object; the surfaces they meet are lit by the whole scene, and mirror it. With the light
+map as radiance cache, a diffuse surface shows its baked light and a glossy one is traced on through its lobes, so that
+mirrors in mirrors are right. Without it everything is path traced, with more noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.cache import LightMapCache
+from lambent.bake.tiles import slices
+from lambent.bake.tracing import path_tracer, rays
+from lambent.bake.tracing.rays import array_of, block_sums, vectors
+from lambent.core.arrays import Floats, Indices
+from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.cubemap import face_directions, faces_at
+from lambent.core.directions import normalize
+from lambent.store.contract import FAR
+
+PATHS_AT_ONCE = 1 << 22
+BLOCKS = (16, 4, 1)  # paths through a texel that are stratified among themselves: the largest that fits is taken
+# Noise of a texel is judged as if its paths were independent. Stratified, they have about .65 of it.
+NOISE, MOST = 0.14, 16  # relative standard error that ends a texel, and times `samples` that end it at the latest
+MIRROR_DEPTH = 6  # glossy surfaces in a row
+
+
+@dataclass(frozen=True)
+class Probe:
+    """radiance (6, N, N, 3) float16, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side."""
+
+    radiance: NDArray[np.float16]
+    distance: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Scenes that a probe is traced in.
+
+    `first` is the scene that the probe sees itself, mostly without its object; `whole` is the scene that lights and is
+    mirrored by the surfaces seen. With a `cache` both are without diffuse terms; without, paths are traced whole. A
+    path meets at most `depth` surfaces.
+    """
+
+    first: Any
+    whole: Any
+    cache: LightMapCache | None = None
+    depth: int = MIRROR_DEPTH
+
+
+def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: int, noise: float = NOISE) -> Probe:
+    """Trace a probe.
+
+    Every texel gets `samples` paths; those that are still noisy, mostly glossy surfaces seen in the probe, get as many
+    more as they need to come down to `noise`, at most MOST times as many in all.
+    """
+    rng = np.random.default_rng(seed)
+    block = next(size for size in BLOCKS if size <= samples)
+    base = -(-samples // block)
+    texels = np.arange(6 * n * n)
+    total, squares = _sums(scene, centre, n, np.repeat(texels, base), block, rng)
+    first = total.reshape(-1, base, 3).sum(axis=1)
+    needed = _blocks_needed(first, squares.reshape(-1, base, 3).sum(axis=1), base * block, noise) * base
+    more = np.repeat(texels, np.ceil(needed).astype(int) - base)
+    extra = _sums(scene, centre, n, more, block, rng)[0]
+    for channel in range(3):
+        first[:, channel] += np.bincount(more, extra[:, channel], minlength=len(texels))
+    count = (base + np.bincount(more, minlength=len(texels))) * block
+    radiance = np.minimum(first / count[:, None], HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
+    return Probe(radiance, *_geometry(scene.first, centre, n))
+
+
+def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -> Floats:
+    """Times as many paths as texels have had, for their relative standard error to be `noise`; in [1, MOST].
+
+    Relative to the texel, or to the median of all where that is brighter: in the dark less accuracy will do.
+    """
+    mean = luminance(total / samples)
+    variance = np.maximum(luminance(squares / samples) - mean**2, 0) / samples
+    allowed = np.maximum(noise * np.maximum(mean, np.median(mean)), 1e-12)
+    return np.asarray(np.clip(variance / allowed**2, 1, MOST))
+
+
+def _sums(
+    scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Sums (k, 3) of radiance and of its squares over `samples` paths through each of the texels."""
+    total, squares = np.zeros((2, len(texels), 3))
+    at_once = max(1, PATHS_AT_ONCE // samples)
+    for mine in slices(len(texels), at_once):
+        total[mine], squares[mine] = _pass(scene, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
+    return total, squares
+
+
+def _pass(
+    scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, seed: int
+) -> tuple[Floats, Floats]:
+    sampler = mi.load_dict({"type": "multijitter", "sample_count": samples})
+    sampler.set_samples_per_wavefront(samples)
+    width = len(texels) * samples
+    sampler.seed(seed, width)
+    texel = dr.gather(mi.UInt32, mi.UInt32(texels.astype(np.uint32)), dr.arange(mi.UInt32, width) // samples)
+    column, row, face = texel % n, texel // n % n, texel // (n * n)
+    jitter = sampler.next_2d()
+    s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
+    ray = mi.Ray3f(_origin(centre) + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
+    start = path_tracer.camera_start(_up_to_first(scene.first, ray))
+    value = path_tracer.radiance(scene.whole, sampler, start, scene.depth, scene.cache)
+    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    square = value * value
+    dr.eval(value, square)
+    return block_sums(value, samples), block_sums(square, samples)
+
+
+def _origin(centre: Floats) -> Any:
+    """The centre as data, not as constants: all probes share their kernels then."""
+    return mi.Point3f(*(dr.opaque(mi.Float, float(x)) for x in centre))
+
+
+def _up_to_first(scene: Any, ray: Any) -> Any:
+    """Rays that begin just before the surface that the given ones meet first in `scene`."""
+    distance = _distance(scene, ray)[0]
+    return mi.Ray3f(ray(dr.maximum(distance * (1 - rays.APPROACH) - rays.APPROACH, 0.0)), ray.d)
+
+
+def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:
+    """Metres to the first surface behind all holes, FAR where there is none, and what is met there."""
+    si = rays.intersect(scene, ray, mi.Bool(True), rays.has_holes(scene))
+    return dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - ray.o), FAR), FAR), si
+
+
+def _direction(face: Any, s: Any, t: Any) -> Any:
+    """Directions (mi.Vector3f) of `faces_at` on numbered faces."""
+    w = mi.Vector3f(0.0)
+    for number, components in enumerate(faces_at(s, t)):
+        w = dr.select(face == number, mi.Vector3f(*components), w)
+    return w
+
+
+def _geometry(scene: Any, centre: Floats, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Distance and normal at the texels' centres."""
+    direction = vectors(mi.Vector3f, normalize(face_directions(n)))
+    distance, si = _distance(scene, mi.Ray3f(_origin(centre), direction))
+    normal = dr.select(dr.dot(si.n, direction) > 0, -si.n, si.n)
+    normal = dr.select(si.is_valid(), normal, -direction)
+    dr.eval(distance, normal)
+    return np.array(distance).reshape(6, n, n), array_of(normal).reshape(6, n, n, 3)

@@ -1,0 +1,129 @@
+"""All probes of a scene: one after another with its object left out, sharing meshes and light map."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.cache import LightMapCache
+from lambent.bake.probes.centre import encloses, flat_axis, places_above, probe_centre
+from lambent.bake.probes.division import HIDDEN, family
+from lambent.bake.probes.hidden import hidden_share, parallax_deg, seen_along, seen_from, spread
+from lambent.bake.probes.planes import bounding_planes
+from lambent.bake.probes.probe import MIRROR_DEPTH, Surroundings, bake_probe
+from lambent.bake.probes.selection import OWN, RAYS, TRIAL_SAMPLES, TRIAL_TEXELS, WORTH, Mirrored, judged, mirrored
+from lambent.bake.tracing.solids import SolidTest
+from lambent.bake.tracing.traced_scene import TracedScene
+from lambent.core.arrays import Floats
+
+
+class ProbeSet:
+    """Bakes the probes of a scene from its light map (H, W, 3), or, where that is None, path traced whole.
+
+    With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
+    paths have at most `max_depth` vertices.
+    """
+
+    def __init__(
+        self, traced: TracedScene, irradiance: Floats | None, irradiance_back: Floats | None, max_depth: int
+    ) -> None:
+        whole_paths = irradiance is None
+        self._traced, self._depth = traced, max_depth if whole_paths else MIRROR_DEPTH
+        self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
+        self._scene = self._builder.scene
+        self._left_out: tuple[frozenset[str], Any] | None = None
+        self._cache = None if irradiance is None else LightMapCache(self._builder, irradiance, irradiance_back)
+
+    @cached_property
+    def _solids(self) -> SolidTest:
+        return SolidTest(self._builder, self._whole)
+
+    def _without(self, names: frozenset[str]) -> Any:
+        """The scene without these objects; kept until others are asked for, as parts of one object share it."""
+        if self._left_out is None or self._left_out[0] != names:
+            self._left_out = None
+            self._left_out = names, self._builder.build(leave_out=names)
+        return self._left_out[1]
+
+    def _mirrored(self, name: str, seed: int) -> Mirrored | None:
+        """What viewers see mirrored in an object, or through it; None where that is too little."""
+        if self._cache is None:
+            return None
+        o = self._scene.object(name)
+        own = [self._builder.shape_number(part) for part in family(self._scene.parts, name)]
+        return mirrored(
+            *spread(o.mesh, RAYS), self._traced.places, self._scene.materials[o.material],
+            self._whole, self._cache, MIRROR_DEPTH, own, seed,
+        )  # fmt: skip
+
+    def _error(self, rays: Mirrored, first: Any, centre: Floats, seed: int) -> float:
+        """Error of a small probe at `centre`; `first` is the scene that it sees itself."""
+        around = Surroundings(first, self._whole, self._cache, MIRROR_DEPTH)
+        return judged(rays, bake_probe(around, centre, TRIAL_TEXELS, TRIAL_SAMPLES, seed), centre).best
+
+    def _centre(self, name: str, without: Any, rays: Mirrored | None, seed: int) -> Floats:
+        """Where the probe stands: over a flat object, where it shows best what viewers see mirrored.
+
+        That is its middle where little is hidden from there; else one of the places that see more, if it shows it
+        better.
+        """
+        scene, mesh = self._scene, self._scene.object(name).mesh
+        if name in scene.probe_centres or rays is None or self._transmits(name) or flat_axis(mesh) is None:
+            return probe_centre(self._builder, name, without, self._solids.within(without))
+        seen = seen_along(rays.origins, rays.directions, without)
+        places = places_above(mesh, np.mean(scene.bounds, axis=0), without)
+        first, *hidden = (hidden_share(seen, place, without) for place in places)
+        if first <= HIDDEN:
+            return np.asarray(places[0])
+        tried = [0, *(i for i, share in enumerate(hidden, 1) if share < WORTH * first)]
+        errors = [self._error(rays, without, places[i], seed) for i in tried]
+        best = int(np.argmin(errors))
+        return np.asarray(places[tried[best] if errors[best] < WORTH * errors[0] else 0])
+
+    def _transmits(self, name: str) -> bool:
+        return self._scene.materials[self._scene.object(name).material].transmits
+
+    def bake(
+        self, name: str, texels: int, samples: int, noise: float, seed: int
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays radiance, distance and planes of one object's probe, and what to note.
+
+        Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
+        `hidden_share` and `parallax_deg` (`hidden`), `mirror_error` and `seen_irradiance` (`selection`).
+
+        Planes that the scene gives are taken as they are; others are found from what the probe sees.
+        """
+        without = self._without(frozenset(family(self._scene.parts, name)))
+        rays = self._mirrored(name, seed)
+        centre = self._centre(name, without, rays, seed)
+        left_out = not encloses(self._builder, name, centre, self._whole)
+        if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
+            alone, held = (self._error(rays, first, centre, seed) for first in (without, self._whole))
+            left_out = held >= WORTH * alone
+        seen = without if left_out else self._whole
+        around = Surroundings(seen, self._whole, self._cache, self._depth)
+        probe = bake_probe(around, centre, texels, samples, seed, noise)
+        given = self._scene.probe_planes.get(name)
+        if given is None:
+            planes = bounding_planes(probe.distance, probe.normals)
+            planes[:, 3] -= planes[:, :3] @ centre.astype(np.float32)
+        else:
+            planes = np.asarray(given, np.float32).reshape(-1, 4)
+        about = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
+        arrays: dict[str, NDArray[Any]] = {"radiance": probe.radiance, "distance": probe.distance, "planes": planes}
+        meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out}
+        meta["traced"] = self._cache is None
+        if rays is not None:
+            found = judged(rays, probe, centre, about, through=self._transmits(name))
+            if found.needs_distance and given is None:
+                arrays["planes"] = planes[:0]
+            meta["mirror_error"] = round(found.best, 3)
+            if found.scales:
+                meta["seen_irradiance"] = [float(value) for value in found.irradiance]
+        of_surface = seen_from(self._scene.object(name).mesh, seen)
+        meta["hidden_share"] = round(hidden_share(of_surface, centre, seen), 3)
+        meta["parallax_deg"] = round(parallax_deg(of_surface, centre, about), 2)
+        return arrays, meta

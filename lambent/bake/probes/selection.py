@@ -1,0 +1,195 @@
+"""How a probe is best taken and looked up: measured by what viewers see mirrored in its object.
+
+Rays leave points that viewers see along the mirror direction, and are path traced; the same rays are looked up in the
+probe. The error decides three things, each where it falls to WORTH of what it was:
+
+- A probe leaves its object out, as convex objects need it, or holds it, as hollow ones may, whose surfaces mirror each
+  other (a window reveal, a frame). Tried where OWN of the rays meet the object itself.
+- Look-ups go by bounding planes, or by the distance map, which costs more, where planes turn them wrongly (a glass
+  beside a bottle).
+- Light from the probe is scaled by a specular occlusion: the ratio of the light map's irradiance to the irradiance of
+  the probe alone, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II"). Near things hide
+  from a surface within a niche most of what the probe sees. Sharp mirrors do not gain by it and are left as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.light.cache import LightMapCache
+from lambent.bake.probes.planes import bounding_planes
+from lambent.bake.probes.probe import Probe
+from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.rays import array_of, independent, leaving, rays_from, towards
+from lambent.core.arrays import Flags, Floats
+from lambent.core.colour import luminance
+from lambent.core.cubemap import face_directions, sample, texel_solid_angles
+from lambent.core.directions import normalize, reflect
+from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.materials.document import Material
+from lambent.materials.lobes import fresnel
+
+RAYS = 2048
+LEAST_RAYS = 64  # fewer say nothing
+TRIAL_TEXELS, TRIAL_SAMPLES = 32, 8
+TRIES = 8  # viewers that are tried for each point
+GRAZING = 0.05  # least cosine of a viewer
+OWN = 0.15
+WORTH = 0.85
+# E(n) of radiance up to the second band is a sum over BASIS of n (Ramamoorthi & Hanrahan 2001, eq. 10): the weight of
+# each is the cosine lobe's coefficient times the square of the harmonic's norm.
+WEIGHTS = np.array([1 / 4, 1 / 2, 1 / 2, 1 / 2, 15 / 16, 15 / 16, 5 / 64, 15 / 16, 15 / 64])
+
+
+@dataclass(frozen=True)
+class Mirrored:
+    """Rays that viewers see mirrored: origins, unit directions and normals (n, 3), radiance (n, 3).
+
+    `irradiance` (n,) is the light map's luminance there, `fresnel` (n,) Schlick's term, and `own` (n,) bool whether the
+    ray meets the object itself.
+    """
+
+    origins: Floats
+    directions: Floats
+    normals: Floats
+    radiance: Floats
+    irradiance: Floats
+    fresnel: Floats
+    own: Flags
+
+
+def mirrored(
+    points: Floats, normals: Floats, places: Floats, material: Material, scene: Any, cache: LightMapCache, depth: int,
+    family: list[int], seed: int,
+) -> Mirrored | None:  # fmt: skip
+    """What viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3): each in one point.
+
+    Through a transmitting material they see what is behind: rays go straight on. None where too few points are in view.
+    `family` are the numbers of the Mitsuba shapes of the object and of its other parts.
+    """
+    rng = np.random.default_rng(seed)
+    found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
+    for _ in range(TRIES if len(places) else 0):
+        left = np.flatnonzero(~found)
+        if not len(left):
+            break
+        tried = places[rng.integers(len(places), size=len(left))]
+        free = _free(scene, points[left], normals[left], tried)
+        eyes[left[free]], found[left[free]] = tried[free], True
+    if found.sum() < LEAST_RAYS:
+        return None
+    at, n = points[found], normals[found]
+    view = normalize(eyes[found] - at)
+    directions = -view if material.transmits else reflect(view, n)
+    ray = leaving(scene, at, n, directions)
+    sampler = independent(seed & 0xFFFFFFFF, len(at))
+    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), depth, cache)
+    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    met = scene.ray_intersect_preliminary(ray).shape
+    own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
+    below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
+    irradiance = array_of(cache.irradiance(below, below.is_valid())).astype(float)
+    r0 = max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
+    share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0))
+    origins, radiance = array_of(ray.o).astype(float), array_of(value).astype(float)
+    return Mirrored(origins, directions, n, radiance, luminance(irradiance), share, own)
+
+
+def _free(scene: Any, points: Floats, normals: Floats, eyes: Floats) -> Flags:
+    """Whether nothing stands between points and eyes, on the side of the normals."""
+    offset = eyes - points
+    in_front = (offset * normals).sum(axis=1) > GRAZING * np.linalg.norm(offset, axis=1)
+    return np.asarray(in_front & ~np.array(scene.ray_test(towards(scene, points, normals, eyes))))
+
+
+def error(rays: Mirrored, looked_up: Floats) -> float:
+    """Mean difference of luminances (n,) to what is mirrored, as the eye counts: in log(1 + L/m), m the median."""
+    true, shown = luminance(rays.radiance) * rays.fresnel, looked_up * rays.fresnel
+    m = max(float(np.median(true)), 1e-6)
+    return float(np.abs(np.log1p(shown / m) - np.log1p(true / m)).mean())
+
+
+def by_planes(rays: Mirrored, radiance: Floats, centre: Floats, planes: Floats) -> Floats:
+    """Luminance (n,) that rays find in a probe by planes (P, 4) about its centre."""
+    return _found(radiance, planes_lookup(rays.origins - centre, rays.directions, planes))
+
+
+def by_distance(rays: Mirrored, radiance: Floats, centre: Floats, distance: Floats) -> Floats:
+    """Luminance (n,) that rays find in a probe by its distance map (6, N, N)."""
+    return _found(radiance, distance_lookup(rays.origins - centre, rays.directions, inverse_depth(distance)))
+
+
+def _found(radiance: Floats, directions: Floats) -> Floats:
+    return np.asarray(luminance(sample(radiance.astype(float), normalize(directions))))
+
+
+def basis_of(n: Floats) -> Floats:
+    """(..., 9) products of the components of unit vectors that WEIGHTS belong to."""
+    x, y, z = n[..., 0], n[..., 1], n[..., 2]
+    return np.stack([np.ones_like(x), x, y, z, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y], axis=-1)
+
+
+def irradiance_of(radiance: Floats) -> Floats:
+    """Luminance of the irradiance that a cube of radiance (6, N, N, 3) gives, as a sum (9,) over `basis_of` normals."""
+    n = radiance.shape[1]
+    w = normalize(face_directions(n)).reshape(-1, 3)
+    weighted = luminance(radiance.astype(float)).reshape(-1) * np.broadcast_to(texel_solid_angles(n), (6, n, n)).ravel()
+    return np.asarray(WEIGHTS * (weighted @ basis_of(w)))
+
+
+def specular_occlusion(rays: Mirrored, irradiance: Floats) -> Floats:
+    """Ratio (n,) of the light map's irradiance to that of the probe alone (9,), at most 1."""
+    whole = np.maximum(basis_of(rays.normals) @ irradiance, 1e-6)
+    return np.asarray(np.clip(rays.irradiance / whole, 0, 1))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Errors of a probe: looked up by planes, the same with `specular_occlusion`, and by the distance map.
+
+    `irradiance` (9,) is the probe's.
+    """
+
+    plain: float
+    scaled: float
+    irradiance: Floats
+    distance: float
+
+    @property
+    def scales(self) -> bool:
+        return self.scaled < WORTH * self.plain
+
+    @property
+    def by_planes(self) -> float:
+        return self.scaled if self.scales else self.plain
+
+    @property
+    def needs_distance(self) -> bool:
+        return self.distance < WORTH * self.by_planes
+
+    @property
+    def best(self) -> float:
+        return self.distance if self.needs_distance else self.by_planes
+
+
+def judged(
+    rays: Mirrored, probe: Probe, centre: Floats, planes: Floats | None = None, *, through: bool = False
+) -> Judged:
+    """How well a probe shows what is mirrored, by `planes` (P, 4) about its centre, or those that are found for it.
+
+    What is seen `through` an object is not scaled.
+    """
+    if planes is None:
+        planes = bounding_planes(probe.distance, probe.normals)
+    light = by_planes(rays, probe.radiance, centre, planes.astype(float))
+    irradiance = irradiance_of(probe.radiance)
+    share = np.ones(len(light)) if through else specular_occlusion(rays, irradiance)
+    plain, scaled = error(rays, light), error(rays, light * share)
+    marched = by_distance(rays, probe.radiance, centre, probe.distance.astype(float))
+    distance = error(rays, marched * (share if scaled < WORTH * plain else 1.0))
+    return Judged(plain, scaled, irradiance, distance)

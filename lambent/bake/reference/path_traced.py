@@ -1,0 +1,83 @@
+"""Path traced images of a scene, with their variance: the reference for the renderer's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.tiles import seed_of
+from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.rays import block_sums, independent
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera, image_plane
+from lambent.core.progress import Progress, silent
+from lambent.scenes.scene import Scene
+from lambent.scenes.textures import prepared
+
+PATHS_AT_ONCE = 1 << 20
+MAX_DEPTH = 16
+
+
+def render_reference(
+    scene: Scene,
+    camera: Camera,
+    width: int,
+    height: int,
+    spp: int,
+    seed: int = 0,
+    progress: Progress = silent,
+    *,
+    max_depth: int = MAX_DEPTH,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Path trace the view of a pinhole camera, pixels filtered by a box.
+
+    Parameters
+    ----------
+    spp : int
+        Samples per pixel, at least 2; rounded up to whole passes.
+    seed : int
+        The same seed gives the same image.
+
+    Returns
+    -------
+    image, variance : (height, width, 3) float32
+        Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
+    """
+    builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
+    balance_emitters(builder)
+    whole = builder.build()
+    per_pass = max(1, min(spp, PATHS_AT_ONCE // (width * height)))
+    passes = -(-spp // per_pass)
+    total, squares = np.zeros((2, width * height, 3))
+    for k in range(passes):
+        sums = _pass(whole, camera, (width, height), per_pass, seed_of(seed, "reference", k), max_depth)
+        total, squares = total + sums[0], squares + sums[1]
+        progress(k + 1, passes, f"path tracing {camera.name}")
+    samples = passes * per_pass
+    mean = total / samples
+    variance = np.maximum(squares / samples - mean**2, 0) / max(1, samples - 1)
+    shape = (height, width, 3)
+    return mean.reshape(shape).astype(np.float32), variance.reshape(shape).astype(np.float32)
+
+
+def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, seed: int, max_depth: int) -> Floats:
+    """Sums and sums of squares (2, pixels, 3) over `samples` paths per pixel."""
+    width, height = size
+    count = width * height * samples
+    sampler = independent(seed, count)
+    pixel = dr.arange(mi.UInt32, count) // samples
+    jitter = sampler.next_2d()
+    x, y = (pixel % width + jitter.x) / width * 2 - 1, 1 - (pixel // width + jitter.y) / height * 2
+    across, up, forward = (mi.Vector3f(*map(float, axis)) for axis in image_plane(camera, width, height))
+    origin = mi.Point3f(*map(float, camera.position)) + dr.zeros(mi.Point3f, count)
+    ray = mi.Ray3f(origin, dr.normalize(across * x + up * y + forward))
+    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), max_depth)
+    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    dr.eval(value)
+    return np.stack([block_sums(v, samples) for v in (value, value * value)]).astype(float)

@@ -1,0 +1,58 @@
+"""Work as a list of independent tiles: the chunks of one array, each with a seed of its own.
+
+Because the seed belongs to the tile, the result is the same whatever the order, and after any interruption.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.progress import Progress
+from lambent.store.store import Chunk, Writer
+
+Tile = Callable[[tuple[slice, ...], int], NDArray[Any]]  # (region of the array, seed) -> its content
+
+
+def seed_of(seed: int, *place: object) -> int:
+    """32-bit seed of a piece of work, from the user's seed and what tells the piece from others."""
+    text = "/".join(map(str, (seed, *place)))
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
+
+
+def slices(count: int, at_once: int) -> list[slice]:
+    """Slices of so many items, some at once."""
+    return [slice(first, min(first + at_once, count)) for first in range(0, count, at_once)]
+
+
+def run_tiles(
+    writer: Writer,
+    tile: Tile,
+    *,
+    seed: int,
+    progress: Progress,
+    what: str,
+    cost: Callable[[tuple[slice, ...]], float] = lambda region: 1.0,
+) -> None:
+    """Compute the missing chunks of an array and write each as soon as it is done.
+
+    Parameters
+    ----------
+    tile : callable
+        Content of a region, from the region and the tile's seed.
+    cost : callable
+        Expected work of a region in any unit, so that progress moves evenly.
+    """
+    name = writer.artefact.name
+    costs: dict[Chunk, float] = {chunk: cost(writer.region(chunk)) for chunk in writer.artefact.chunk_grid}
+    total = sum(costs.values())
+    done = total - sum(costs[chunk] for chunk in writer.missing)
+    progress(done, total, what)
+    for chunk in writer.missing:
+        writer.write(chunk, np.asarray(tile(writer.region(chunk), seed_of(seed, name, chunk))))
+        done += costs[chunk]
+        progress(done, total, what)

@@ -1,0 +1,67 @@
+"""How often each emitter is sampled: in proportion to the light it brings to the scene's surfaces.
+
+Mitsuba chooses emitters with equal probability, so that the sun of a room with ten lamps gets one sample in eleven.
+The variance of choosing emitter i with probability p_i is least for p_i in proportion to the root mean square of its
+contribution when chosen; a short pre-pass measures that, shadows included.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.sky.guide import guided_sky, learn
+from lambent.bake.tracing import path_tracer, rays
+from lambent.bake.tracing.rays import array_of, independent, vectors
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.arrays import Floats
+from lambent.core.colour import luminance
+from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
+from lambent.scenes.scene import Scene
+
+POINTS, SAMPLES = 8192, 16
+FLOOR = 0.1  # of the mean weight: light that the pre-pass has missed costs noise, and is not lost
+
+
+def balance_emitters(builder: SceneBuilder) -> None:
+    """Set the sampling weights of a builder's emitters, for the scenes it builds from now on. Deterministic.
+
+    The environment is guided first (`sky.guide`): its contribution depends on how it is sampled.
+    """
+    if builder.environment is not None:
+        whole = builder.build()
+        guide = learn(builder.scene, whole, builder.environment)
+        if guide is not None:
+            builder.environment = guided_sky(builder.environment, guide, whole.bbox())
+    emitters = builder.emitters()
+    if len(emitters) < 2:
+        return
+    position, normal = _points_and_normals(builder.scene, POINTS)
+    scene = builder.build()
+    width = POINTS * SAMPLES
+    sampler = independent(0, width)
+    at = dr.arange(mi.UInt32, width) // SAMPLES
+    si = dr.zeros(mi.SurfaceInteraction3f, width)
+    si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, position), at)
+    si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normal), at))
+    ds, value = path_tracer.sample_emitter(scene, si, sampler.next_2d(), mi.Bool(True), rays.has_holes(scene))
+    value *= dr.maximum(dr.dot(ds.d, si.n), 0.0)
+    brought = luminance(np.nan_to_num(array_of(value), posinf=0.0))
+    chosen = np.array(dr.reinterpret_array(mi.UInt32, ds.emitter))
+    numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
+    squares = np.bincount(chosen, brought**2, minlength=max(numbers) + 1)[numbers]
+    counts = np.bincount(chosen, minlength=max(numbers) + 1)[numbers]
+    weight = np.sqrt(squares / np.maximum(counts, 1))
+    if weight.any():
+        builder.weigh_emitters(weight / weight.mean() + FLOOR)
+
+
+def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats]:
+    """Points (count, 3) and normals, spread over all surfaces as the light map's texels are."""
+    rng = np.random.default_rng(0)
+    corners = scene.corners
+    scale = np.concatenate([np.full(len(o.mesh.faces), o.light_map_scale) for o in scene.objects])
+    area = triangle_areas(corners) * scale**2
+    face = rng.choice(len(area), size=count, p=area / area.sum())
+    return points_on_triangles(corners, face, rng), triangle_normals(corners[face])

@@ -1,0 +1,168 @@
+"""Path tracing: radiance along rays and irradiance at points, one vectorised loop for every bake.
+
+Multiple importance sampling between emitter sampling and BSDF sampling (Veach 1997, balance heuristic), Russian
+roulette from the second bounce on. The path starts at a vertex that the caller has sampled, with its density.
+
+Paths and shadow rays pass holes of surfaces (`rays`). An emitter is sampled as if it had none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lambent.bake.tracing import rays
+
+ROULETTE_DEPTH = 2
+Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
+
+
+@dataclass
+class Start:
+    """Where paths start: `ray`, the interaction it leaves, and the density of its direction, pdf (sr^-1).
+
+    The density weights the emitters that the ray meets; `direct` counts them in full, where nothing else samples them.
+    """
+
+    ray: Any
+    origin: Any
+    pdf: Any
+    direct: bool
+
+
+def camera_start(ray: Any) -> Start:
+    """Start of paths from a camera: nothing else samples their first ray."""
+    return Start(ray, dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o)), mi.Float(1.0), True)
+
+
+def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cache | None = None) -> Any:
+    """Radiance (mi.Color3f) that arrives along rays, W/(sr m^2).
+
+    Parameters
+    ----------
+    max_depth : int
+        Vertices on a path, the last emitter not counted: 1 sees emitters and, with a cache, diffuse surfaces.
+    cache : callable, optional
+        Diffuse radiance at a surface from baked light; the scene's materials must then be without diffuse terms.
+    """
+    return _trace(
+        scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
+        mi.Bool(start.direct), max_depth, cache or _nothing, rays.has_holes(scene),
+    )  # fmt: skip
+
+
+def _nothing(si: Any, active: Any) -> Any:
+    return mi.Color3f(0.0)
+
+
+def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tuple[Any, Any]:
+    """DirectionSample3f of Mitsuba's `sample_emitter_direction`, and what arrives over its density, 0 in shadow."""
+    ds, value = scene.sample_emitter_direction(si, u, False, active)
+    lit = active & (ds.pdf > 0)
+    lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)
+    return ds, dr.select(lit, value, 0.0)
+
+
+@dr.syntax
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  # type: ignore[no-untyped-def]
+    width = dr.width(ray.o)
+    result = dr.zeros(mi.Color3f, width)
+    throughput = dr.ones(mi.Color3f, width)
+    depth = dr.zeros(mi.UInt32, width)
+    active = dr.full(mi.Bool, True, width)
+    ctx = mi.BSDFContext()
+    while active:
+        si = rays.intersect(scene, ray, active, holes)
+        ds = mi.DirectionSample3f(scene, si, origin)
+        emitter = si.emitter(scene)
+        pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
+        weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
+        result += dr.select(active, throughput * emitter.eval(si, active) * weight, 0.0)
+        active &= si.is_valid() & (depth < max_depth)
+        result += dr.select(active, throughput * cache(si, active), 0.0)
+
+        at = mi.SurfaceInteraction3f(si)  # with the normal on the ray's side, by which a guided sky is sampled
+        at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)
+        bsdf = si.bsdf(ray)
+        lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        ds, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, lit)
+        lit &= ds.pdf > 0
+        wo = si.to_local(ds.d)
+        f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
+            ctx, si, wo, sampler.next_1d(active), sampler.next_2d(active), active
+        )
+        weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, pdf_bsdf))
+        brought = throughput * f * value * weight
+        lit &= dr.max(brought) > 0  # a narrow lobe sees few emitters; the others need no shadow rays
+        lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)
+        result += dr.select(lit, brought, 0.0)
+
+        throughput *= f_sample
+        origin = mi.SurfaceInteraction3f(at)
+        pdf = mi.Float(sample.pdf)
+        direct = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        ray = rays.leaving(scene, si.p, si.n, si.to_world(sample.wo))
+        depth += 1
+        brightest = dr.max(throughput)
+        active &= (brightest > 0) & (pdf > 0)
+        survive = dr.select(depth >= ROULETTE_DEPTH, dr.minimum(brightest, 0.95), 1.0)
+        active &= sampler.next_1d(active) < survive
+        throughput *= dr.rcp(dr.maximum(survive, 1e-6))
+    return result
+
+
+def _balance(a: Any, b: Any) -> Any:
+    return dr.select(a > 0, a / (a + b), 0.0)
+
+
+@dataclass
+class Points:
+    """Points on surfaces, one per thread: position, shading normal and triangle normal on the lit side."""
+
+    position: Any
+    normal: Any
+    flat: Any
+
+
+def irradiance(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
+) -> Any:
+    """One sample of irradiance (mi.Color3f) at each point, W/m^2, all bounces.
+
+    Parameters
+    ----------
+    u_bsdf, u_emitter : mi.Point2f
+        In [0, 1)^2, for a cosine distributed direction and a point on an emitter; to be stratified.
+    max_depth, cache
+        As `radiance` takes them.
+    """
+    (found, _), (aimed, _) = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    return found + aimed
+
+
+def moment(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
+) -> Any:
+    """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
+    both = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in both))
+
+
+def _contributions(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None
+) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """Contributions to the irradiance from BSDF and emitter sampling, each with its direction."""
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
+    si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
+    local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
+    ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
+    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth, cache)
+    ds, value = sample_emitter(scene, si, u_emitter, mi.Bool(True), rays.has_holes(scene))
+    cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
+    weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
+    direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)
+    return (dr.pi * arriving, ray.d), (direct, ds.d)

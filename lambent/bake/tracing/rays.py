@@ -1,0 +1,161 @@
+"""Rays: their way to Dr.Jit, where they leave surfaces, and what they meet.
+
+Where a texture says that there is no surface (`eval_null_transmission` of the BSDF), rays go on as if nothing were
+there. `holes` is `has_holes(scene)` everywhere: where no shape has holes, nothing is spent on looking for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.core.directions import basis
+from lambent.core.sequences import cosine_hemisphere, r2
+
+ALIGNED_BYTES = 64  # the longest vectors that LLVM has
+OFFSET = 1e-5  # metres, and share of the largest coordinate, over a surface from where rays leave it
+OFFSET_OF_SCENE = 1e-7  # likewise, of the scene's diagonal: rays over a triangle of 1 km meet it from 30 micrometres
+APPROACH = 10 * OFFSET  # likewise, before a surface that rays fall onto: at grazing incidence little of it is height
+SHADOW_SHORT = 9e-4  # share of a ray to a point that it ends before it, Mitsuba's own
+
+
+def vectors(kind: Any, array: Floats) -> Any:
+    """An array (..., 3) as `kind`: mi.Vector3f, mi.Point3f or mi.Normal3f, one after another.
+
+    Kernels do not depend on the array. Dr.Jit takes an (n, 3) array apart by a kernel that holds n as a constant, and
+    compiles another one for memory that does not begin at a multiple of the vector's length: seconds, where the kernel
+    traces paths.
+    """
+    return kind(*(mi.Float(_aligned(component)) for component in array.reshape(-1, 3).T))
+
+
+def rays_from(origins: Floats, directions: Floats) -> Any:
+    """mi.Ray3f from origins (n, 3), or one (3,), along directions (n, 3)."""
+    return mi.Ray3f(vectors(mi.Point3f, np.broadcast_to(origins, directions.shape)), vectors(mi.Vector3f, directions))
+
+
+def array_of(vector: Any) -> NDArray[np.float32]:
+    """A vector or colour of Dr.Jit as an array (n, 3)."""
+    components = [vector[0], vector[1], vector[2]]
+    dr.eval(components)
+    return np.stack([np.array(c) for c in components], axis=-1)
+
+
+def block_sums(vector: Any, n: int) -> NDArray[np.float32]:
+    """Sums (..., 3) over every n consecutive vectors or colours of Dr.Jit."""
+    return np.stack([np.array(dr.block_sum(component, n)) for component in (vector.x, vector.y, vector.z)], axis=-1)
+
+
+def _aligned(values: Floats) -> NDArray[np.float32]:
+    """A copy (n,) that begins at a multiple of ALIGNED_BYTES."""
+    memory = np.empty(4 * len(values) + ALIGNED_BYTES, np.uint8)
+    start = -memory.ctypes.data % ALIGNED_BYTES
+    result = memory[start : start + 4 * len(values)].view(np.float32)
+    result[:] = values
+    return result
+
+
+def independent(seed: int, width: int) -> Any:
+    """mi.Sampler of independent random numbers for so many threads."""
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, width)
+    return sampler
+
+
+def leaving(scene: Any, p: Any, n: Any, direction: Any) -> Any:
+    """Rays that leave points p of surfaces of normals n, on the side of `direction`: Dr.Jit's, or arrays (n, 3).
+
+    They are offset by 1/9 of Mitsuba's epsilon; with Mitsuba's, rays miss contact geometry.
+    """
+    p, n, direction = _on_device(p, n, direction)
+    box = scene.bbox()
+    size = float(dr.norm(box.extents())) if box.valid() else 0.0
+    above = OFFSET * (1 + dr.max(dr.abs(p))) + dr.opaque(mi.Float, OFFSET_OF_SCENE * size)
+    return mi.Ray3f(mi.Point3f(p + n * dr.mulsign(above, dr.dot(n, direction))), direction)
+
+
+def towards(scene: Any, p: Any, n: Any, target: Any) -> Any:
+    """Rays that leave points p of surfaces of normals n, and end just before a point elsewhere; as `leaving`."""
+    p, n, target = _on_device(p, n, target)
+    start = leaving(scene, p, n, target - p).o
+    offset = target - start
+    distance = dr.norm(offset)
+    ray = mi.Ray3f(start, offset / distance)
+    ray.maxt = distance * (1 - SHADOW_SHORT)
+    return ray
+
+
+def _on_device(*values: Any) -> Iterator[Any]:
+    return (vectors(mi.Vector3f, v) if isinstance(v, np.ndarray) else v for v in values)
+
+
+def cosine_directions(normals: Floats) -> Floats:
+    """Cosine distributed directions (n, 3) about unit normals (n, 3), by the R2 sequence."""
+    t, b = basis(normals)
+    local = cosine_hemisphere(r2(len(normals)))
+    return np.asarray(local[:, :1] * t + local[:, 1:2] * b + local[:, 2:] * normals)
+
+
+def distances(scene: Any, ray: Any) -> NDArray[np.float64]:
+    """Distances (n,) to what rays meet first, infinite where there is nothing."""
+    return np.array(scene.ray_intersect_preliminary(ray).t).astype(float)
+
+
+def has_holes(scene: Any) -> bool:
+    """Whether a shape of the scene has holes."""
+    return any(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null) for shape in scene.shapes())
+
+
+def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
+    """What a ray meets behind all holes; `si.t` counts from the last of them."""
+    if not holes:
+        return scene.ray_intersect(ray, active)
+    return _behind_holes(scene, mi.Ray3f(ray), mi.Bool(active))
+
+
+def in_shadow(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
+    """Whether anything without a hole blocks a ray."""
+    if not holes:
+        return scene.ray_test(ray, active)
+    return intersect(scene, ray, active, True).is_valid()
+
+
+def hidden(scene: Any, p: Any, n: Any, target: Any, active: Any, holes: bool) -> Any:
+    """Whether anything without a hole stands between points p of surfaces of normals n and a point elsewhere."""
+    ray = towards(scene, p, n, target)
+    return _blocked(scene, ray, mi.Point3f(target), mi.Bool(active)) if holes else scene.ray_test(ray, active)
+
+
+def _is_hole(si: Any, active: Any) -> Any:
+    met = active & si.is_valid()
+    return met & (si.bsdf().eval_null_transmission(si, met)[0] > 0.5)
+
+
+@dr.syntax
+def _behind_holes(scene, ray, active):  # type: ignore[no-untyped-def]
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
+    si.t = dr.full(mi.Float, dr.inf, dr.width(ray.o))  # nothing is met where `active` is false
+    again = active
+    while again:
+        si = scene.ray_intersect(ray, again)
+        ray = leaving(scene, si.p, si.n, ray.d)
+        again = _is_hole(si, again)
+    return si
+
+
+@dr.syntax
+def _blocked(scene, ray, target, active):  # type: ignore[no-untyped-def]
+    blocked = mi.Bool(False)
+    again = active
+    while again:
+        si = scene.ray_intersect(ray, again)
+        ray = towards(scene, si.p, si.n, target)
+        blocked = si.is_valid()
+        again = _is_hole(si, again)
+    return blocked

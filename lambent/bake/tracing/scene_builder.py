@@ -1,0 +1,190 @@
+"""A scene as Mitsuba sees it.
+
+Mitsuba's world is ours: right-handed, y up, metres. Every object stays one Mitsuba mesh with the object's name as id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
+from lambent.bake.bsdfs.table_plugin import table_dict
+from lambent.bake.sky.daylight import sky_image
+from lambent.core.arrays import Floats
+from lambent.core.images import read_image
+from lambent.materials.measured.patch_sheet import Lookup
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Environment, Light, Scene, SceneObject, SunSky
+
+UV2_ATTRIBUTE = "vertex_uv2"
+
+
+@dataclass(frozen=True)
+class EmitterSampling:
+    """How a pre-pass has found emitters are best sampled: the environment (mi.Emitter), guided or not, and weights.
+
+    weights (n,) are those of `SceneBuilder.emitters()`.
+    """
+
+    environment: Any
+    weights: Floats
+
+
+class SceneBuilder:
+    """Makes Mitsuba scenes of one scene: whole, or with objects left out; meshes are shared between them.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to build.
+    uv2 : mapping, optional
+        Light map coordinates (V, 2) per object name; they become the mesh attribute `vertex_uv2` (third component 0).
+    diffuse : bool
+        False takes the diffuse terms out of all materials (for tracing with a light map).
+    measured : mapping, optional
+        Tables by material name, by which surfaces scatter instead of their material, whole even without `diffuse`.
+    sampling : EmitterSampling, optional
+        Of another builder of the same scene, whose emitters are sampled alike.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        uv2: Mapping[str, Floats] | None = None,
+        *,
+        diffuse: bool = True,
+        measured: Mapping[str, Lookup] | None = None,
+        sampling: EmitterSampling | None = None,
+    ) -> None:
+        register_material_plugin()
+        self.scene, self.measured = scene, measured or {}
+        tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
+        # Equal materials share a BSDF: each one costs every kernel a function of its own.
+        bsdfs: dict[object, Any] = {}
+        self.meshes = {}
+        for o in scene.objects:
+            bsdf = tables.get(o.material)
+            if bsdf is None:
+                material, textures = scene.materials[o.material], scene.textures.get(o.material)
+                look = (material_dict(material, diffuse=diffuse)["material"], textures and o.material)
+                if look not in bsdfs:
+                    bsdfs[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse))
+                bsdf = bsdfs[look]
+            self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
+        self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
+        self.environment: Any = scene.environment and mi.load_dict(environment_dict(scene.environment))
+        if sampling is not None:
+            self.environment = sampling.environment
+            self.weigh_emitters(sampling.weights)
+
+    def build(self, leave_out: Collection[str] = ()) -> Any:
+        """mi.Scene without the named objects (their emission goes with them)."""
+        parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
+        parts |= {f"light_{i}": light for i, light in enumerate(self._lights)}
+        if self.environment is not None:
+            parts["environment"] = self.environment
+        if not self._lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
+            parts["darkness"] = {"type": "constant", "radiance": 0.0}  # Mitsuba warns about a scene without light
+        return mi.load_dict({"type": "scene", **parts}, optimize=False)
+
+    def emitters(self) -> list[Any]:
+        """All mi.Emitter: of objects, lights, environment."""
+        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._lights
+        return [*found, self.environment] if self.environment is not None else found
+
+    def sampling(self) -> EmitterSampling:
+        """How emitters are sampled, for another builder of the same scene."""
+        weights = np.array([float(mi.traverse(emitter)["sampling_weight"]) for emitter in self.emitters()])
+        return EmitterSampling(self.environment, weights)
+
+    def weigh_emitters(self, weights: Floats) -> None:
+        """Set how often each of `emitters()` is chosen, relative to the others, in scenes built from now on."""
+        for emitter, weight in zip(self.emitters(), weights, strict=True):
+            parameters = mi.traverse(emitter)
+            parameters["sampling_weight"] = float(weight)
+            parameters.update()
+
+    def shape_number(self, name: str) -> int:
+        """Mitsuba's number of an object's shape: what `si.shape` is, reinterpreted."""
+        return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(self.meshes[name]))[0])
+
+    def object_numbers(self) -> Any:
+        """mi.UInt32 that maps Mitsuba's shape number (reinterpreted `si.shape`) to the object's index in the scene."""
+        ids = [self.shape_number(name) for name in self.meshes]
+        table = np.zeros(max(ids) + 1, np.uint32)
+        table[ids] = np.arange(len(ids))
+        return mi.UInt32(table)
+
+
+def light_map_uv(si: Any, active: Any) -> Any:
+    """Light map coordinates (mi.Point2f) of surface interactions."""
+    uv2 = si.shape.eval_attribute_3(UV2_ATTRIBUTE, si, active)
+    return mi.Point2f(uv2.x, uv2.y)
+
+
+def light_map_texel(si: Any, width: int, height: int, active: Any) -> Any:
+    """Texel (mi.UInt32), row * width + column, of the light map that surface interactions lie in."""
+    uv2 = light_map_uv(si, active)
+    column = dr.clip(mi.Int32(dr.floor(uv2.x * width)), 0, width - 1)
+    row = dr.clip(mi.Int32(dr.floor(uv2.y * height)), 0, height - 1)
+    return mi.UInt32(row * width + column)
+
+
+def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
+    """mi.Mesh of an object with a BSDF, its brushing direction and, if given, its light map coordinates."""
+    props = mi.Properties()
+    props["mesh_bsdf"] = bsdf
+    if any(o.emission):
+        props["mesh_emitter"] = mi.load_dict({"type": "area", "radiance": _rgb(o.emission)})
+    vertices, faces = len(o.mesh.positions), len(o.mesh.faces)
+    mesh = mi.Mesh(o.name, vertices, faces, props=props, has_vertex_normals=True, has_vertex_texcoords=True)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(o.mesh.positions.astype(np.float32).ravel())
+    parameters["vertex_normals"] = mi.Float(o.mesh.normals.astype(np.float32).ravel())
+    parameters["vertex_texcoords"] = mi.Float(o.mesh.uv.astype(np.float32).ravel())
+    parameters["faces"] = mi.UInt32(o.mesh.faces.astype(np.uint32).ravel())
+    parameters.update()
+    mesh.add_attribute(TANGENT_ATTRIBUTE, 3, o.mesh.tangents.astype(np.float32).ravel())
+    if uv2 is not None:
+        padded = np.concatenate([uv2, np.zeros((vertices, 1))], axis=1)
+        mesh.add_attribute(UV2_ATTRIBUTE, 3, padded.astype(np.float32).ravel())
+    return mesh
+
+
+def _rgb(value: tuple[float, float, float]) -> dict[str, Any]:
+    return {"type": "rgb", "value": list(value)}
+
+
+def light_dict(light: Light) -> dict[str, Any]:
+    """Mitsuba's dictionary of a light."""
+    if isinstance(light, DirectionalLight):
+        return {"type": "directional", "direction": list(light.direction), "irradiance": _rgb(light.irradiance)}
+    if light.direction is None:
+        return {"type": "point", "position": list(light.position), "intensity": _rgb(light.intensity)}
+    origin = np.asarray(light.position, float)
+    aside = [0.0, 0.0, 1.0] if abs(light.direction[1]) > 0.9 * np.linalg.norm(light.direction) else [0.0, 1.0, 0.0]
+    frame = mi.ScalarTransform4f().look_at(origin.tolist(), (origin + light.direction).tolist(), aside)
+    angles = {"cutoff_angle": light.outer_deg, "beam_width": min(light.inner_deg, light.outer_deg)}
+    return {"type": "spot", "to_world": frame, "intensity": _rgb(light.intensity), **angles}
+
+
+def environment_dict(environment: Environment) -> dict[str, Any]:
+    """Mitsuba's dictionary of an environment.
+
+    Mitsuba's lat-long image looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
+    """
+    if isinstance(environment, ConstantEnvironment):
+        # an image, since Mitsuba's own constant evaluates to one value for any number of directions
+        image, scale, rotation_deg = np.full((8, 16, 3), environment.radiance, np.float32), 1.0, 0.0
+    elif isinstance(environment, SunSky):
+        image, scale, rotation_deg = sky_image(environment), 1.0, 0.0
+    else:
+        image = read_image(environment.file)[..., :3].astype(np.float32)
+        scale, rotation_deg = environment.scale, environment.rotation_deg
+    turned = mi.ScalarTransform4f().rotate([0, 1, 0], 180 + rotation_deg)
+    return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(image)), "scale": scale, "to_world": turned}

@@ -1,0 +1,136 @@
+"""The scene as a bake traces it: Mitsuba's scenes, and which points of the light map are lit and seen, each made once.
+
+Everything follows from the scene and the split meshes alone: a bake that continues an interrupted one finds the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.surfaces.atlas import Atlas
+from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
+from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
+from lambent.bake.tracing.solids import SolidTest
+from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.files import sha256_of
+from lambent.core.progress import Progress, silent
+from lambent.materials.measured.patch_sheet import Lookup, lookup_of
+from lambent.materials.measured.registry import load
+
+
+class TracedScene:
+    """Shared by the artefacts of a bake. `merged` is the geometry of the atlas in one, as in `atlas.merged`.
+
+    `two_sided` is, of each object, whether its back has a light map too.
+    """
+
+    def __init__(
+        self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent
+    ) -> None:
+        self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
+        self._two_sided = np.repeat(two_sided, [len(o.mesh.faces) for o in self.scene.objects])
+        self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
+        self._whole: Any = None
+        self._sampling: EmitterSampling | None = None
+        self._sides: dict[float, Sides] = {}
+        self._views: dict[float, tuple[Sides, Indices]] = {}
+
+    def builder(self, *, diffuse: bool, photons: bool = False) -> SceneBuilder:
+        """Builder of the scene, with or without diffuse terms; kept until another one is asked for.
+
+        Kernels contain every live BSDF, traced or not: two builders would double the time to compile. All builders
+        sample emitters as the pre-pass of the first one found.
+        """
+        kind = diffuse, photons
+        if self._builder is None or self._builder[0] != kind:
+            self._builder = self._whole = None
+            tables = self._measured_tables(photons)
+            builder = SceneBuilder(
+                self.scene, self.atlas.uv2, diffuse=diffuse, measured=tables, sampling=self._sampling
+            )
+            if self._sampling is None:
+                balance_emitters(builder)
+                self._sampling = builder.sampling()
+            self._builder = kind, builder
+        return self._builder[1]
+
+    def _measured_tables(self, photons: bool) -> Mapping[str, Lookup]:
+        """Tables that materials scatter by, by the material's name, for photons with light and viewer exchanged.
+
+        The renderer shows a fit of the table, the material's document.
+        """
+        files = self.scene.measured
+        worn = {o.material for o in self.scene.objects} & set(files)
+        tell: Any = self.progress  # hashable, which its protocol does not say
+        return {name: _lookup(files[name], sha256_of(files[name]), photons, tell) for name in sorted(worn)}
+
+    def whole(self, *, diffuse: bool, photons: bool = False) -> Any:
+        """mi.Scene of that builder, with all objects."""
+        builder = self.builder(diffuse=diffuse, photons=photons)
+        if self._whole is None:
+            self._whole = builder.build()
+        return self._whole
+
+    @cached_property
+    def texels(self) -> Texels:
+        return texels_of(self.merged, self.atlas.width, self.atlas.height)
+
+    @cached_property
+    def labels(self) -> Indices:
+        """(H, W) chart of each texel."""
+        return chart_labels(self.merged, self.texels)
+
+    def lit_sides(self, sign: float) -> Sides:
+        """Points that light can reach, on the normals' side (sign +1) or the other (-1)."""
+        if sign not in self._sides:
+            ours = np.ones(self.texels.face.shape, bool) if sign > 0 else self._two_sided[self.texels.face]
+            kind = self._at_hand
+            solids = SolidTest(self.builder(**kind), self.whole(**kind))
+            within = self._of_points(ours, sign, solids.embedded)
+            self._sides[sign] = Sides(self.texels, sign, ours & ~within)
+        return self._sides[sign]
+
+    def in_view(self, sign: float) -> tuple[Sides, Indices]:
+        """`lit_sides` without hidden points, where a texel has others, and `labels` with BEYOND for hidden texels."""
+        if sign not in self._views:
+            sides = self.lit_sides(sign)
+            self.progress(0, 1, "visibility")
+            whole = self.whole(**self._at_hand)
+            found = self._of_points(sides.valid, sign, lambda p, n: seen(whole, self.places, p, n))
+            valid, labels = without_hidden(self.texels, sides.valid, found, self.labels)
+            self._views[sign] = replace(sides, valid=valid), labels
+        return self._views[sign]
+
+    @cached_property
+    def places(self) -> Floats:
+        """(n, 3) where viewers may stand."""
+        return viewing_places(self.scene, self.whole(**self._at_hand))
+
+    @property
+    def _at_hand(self) -> dict[str, bool]:
+        """The kind of scene at hand, if there is one: the shapes of all kinds are the same."""
+        diffuse, photons = self._builder[0] if self._builder else (False, False)
+        return {"diffuse": diffuse, "photons": photons}
+
+    def _of_points(self, asked: Flags, sign: float, test: Callable[[Floats, Floats], Flags]) -> Flags:
+        """(K, POINTS) results of a test of points (n, 3) and normals of triangles (n, 3), where `asked`."""
+        t = self.texels
+        same = (t.face[:, :, None] == t.face[:, None]) & (t.positions[:, :, None] == t.positions[:, None]).all(axis=-1)
+        first = np.argmax(same & asked[:, None], axis=2)  # points that repeat are tested once
+        once = asked & (first == np.arange(POINTS))
+        found = np.zeros(asked.shape, bool)
+        found[once] = test(t.positions[once], sign * t.flat[once])
+        return np.asarray(np.take_along_axis(found, first, axis=1) & asked)
+
+
+@lru_cache(maxsize=8)
+def _lookup(file: Path, digest: str, photons: bool, progress: Any) -> Lookup:
+    return lookup_of(load(file), None, progress, reverse=photons)

@@ -1,0 +1,66 @@
+"""Where in a probe a ray finds its light: numpy's version of the renderer's shaders, tested for parity with them.
+
+Points x are about the probe's centre, directions w unit. A direction that is returned need not be unit; it is w where
+the look-up knows of nothing on the ray.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.cubemap import face_directions, sample
+from lambent.core.directions import normalize
+
+Floats = NDArray[np.floating]
+PLANE_ACTIVE_M = 1e-6  # planes that x is nearer to, or behind, are left out
+NEARNESS_MIN = 1e-6  # 1/m: what is farther off is at infinity
+# Of the march through a distance map: steps, their growth, the first step as a share of what is seen along w, and the
+# bounds of the secant's shares.
+STEPS, GROWTH, FIRST = 12, 1.6, 0.05
+SECANTS = ((0.05, 0.95), (0.05, 0.95), (0.05, 0.95), (0.0, 1.0))
+DEPTH_MIN_M, INVERSE_MIN = 1e-3, 1e-4
+
+
+def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
+    """Directions (n, 3) from the probe's centre to where rays meet the first of its bounding planes (P, 4).
+
+    Thesis M, 4.4.1; planes (n, d) are those with n.p + d = 0.
+    """
+    height = x @ planes[:, :3].T + planes[:, 3]
+    nearness = np.divide(-(w @ planes[:, :3].T), height, out=np.zeros(height.shape), where=height > PLANE_ACTIVE_M)
+    nearness = nearness.max(axis=1, initial=0.0)[:, None]
+    return np.where(nearness > NEARNESS_MIN, x + w / np.maximum(nearness, NEARNESS_MIN), w)
+
+
+def inverse_depth(distance: Floats) -> Floats:
+    """(6, N, N, 1) 1/max(|x|, |y|, |z|), 1/m, of the points at `distance` (6, N, N): linear over planes."""
+    length = np.linalg.norm(face_directions(distance.shape[1]), axis=-1)
+    return np.asarray((length / np.clip(distance, DEPTH_MIN_M, None))[..., None])
+
+
+def distance_lookup(x: Floats, w: Floats, inverse: Floats) -> Floats:
+    """Directions (n, 3) from the probe's centre to where rays pass behind what it sees, of `inverse_depth`.
+
+    A distance impostor (Szirmay-Kalos et al. 2005): growing steps, then the secant.
+    """
+
+    def behind(t: Floats) -> Floats:
+        p = x + t[:, None] * w
+        return np.asarray(np.abs(p).max(axis=1) * sample(inverse, normalize(p))[:, 0] - 1)
+
+    near, f_near = np.zeros(len(x)), np.full(len(x), -1.0)
+    far = np.maximum(np.linalg.norm(x, axis=1), FIRST / np.maximum(sample(inverse, w)[:, 0], INVERSE_MIN))
+    f_far = behind(far)
+    for _ in range(STEPS - 1):
+        on = f_far < 0
+        near, f_near = np.where(on, far, near), np.where(on, f_far, f_near)
+        far = np.where(on, far * GROWTH, far)
+        f_far = np.where(on, behind(far), f_far)
+    met = f_far >= 0
+    for low, high in SECANTS:
+        t = near + (far - near) * (f_near / np.minimum(f_near - f_far, -1e-9)).clip(low, high)
+        f = behind(t)
+        near, f_near = np.where(f < 0, t, near), np.where(f < 0, f, f_near)
+        far, f_far = np.where(f < 0, far, t), np.where(f < 0, f_far, f)
+    return np.where(met[:, None], x + t[:, None] * w, w)

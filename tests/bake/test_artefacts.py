@@ -1,0 +1,165 @@
+"""Kinds of artefacts are found by their files; their keys stay what they were."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lambent.bake import artefacts
+from lambent.bake.bake import bake, found, in_order
+from lambent.bake.context import BakeContext
+from lambent.bake.methods import chosen
+from lambent.bake.quality import quality_named
+from lambent.core.errors import UserError
+from lambent.core.geometry import triangle_areas
+from lambent.core.progress import silent
+from lambent.scenes.scene import ConstantEnvironment, MaterialTextures, PointLight, Scene, Texture
+from lambent.store.store import Store
+from tests.bake.small_scenes import MIRROR, TINY, plane, room_with_step
+
+TOY = '''
+"""Areas of triangles."""
+
+from lambent.bake.keys import key_of
+from lambent.core.geometry import triangle_areas
+
+KIND = "areas"
+NEEDS = ("geometry",)
+NAME = "areas/m2"
+
+
+def keys(context):
+    return {NAME: key_of(KIND, 1, context.keys("geometry")["geometry/faces"])}
+
+
+def bake(context):
+    geometry = context.geometry
+    context.progress(0, 1, "areas")
+    context.put(KIND, NAME, triangle_areas(geometry["positions"][geometry["faces"]]))
+'''
+
+
+@pytest.fixture
+def toy(tmp_path: Path) -> Iterator[str]:
+    """A kind of artefact in a folder of its own, as a plug-in brings it."""
+    folder = tmp_path / "plug_in"
+    folder.mkdir()
+    (folder / "areas.py").write_text(TOY)
+    artefacts.__path__.append(str(folder))
+    importlib.invalidate_caches()
+    yield "areas"
+    artefacts.__path__.pop()
+    sys.modules.pop(f"{artefacts.__name__}.areas", None)
+
+
+def test_a_kind_of_artefact_is_one_file(toy: str, tmp_path: Path) -> None:
+    calls: list[str] = []
+
+    def baked(**options: object) -> Store:
+        calls.clear()
+        tell = lambda done, total, what: calls.append(what)  # noqa: E731
+        return bake(room_with_step(), tmp_path / "s", quality=TINY, only=[toy], progress=tell, **options)
+
+    store = baked()
+    assert {a.kind for a in store.artefacts()} == {"geometry", toy}, "what it needs, and nothing else"
+    corners = store.read("geometry/positions")[store.read("geometry/faces")]
+    assert np.array_equal(store.read("areas/m2"), triangle_areas(corners))
+    assert store.documents["timings"].keys() == {"geometry", toy} and toy in calls
+    baked()
+    assert toy not in calls, "it is up to date"
+    store._artefacts["areas/m2"].complete = False  # as if the bake had been interrupted
+    store._save()
+    baked()
+    assert "unwrapping" not in calls and "areas/m2" in Store.open(tmp_path / "s")
+    baked(resume=False)
+    assert {"unwrapping", toy} <= set(calls)
+
+
+def test_the_command_offers_every_kind_there_is(toy: str) -> None:
+    command = importlib.import_module("lambent.cli.bake")
+    try:
+        offered = {str(kind) for kind in importlib.reload(command).Kind}
+    finally:
+        artefacts.__path__.pop()
+        own = {str(kind) for kind in importlib.reload(command).Kind}
+        artefacts.__path__.append(toy)
+    assert own == {"geometry", "environment", "light_map", "probe"} and offered == {*own, toy}
+
+
+def kinds(**needs: tuple[str, ...]) -> dict[str, SimpleNamespace]:
+    return {name: SimpleNamespace(KIND=name, NEEDS=those) for name, those in needs.items()}
+
+
+def test_what_is_needed_comes_first() -> None:
+    some = kinds(a=("c",), b=(), c=("d",), d=())
+    assert in_order(some, ["a"]) == ["d", "c", "a"]
+    order = in_order(some, some)
+    assert sorted(order) == ["a", "b", "c", "d"] and order.index("d") < order.index("c") < order.index("a")
+
+
+@pytest.mark.parametrize(
+    ("needs", "said"),
+    [
+        ({"a": ("b",), "b": ("a",)}, "circle.*a -> b|b -> a"),
+        ({"a": ("bee",), "bees": ()}, "NEEDS of a: unknown artefact.*'bees'"),
+    ],
+    ids=["circle", "unknown need"],
+)
+def test_needs_that_cannot_be_met_are_told(needs: dict[str, tuple[str, ...]], said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        in_order(kinds(**needs), ["a"])
+
+
+def test_settings_of_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="did you mean 'light_map'"):
+        bake(plane(), tmp_path / "s", quality=TINY.changed(lightmap={"max_depth": 3}))
+
+
+def bumpy_mirror() -> Scene:
+    bumps = np.zeros((1, 1, 3), np.float16)
+    bumps[..., 2] = 1
+    return replace(
+        plane(),
+        materials={"black": MIRROR},
+        textures={"black": MaterialTextures(normal=Texture(bumps))},
+        environment=ConstantEnvironment((1.0, 0.5, 0.25)),
+        lights=(PointLight((0.0, 1.0, 0.0), (1.0, 1.0, 1.0)),),
+    )
+
+
+NAMES = (
+    "geometry/uv2",
+    "environment/radiance",
+    "SAMPLES",
+    "light_map/lean",
+    "probe/floor/distance",
+    "probe/floor/planes",
+)
+PINNED = {
+    ("preview", "paths", "cached"): "b7af54e9 4cae5d96 30df0e5b 0ba5ac93 07cc0ebf 09cb6717",
+    ("preview", "photons", "traced"): "b7af54e9 4cae5d96 e6283dd7 eed6d598 37f78f90 0e63a189",
+    ("normal", "paths", "cached"): "fb99ce3f 5095e777 641498c2 1b402fb2 81441808 7ad3b079",
+    ("normal", "photons", "traced"): "fb99ce3f 5095e777 454a6549 2e87b59f b24bb978 c920e300",
+    ("final", "paths", "cached"): "546eff9e cef94a2c cae3853d 8a5e4c18 4e853f9d 529384c4",
+    ("final", "photons", "traced"): "546eff9e cef94a2c 9f560833 e6646d40 e6051e40 dc707aec",
+}
+
+
+@pytest.mark.parametrize("case", PINNED, ids="-".join)
+def test_stores_of_older_bakes_are_up_to_date(tmp_path: Path, case: tuple[str, str, str]) -> None:
+    """Keys of version 0.1.0: where one changes without need, everybody bakes again."""
+    quality, light_map, probes = case
+    store = Store.create(tmp_path / "s", {})
+    methods = chosen({}, light_map=light_map, probes=probes)
+    context = BakeContext(bumpy_mirror(), store, found(), quality_named(quality), methods, 0, silent)
+    keys = {name: key for kind in found() for name, key in context.keys(kind).items()}
+    keys["SAMPLES"] = keys["light_map/photons" if light_map == "photons" else "light_map/traced"]
+    assert keys["light_map/leaning"] == keys["SAMPLES"] and keys["light_map/noise"] == keys["light_map/lean"]
+    assert " ".join(keys[name][:8] for name in NAMES) == PINNED[case]
