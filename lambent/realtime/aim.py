@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.cubemap import texel_solid_angles
 from lambent.materials.document import Material
 from lambent.realtime.cube_mips import blurred, overlaps
 
-Floats = NDArray[np.floating]
 LEVELS = 6  # at most: 64 texels along a face
 HEAD_ROWS = 3
 INTERPOLATED = (1 / 8, 6 / 8, 1 / 8)  # mean over a texel of what bilinear look-ups show there

@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe
 from lambent.materials.lobes import fresnel
 from lambent.realtime.patterns import lobe_points, rings_table
 
-Floats = NDArray[np.floating]
 FACTORS = 32  # at cos_o = (i + 1/2)/FACTORS, four to a row: FACTOR_ROWS in rings.wgsl
 EXACT_SAMPLES = 512
 AZIMUTHS = 6

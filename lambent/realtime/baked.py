@@ -9,14 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
-
-Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +27,9 @@ class Probe:
     """
 
     centre: tuple[float, float, float]
-    radiance: Array
-    distance: Array | None = None
-    planes: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+    radiance: Floats
+    distance: Floats | None = None
+    planes: Floats = field(default_factory=lambda: np.zeros((0, 4), np.float32))
     irradiance: tuple[float, ...] = ()
 
 
@@ -39,21 +38,21 @@ class BakedScene:
     """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name."""
 
     record: SceneRecord
-    positions: Array
-    normals: Array
-    tangents: Array
-    uv2: Array
+    positions: Floats
+    normals: Floats
+    tangents: Floats
+    uv2: Floats
     faces: NDArray[np.uint32]
-    irradiance: Array | None = None
-    irradiance_back: Array | None = None
-    environment: Array | None = None
+    irradiance: Floats | None = None
+    irradiance_back: Floats | None = None
+    environment: Floats | None = None
     probes: Mapping[str, Probe] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
-    uv: Array | None = None
+    uv: Floats | None = None
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
-    noise: Array | None = None  # (H, W), relative standard error of the light map
-    noise_back: Array | None = None
-    dominant_direction: Array | None = None  # (H, W, 3), that light comes from; may be absent
+    noise: Floats | None = None  # (H, W), relative standard error of the light map
+    noise_back: Floats | None = None
+    dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -75,7 +74,7 @@ def read_baked(store: Store) -> BakedScene:
     record = contract.scene_record(store)
     missing: list[str] = []
 
-    def light(name: str, why: str | None) -> Array | None:
+    def light(name: str, why: str | None) -> Floats | None:
         if name not in store:
             if why is not None:
                 missing.append(f"{name}: {why}")
@@ -85,7 +84,7 @@ def read_baked(store: Store) -> BakedScene:
             missing.append(f"{name}: {bad} values are negative or not finite and were set to 0")
         return values
 
-    def noise(side: str) -> Array | None:
+    def noise(side: str) -> Floats | None:
         name = noise_name(side)
         return finite(store.read(name))[0] if name in store else None
 
@@ -116,7 +115,7 @@ def read_baked(store: Store) -> BakedScene:
     )
 
 
-def _probe(store: Store, name: str, radiance: Array) -> Probe:
+def _probe(store: Store, name: str, radiance: Floats) -> Probe:
     meta = store.artefact(contract.probe_name(name, "radiance")).meta
     x, y, z = meta["centre"]
     distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))

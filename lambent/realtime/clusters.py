@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.contract import ObjectRecord
 
-Floats = NDArray[np.floating]
-Ints = NDArray[np.int64]
 CLUSTER_FACES = 64
 SLACK = 1e-5  # of the largest term of a plane's equation: the GPU counts in single precision
 MERGED_GAP = 256  # faces between two runs that are drawn with them: another call costs as much
@@ -25,8 +24,8 @@ MERGED_GAP = 256  # faces between two runs that are drawn with them: another cal
 class Seen:
     """Runs of faces, in order, none across the border of two objects: [begin, end)."""
 
-    begin: Ints
-    end: Ints
+    begin: Indices
+    end: Indices
 
     def of(self, first_face: int, face_count: int) -> list[tuple[int, int]]:
         """(first, count) of the runs in a range of faces that begins and ends with objects."""
@@ -75,7 +74,7 @@ class Clusters:
             visible &= ~(terms.sum(axis=1) + plane[3] < -SLACK * reach)
         return self._runs(visible)
 
-    def _runs(self, visible: NDArray[np.bool_]) -> Seen:
+    def _runs(self, visible: Flags) -> Seen:
         at = np.flatnonzero(visible)
         joined = (self._end[at[:-1]] == self._begin[at[1:]]) & (self._owner[at[:-1]] == self._owner[at[1:]])
         breaks = np.flatnonzero(~joined)

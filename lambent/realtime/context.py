@@ -7,9 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lambent.realtime.clusters import Clusters, Seen
 from lambent.realtime.draws import Draw
 from lambent.realtime.frame_state import FrameState
@@ -17,6 +14,7 @@ from lambent.realtime.pipelines import cover
 from lambent.realtime.planar_view import PlanarView
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.slices import Band, Cut, Steps, Whole
+from lambent.realtime.structs import Record
 from lambent.realtime.targets import PassTimer, Target, Targets, stored
 
 SMOOTH_PRIOR = 0.5  # share of the prior from which edges are those of one frame, and so are blended
@@ -26,9 +24,9 @@ SMOOTH_PRIOR = 0.5  # share of the prior from which edges are those of one frame
 class FrameContext:
     """A frame under way. Passes read it, and leave in it what the next ones need."""
 
-    part: Whole | Cut  # whose encoder takes the passes
+    slicing: Whole | Cut  # whose encoder takes the passes
     state: FrameState
-    data: NDArray[np.void]  # of FRAME_DTYPE
+    data: Record  # of FRAME_DTYPE
     frame_group: Any  # group 0 of all pipelines, with `data`
     resources: SceneResources
     clusters: Clusters
@@ -68,7 +66,7 @@ class FrameContext:
         self, name: str, views: Iterable[Any], load_op: str, depth: str = "load", band: Band | None = None
     ) -> Any:
         """A render pass into `views` and the target's depth, which it loads or clears; group 0 is set."""
-        render = self.part.encoder.begin_render_pass(
+        render = self.slicing.encoder.begin_render_pass(
             color_attachments=stored(views, load_op),
             depth_stencil_attachment={
                 "view": self.target.depth.create_view(), "depth_clear_value": 0.0, "depth_load_op": depth,
@@ -85,7 +83,7 @@ class FrameContext:
         self, name: str, views: Iterable[Any], pipeline: Any, groups: Iterable[Any], band: Band | None = None
     ) -> None:
         """A render pass of a `screen_pipeline` into `views`."""
-        cover(self.part.encoder, views, pipeline, groups, self.timer.writes(name), band)
+        cover(self.slicing.encoder, views, pipeline, groups, self.timer.writes(name), band)
 
 
 class Pass(Protocol):

@@ -13,12 +13,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import HALF_MAX
 from lambent.core.cubemap import directions_at, sample, texel_solid_angles
 
-Floats = NDArray[np.floating]
 BLUR = (1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16)  # along rows and columns: variance 1 texel^2
 # Variance of a look-up in texel^2 per axis: box 1/12, and linear interpolation 1/6, to which the blur adds 1.
 SMOOTH_AREA = 5.0

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.discovery import known
@@ -18,7 +18,7 @@ from lambent.materials.document import Material
 from lambent.realtime.integrators import integrator
 from lambent.realtime.patterns import N_MAX, automatic_n
 from lambent.realtime.planar_integrators import AUTO, TILE, planar_integrator
-from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.structs import FRAME_DTYPE, Record
 
 LIGHT_MAP = "light-map"  # irradiance, in the place of radiance
 LIGHT_MAP_NOISE = "noise"  # its relative standard error before it was denoised
@@ -133,7 +133,7 @@ def quantity_of(show: str) -> Quantity:
     return QUANTITIES.get(show, LUMINANCE)
 
 
-def frame_data(state: FrameState, bounds: ArrayLike) -> NDArray[np.void]:
+def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     """Record of FRAME_DTYPE; `bounds` (2, 3) are those of the scene."""
     camera, width, height = state.camera, state.width, state.height
     jitter = state.jitter_px

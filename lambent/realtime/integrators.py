@@ -10,14 +10,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
-
-Floats = NDArray[np.floating]
 
 
 def _no_table(lobe: Lobe, n: int) -> Floats:

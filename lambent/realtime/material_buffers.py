@@ -14,7 +14,7 @@ from lambent.realtime.albedo import roughness_level
 from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.patterns import border
-from lambent.realtime.structs import MATERIAL_DTYPE, PLACED_LOBE_DTYPE
+from lambent.realtime.structs import MATERIAL_DTYPE, PLACED_LOBE_DTYPE, Record
 from lambent.realtime.textures import BoundTextures
 
 KEPT = 16  # groups of one material: shading, planar reflections, mirrored views, each for some integrators and n
@@ -50,7 +50,7 @@ class MaterialBuffers:
         return self._layouts.group(self._layouts.material, *buffers, *self._bound)
 
 
-def material_data(material: Material, textures: BoundTextures) -> NDArray[np.void]:
+def material_data(material: Material, textures: BoundTextures) -> Record:
     """Record of MATERIAL_DTYPE."""
     data = np.zeros(1, MATERIAL_DTYPE)
     data["kd"][0], data["kt_d"][0, :3] = (*material.kd, material.kd_coupled), material.kt_d
@@ -60,7 +60,7 @@ def material_data(material: Material, textures: BoundTextures) -> NDArray[np.voi
     return data
 
 
-def lobe_data(lobes: tuple[Lobe, ...]) -> NDArray[np.void]:
+def lobe_data(lobes: tuple[Lobe, ...]) -> Record:
     """(max(1, L),) records of PLACED_LOBE_DTYPE; storage buffers cannot be empty."""
     data = np.zeros(max(1, len(lobes)), PLACED_LOBE_DTYPE)
     if lobes:

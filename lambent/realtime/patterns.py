@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.sequences import hammersley
 from lambent.materials.document import Lobe, Material
-
-Floats = NDArray[np.floating]
 
 RINGS: dict[int, tuple[int, ...]] = {
     1: (1,), 3: (3,), 5: (1, 4), 7: (1, 6), 9: (2, 7), 11: (1, 5, 5), 13: (1, 6, 6), 15: (1, 7, 7), 17: (1, 8, 8),

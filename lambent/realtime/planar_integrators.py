@@ -7,15 +7,14 @@ integrator without one shows the probes on planar reflectors, too.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.integrators import Integrator
 
-Floats = NDArray[np.floating]
 TILE = 64  # pixels that sample a lobe in turns
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 # Factors on the filter, 1 where it covers the lobe, by experiment: the narrower the better where each sample finds its

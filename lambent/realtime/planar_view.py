@@ -16,12 +16,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE
+from lambent.core.arrays import Floats
+from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE, Record
 from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
-Floats = NDArray[np.floating]
 MARGIN_PX = 16  # least margin at each edge
 MOST_MARGIN = 0.1  # of the frame's longer side: what a wide lobe sees beyond is left to the probe
 STEP_PX = 64  # sizes are multiples of this: six MIP levels without remainder
@@ -36,10 +35,10 @@ class PlanarView:
     """One reflector of one frame."""
 
     reflector: ReflectorRecord
-    frame: NDArray[np.void]  # record of FRAME_DTYPE that the buffer is drawn with
-    uniform: NDArray[np.void]  # of MIRRORED_VIEW_DTYPE: how places in the scene find theirs in the buffer
+    frame: Record  # record of FRAME_DTYPE that the buffer is drawn with
+    uniform: Record  # of MIRRORED_VIEW_DTYPE: how places in the scene find theirs in the buffer
     size: tuple[int, int]  # width and height of the buffer, pixels
-    plan: NDArray[np.void] | None = None  # of PLAN_DTYPE: how rays find their place in the reflector's plan, if any
+    plan: Record | None = None  # of PLAN_DTYPE: how rays find their place in the reflector's plan, if any
 
     def has(self, record: ObjectRecord) -> bool:
         """Whether an object is a part of the reflector."""
@@ -47,7 +46,7 @@ class PlanarView:
 
 
 def planar_views(
-    frame: NDArray[np.void], reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
+    frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
     widest: Mapping[str, float] | None = None,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
@@ -80,7 +79,7 @@ def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
     return CLEARANCE * max(float(np.abs(reflector.outline).max()), float(np.abs(eye).max()))
 
 
-def covered_share(frame: NDArray[np.void], outline: Floats) -> float:
+def covered_share(frame: Record, outline: Floats) -> float:
     """Share of the frame that a convex polygon (P, 3) covers, 0 where it is out of view."""
     clip_from_world = frame["clip_from_world"].T.astype(float)
     points = np.column_stack([outline, np.ones(len(outline))]) @ clip_from_world[[0, 1, 3]].T
@@ -106,7 +105,7 @@ def _clipped(points: Floats, height: Floats) -> Floats:
 
 
 def _view(
-    frame: NDArray[np.void], plane: Floats, reflector: ReflectorRecord, size: tuple[int, int],
+    frame: Record, plane: Floats, reflector: ReflectorRecord, size: tuple[int, int],
     place: tuple[Floats, Floats], number: int,
 ) -> PlanarView | None:  # fmt: skip
     """The view of a reflector in the plane (n, d), n on the viewer's side; None where no ray of the frame meets it."""
@@ -152,7 +151,7 @@ def _view(
     return PlanarView(reflector, seen, uniform, size_px, plan)
 
 
-def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.void] | None:
+def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> Record | None:
     if record is None:
         return None
     uniform = np.zeros((), PLAN_DTYPE)
@@ -164,7 +163,7 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> NDArray[np.v
     return uniform
 
 
-def _padded(frame: NDArray[np.void], size: tuple[int, int], m: float) -> tuple[Floats, Floats]:
+def _padded(frame: Record, size: tuple[int, int], m: float) -> tuple[Floats, Floats]:
     """Size of the buffer of a frame of `size`, and where the frame's first pixel lies in it.
 
     The margin holds the half-width 2 m of the widest lobe about the rays at the edges.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import wgpu
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.materials.document import Material
 from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
 from lambent.realtime.baked import Probe
@@ -25,7 +25,7 @@ DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 class ProbeMaps:
     """Cube maps of a probe's radiance, (6, N, N, 3), each made when an integrator first asks for it."""
 
-    def __init__(self, layouts: Layouts, radiance: NDArray[np.floating], sampler: Any) -> None:
+    def __init__(self, layouts: Layouts, radiance: Floats, sampler: Any) -> None:
         self._layouts, self._radiance, self._sampler = layouts, radiance, sampler
         self._texture = cache(self._new_texture)
 
@@ -46,7 +46,7 @@ class ProbeMaps:
 class LampTable:
     """The table of a probe's lamps (aim.py), and their prominence, 0 to 1."""
 
-    def __init__(self, device: Any, radiance: NDArray[np.floating]) -> None:
+    def __init__(self, device: Any, radiance: Floats) -> None:
         table = aim_table(finite(radiance)[0])
         self.buffer = device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
         self.prominence = float(table[0, 1])

@@ -38,7 +38,7 @@ from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.slices import Cut, Steps, Whole
-from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.structs import FRAME_DTYPE, Record
 from lambent.realtime.targets import PassTimer, Targets, pixels
 from lambent.store.store import Store
 
@@ -88,12 +88,12 @@ class Renderer:
         encoded and smoothed. Returns before the GPU is done: see `finish`.
         """
         started = time.perf_counter()
-        part, self._gpu_ms = Whole(self.device.create_command_encoder()), None
-        context = self._begun(part, state, target_view)
+        whole, self._gpu_ms = Whole(self.device.create_command_encoder()), None
+        context = self._begun(whole, state, target_view)
         for _ in self._steps(context):
             pass
-        self._timer.resolve(part.encoder)
-        self.device.queue.submit([part.encoder.finish()])
+        self._timer.resolve(whole.encoder)
+        self.device.queue.submit([whole.encoder.finish()])
         self._counts["encode_ms"] = (time.perf_counter() - started) * 1e3
         return context.radiance
 
@@ -195,7 +195,7 @@ class Renderer:
             "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
         }
 
-    def _begun(self, part: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
+    def _begun(self, slicing: Whole | Cut, state: FrameState, target_view: Any) -> FrameContext:
         """A frame before its first pass."""
         state.check()
         self._frames += 1
@@ -206,14 +206,14 @@ class Renderer:
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
         target = self._targets.fit(state.size, "rgba16float" if passing else "rgba32float")
         context = FrameContext(
-            part, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
+            slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             draws, views, Counter(), shown=target_view,
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few
         return context
 
-    def _planar_views(self, state: FrameState, data: NDArray[np.void]) -> list[PlanarView]:
+    def _planar_views(self, state: FrameState, data: Record) -> list[PlanarView]:
         """Mirrored views of the planar reflectors that have a buffer in this frame."""
         if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
             return []

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import wgpu
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.clusters import merged
 from lambent.realtime.cube_mips import finite
@@ -23,8 +23,6 @@ from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import cube_texture, upload, with_alpha
 from lambent.store.contract import ObjectRecord
-
-Floats = NDArray[np.floating]
 
 
 def device_needs(scene: BakedScene) -> dict[str, int]:

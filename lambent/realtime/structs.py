@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lambent.materials.shader_layout import wgsl_dtype
 from lambent.realtime.shader_source import assemble
 
+Record = NDArray[np.void]
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
     "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",

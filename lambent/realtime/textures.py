@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import srgb_encode
 from lambent.realtime.uploads import half, upload
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.scenes.textures import CHANNELS, doubled_angle, halved, parts, slopes
 
-Floats = NDArray[np.floating]
 KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, in shaders/material.wgsl
 BITS = {kind: 1 << i for i, kind in enumerate(KINDS)}
 WIDENING = BITS["roughness"] | BITS["normal"]  # textures that make lobes wider

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
@@ -22,8 +22,6 @@ from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import ObjectRecord, SceneRecord
-
-Floats = NDArray[np.floating]
 
 COARSE = 16  # texels along a face of the environment that diffuse light is summed from
 CAMERA = Camera(name="front", position=(0.0, 0.0, 4.2), target=(0.0, 0.0, 0.0), fov_y_deg=36.0)

@@ -9,9 +9,8 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import HALF_MAX
-
-Floats = NDArray[np.floating]
 
 
 def half(values: Floats) -> NDArray[np.float16]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import OBLIQUE, cube_of, smooth_light, wall_scene
 
-from lambent.bake import probe_modes
+from lambent.core import probe_lookups
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
@@ -106,20 +106,11 @@ def places(count: int = 4000) -> tuple[np.ndarray, np.ndarray]:
 
 
 def looked_up(name: str, monkeypatch: pytest.MonkeyPatch, x: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Unit directions that the bake's copy of a look-up finds for rays about a probe at the origin."""
-    found = []
-
-    def sample(cube: np.ndarray, w: np.ndarray) -> np.ndarray:
-        found.append(w)
-        return np.zeros((len(w), cube.shape[-1])) if cube.shape[-1] == 3 else inverse_depth(w)
-
-    monkeypatch.setattr(probe_modes, "sample", sample)
-    rays = probe_modes.Mirrored(x, w, w, CUBE[0, 0, :1], x[:, 0], x[:, 0], x[:, 0] > 0)
+    """Unit directions that numpy's version of a look-up finds for rays about a probe at the origin."""
+    monkeypatch.setattr(probe_lookups, "sample", lambda _, w: inverse_depth(w))
     if name == "planes":
-        probe_modes.by_planes(rays, CUBE, np.zeros(3), PLANES.astype(float))
-    else:
-        probe_modes.by_distance(rays, CUBE, np.zeros(3), DISTANCE)
-    return found[-1]
+        return normalize(probe_lookups.planes_lookup(x, w, PLANES.astype(float)))
+    return normalize(probe_lookups.distance_lookup(x, w, probe_lookups.inverse_depth(DISTANCE)))
 
 
 def inverse_depth(w: np.ndarray) -> np.ndarray:
@@ -147,7 +138,7 @@ def in_shader(name: str, x: np.ndarray, w: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["planes", "distance"])
 def test_shaders_look_up_as_the_bake_does(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bake chooses between look-ups by its own copies of them."""
+    """The bake chooses between look-ups by numpy's versions of them."""
     x, w = places()
     got, expected = in_shader(name, x, w), looked_up(name, monkeypatch, x, w)
     assert_parity(got, expected.astype(np.float32), atol=2e-4)

@@ -34,7 +34,7 @@ def smoothed(device) -> Any:
         device.queue.write_texture({"texture": given}, np.ascontiguousarray(pixels), rows, size)
         part = Whole(device.create_command_encoder())
         context = SimpleNamespace(
-            part=part, unsmoothed=given, shown=target.create_view(),
+            slicing=part, unsmoothed=given, shown=target.create_view(),
             state=SimpleNamespace(size=(SIZE, SIZE)), resources=SimpleNamespace(sampler=sampler),
             cover=lambda name, views, pipeline, groups, band: cover(part.encoder, views, pipeline, groups, {}, band),
         )  # fmt: skip

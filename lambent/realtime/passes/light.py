@@ -106,7 +106,7 @@ class LightPass:
         light = resources.noise_group if context.state.show == LIGHT_MAP_NOISE else resources.light_group
         masked = resources.masked if context.blends_masks else set()
         fringes = [draw for draw in context.draws if draw.item.record.name in masked]
-        for band in context.part.bands("shade", context.state.size):
+        for band in context.slicing.bands("shade", context.state.size):
             render = context.begin("shade", [context.target.radiance.create_view()], band.load_op, band=band)
             seen = context.seen(band.shares)
             self._shade.draw(render, context, context.draws, seen, (format,), light)

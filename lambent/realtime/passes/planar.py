@@ -65,7 +65,7 @@ class PlanarPass:
         group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [draw.by(how, context.resources, draw.n) for draw in mine]
-        for band in context.part.bands("planar", context.state.size):
+        for band in context.slicing.bands("planar", context.state.size):
             render = context.begin("planar", layers, "load" if index else band.load_op, band=band)
             self._shading.draw(render, context, draws, context.seen(band.shares), (FORMAT,) * FOUND, group)
             render.end()
@@ -78,6 +78,6 @@ class PlanarPass:
             group = self._layouts.group(self._layouts.of("exact layers"), found)
             context.cover("clean", layers, self._clean, [group])
         else:
-            context.part.encoder.begin_render_pass(
+            context.slicing.encoder.begin_render_pass(
                 color_attachments=stored(layers), **context.timer.writes("clean")
             ).end()

@@ -141,7 +141,7 @@ class PlanarBufferPass:
         context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
         render.end()
         yield
-        for band in context.part.bands("mirror", view.size):
+        for band in context.slicing.bands("mirror", view.size):
             render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
             seen = context.seen(band.shares)
             self._shading.draw(render, context, context.draws, seen, FORMATS, resources.light_group)

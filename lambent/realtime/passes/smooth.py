@@ -21,6 +21,6 @@ class SmoothPass:
         if context.unsmoothed is None:
             return
         group = self._layouts.group(self._layouts.shown, context.unsmoothed.create_view(), context.resources.sampler)
-        for band in context.part.bands("smooth", context.state.size):
+        for band in context.slicing.bands("smooth", context.state.size):
             context.cover("smooth", [context.shown], self._pipeline, [group], band)
             yield

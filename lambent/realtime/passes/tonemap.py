@@ -24,6 +24,6 @@ class TonemapPass:
         views = [(texture or context.radiance).create_view() for texture in (context.radiance, context.prior)]
         groups = [context.frame_group, self._layouts.group(self._layout, *views)]
         target = context.unsmoothed.create_view() if context.unsmoothed else context.shown
-        for band in context.part.bands("tonemap", context.state.size):
+        for band in context.slicing.bands("tonemap", context.state.size):
             context.cover("tonemap", [target], self._pipeline, groups, band)
             yield
