@@ -1,9 +1,9 @@
-"""Scene in, store out: geometry, light map, environment, probes and whatever else stands in `artefacts/`.
+"""Scene in, store out: geometry, light map, environment, probes and all other kinds in `artefacts/`.
 
     store = bake(load_scene("builtin:room"), Path("room.store"), quality="preview")
 
-Every array carries the hash of what it was made from: what has not changed is not baked again. A bake that was
-interrupted, even by kill -9, continues where it was and ends with the same arrays, bit for bit.
+Every array carries a key, the hash of its inputs: arrays whose inputs have not changed are not baked again. A bake that
+was interrupted, even by kill -9, continues where it was and ends with the same arrays, bit for bit.
 """
 
 from __future__ import annotations
@@ -52,15 +52,15 @@ def bake(
     ----------
     quality : {'preview', 'normal', 'final'} or Quality
     only : collection of str, optional
-        Kinds of artefacts to bake, modules of `artefacts/`; what they need is baked too. All by default.
+        Kinds of artefacts to bake, modules of `artefacts/`; their needs are baked too. All by default.
     resume : bool
         False bakes everything anew, even what is up to date.
     seed : int
         The same seed gives the same arrays.
     light_map : {'paths', 'photons'}, optional
-        What integrates the light map: path tracing and final gathering, or photons. By default as the store has it.
+        The light map's integrator: path tracing and final gathering, or photons. By default as in the store.
     probes : {'cached', 'traced'}, optional
-        Whether probes show surfaces as the light map has them, or are path traced whole. By default as in the store.
+        Whether surfaces seen by probes show the light map, or all paths are traced. By default as in the store.
 
     Returns
     -------
@@ -110,12 +110,12 @@ def found() -> dict[str, Artefact]:
 
 
 def in_order(kinds: Mapping[str, Artefact], wanted: Collection[str]) -> list[str]:
-    """The kinds that are wanted and those that they need, each after what it needs.
+    """The wanted kinds and all that they need, each after its needs.
 
     Raises
     ------
     UserError
-        Where a kind needs one that there is not, or, in a circle, itself.
+        Where a kind needs one that does not exist, or, in a circle, itself.
     """
     needs: dict[str, tuple[str, ...]] = {}
     left = [known("kind of artefact", kind, kinds) for kind in wanted]
@@ -130,7 +130,7 @@ def in_order(kinds: Mapping[str, Artefact], wanted: Collection[str]) -> list[str
 
 @contextmanager
 def _timed(context: BakeContext, kind: str) -> Iterator[None]:
-    """Note the seconds of a kind in the document "timings", those of an interrupted bake that it continues included."""
+    """Note the seconds of a kind in the document "timings", added to those of an interrupted bake that it continues."""
     store, start = context.store, time.perf_counter()
     before = store.documents.get(TIMINGS, {}).get(kind, 0.0) if context.begun(kind) else 0.0
     try:

@@ -1,4 +1,4 @@
-"""What artefacts are baked from and with, each thing made once: the bake context.
+"""The bake context: scene, store, settings, and everything that several artefacts share, made once.
 
 A kind of artefact is a module of `artefacts/`, found by its file:
 
@@ -6,8 +6,8 @@ A kind of artefact is a module of `artefacts/`, found by its file:
     NEEDS = ("geometry",)        kinds whose arrays it reads, baked before it
     SETTINGS = {...}             optional: a dataclass for each QualityName
     def keys(context)            {array name: key} of every array it writes, samples kept for a later bake included
-    def bake(context)            writes those of them that are stale
-    def describe(context)        optional: writes documents and whatever else is no part of a key; called by every bake
+    def bake(context)            writes the stale arrays
+    def describe(context)        optional: writes documents, which have no keys; called by every bake
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class BakeContext:
         return self.store.begin(name, "raw", shape, chunks, "float32", key=key, meta=self.provenance())
 
     def provenance(self, **more: Any) -> dict[str, Any]:
-        """What to note of an array: quality, seed, engine."""
+        """Notes of an array: quality, seed, engine, and more."""
         return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
 
     @cached_property

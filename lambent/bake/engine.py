@@ -82,7 +82,7 @@ def engine() -> Engine:
     Raises
     ------
     UserError
-        Where neither renders, with what to install.
+        Where neither renders, with a hint what to install.
     """
     probe = probe_engine()
     if probe.engine is None:
@@ -177,7 +177,7 @@ def _cuda_driver() -> int | None:
 
 
 def _try(name: str, library: Path | None) -> Engine | str:
-    """Render a few pixels with variant `name` in a subprocess: the engine, or one line that says what went wrong."""
+    """Render a few pixels with variant `name` in a subprocess: the engine, or a line with the reason."""
     environment = os.environ | _kernel_cache_without_home()
     if library is not None:
         environment[LIBRARY_VARIABLE] = str(library)

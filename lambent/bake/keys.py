@@ -33,11 +33,8 @@ def _update(result: Any, one: object) -> None:
 
 def geometry_inputs(scene: Scene) -> list[object]:
     """All meshes, and their scale in the light map."""
-    inputs: list[object] = []
-    for o in scene.objects:
-        m = o.mesh
-        inputs += [o.name, o.light_map_scale, m.positions, m.normals, m.tangents, m.uv, m.faces]
-    return inputs
+    arrays = ((o, o.mesh.positions, o.mesh.normals, o.mesh.tangents, o.mesh.uv, o.mesh.faces) for o in scene.objects)
+    return [one for o, *mesh in arrays for one in (o.name, o.light_map_scale, *mesh)]
 
 
 def material_inputs(scene: Scene) -> object:

@@ -22,7 +22,7 @@ class QualityName(StrEnum):
 class Quality:
     """The settings of a named quality, with changes.
 
-    `name` is what the store keeps; `changes` maps kinds of artefacts to new values of their settings' fields.
+    The store keeps `name`; `changes` maps kinds of artefacts to new values of their settings' fields.
     """
 
     name: str

@@ -14,8 +14,8 @@ from lambent.core.directions import normalize
 
 Floats = NDArray[np.floating]
 PLANE_ACTIVE_M = 1e-6  # planes that x is nearer to, or behind, are left out
-NEARNESS_MIN = 1e-6  # 1/m: what is farther off is at infinity
-# Of the march through a distance map: steps, their growth, the first step as a share of what is seen along w, and the
+NEARNESS_MIN = 1e-6  # 1/m: farther planes are at infinity
+# The march through a distance map: steps, their growth, the first step as a share of the distance seen along w, and
 # bounds of the secant's shares.
 STEPS, GROWTH, FIRST = 12, 1.6, 0.05
 SECANTS = ((0.05, 0.95), (0.05, 0.95), (0.05, 0.95), (0.0, 1.0))

@@ -19,7 +19,7 @@ from lambent.bake.methods import chosen
 from lambent.bake.quality import quality_named
 from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_areas
-from lambent.core.progress import silent
+from lambent.core.progress import Cancelled, silent
 from lambent.scenes.scene import ConstantEnvironment, MaterialTextures, PointLight, Scene, Texture
 from lambent.store.store import Store
 from tests.bake.small_scenes import MIRROR, TINY, plane, room_with_step
@@ -28,6 +28,7 @@ TOY = '''
 """Areas of triangles."""
 
 from lambent.bake.keys import key_of
+from lambent.bake.tiles import run_tiles
 from lambent.core.geometry import triangle_areas
 
 KIND = "areas"
@@ -40,9 +41,12 @@ def keys(context):
 
 
 def bake(context):
-    geometry = context.geometry
-    context.progress(0, 1, "areas")
-    context.put(KIND, NAME, triangle_areas(geometry["positions"][geometry["faces"]]))
+    corners = context.geometry["positions"][context.geometry["faces"]]
+    writer = context.samples(KIND, NAME, corners.shape[:1], (100,))
+    run_tiles(
+        writer, lambda region, seed: triangle_areas(corners[region]), seed=0, progress=context.progress, what="areas"
+    )
+    writer.finish()
 '''
 
 
@@ -60,26 +64,33 @@ def toy(tmp_path: Path) -> Iterator[str]:
 
 
 def test_a_kind_of_artefact_is_one_file(toy: str, tmp_path: Path) -> None:
-    calls: list[str] = []
+    steps: list[str] = []
 
-    def baked(**options: object) -> Store:
-        calls.clear()
-        tell = lambda done, total, what: calls.append(what)  # noqa: E731
+    def baked(stop_after: float = 1.0, **options: object) -> Store:
+        def tell(done: float, total: float, what: str) -> None:
+            steps.append(what)
+            if what == toy and 0 < done / total >= stop_after and stop_after < 1:
+                raise Cancelled
+
+        steps.clear()
         return bake(room_with_step(), tmp_path / "s", quality=TINY, only=[toy], progress=tell, **options)
 
+    with pytest.raises(Cancelled):
+        baked(stop_after=0.3)
+    half = Store.open(tmp_path / "s")
+    whole = len(half.read("geometry/faces"))
+    assert half.artefacts()[-1].kind == "raw" and "areas/m2" not in half and "unwrapping" in steps
+    begun = steps.count(toy)
     store = baked()
-    assert {a.kind for a in store.artefacts()} == {"geometry", toy}, "what it needs, and nothing else"
+    assert {a.name.partition("/")[0] for a in store.artefacts()} == {"geometry", toy}, "with its need, and nothing else"
     corners = store.read("geometry/positions")[store.read("geometry/faces")]
-    assert np.array_equal(store.read("areas/m2"), triangle_areas(corners))
-    assert store.documents["timings"].keys() == {"geometry", toy} and toy in calls
+    np.testing.assert_array_equal(store.read("areas/m2"), triangle_areas(corners).astype(np.float32))
+    assert "unwrapping" not in steps and begun + steps.count(toy) == -(-whole // 100) + 2, "each chunk is baked once"
+    assert store.documents["timings"].keys() == {"geometry", toy}
     baked()
-    assert toy not in calls, "it is up to date"
-    store._artefacts["areas/m2"].complete = False  # as if the bake had been interrupted
-    store._save()
-    baked()
-    assert "unwrapping" not in calls and "areas/m2" in Store.open(tmp_path / "s")
+    assert toy not in steps, "it is up to date"
     baked(resume=False)
-    assert {"unwrapping", toy} <= set(calls)
+    assert {"unwrapping", toy} <= set(steps)
 
 
 def test_the_command_offers_every_kind_there_is(toy: str) -> None:

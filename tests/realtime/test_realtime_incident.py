@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -146,3 +147,13 @@ def test_shaders_look_up_as_the_bake_does(name: str, monkeypatch: pytest.MonkeyP
         t = ((np.sign(w) * ROOM - x) / w).min(axis=-1)
     error = np.linalg.norm(got - normalize(x + t[:, None] * w), axis=-1)
     assert np.quantile(error, 1 if name == "planes" else 0.5) < 2e-3, "steps of the march may skip an edge of the room"
+
+
+def test_constants_of_look_ups_stand_in_both() -> None:
+    march, planes = (shader_of(look_ups()[name]) for name in ("distance", "planes"))
+    steps, growth, first = probe_lookups.STEPS, probe_lookups.GROWTH, probe_lookups.FIRST
+    assert f"const STEPS = {steps}u;" in march and f"far *= {growth};" in march and f"{first} * reach" in march
+    bounds = re.findall(r"-1e-9\), ([\d.]+), ([\d.]+)\)", march)
+    assert [tuple(map(float, pair)) for pair in bounds] == [*dict.fromkeys(probe_lookups.SECANTS)]
+    assert f"i < {len(probe_lookups.SECANTS) - 1}u" in march
+    assert f"PLANE_ACTIVE_M = {probe_lookups.PLANE_ACTIVE_M:.0e};".replace("e-0", "e-") in planes

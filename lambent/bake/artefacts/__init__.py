@@ -1,1 +1,1 @@
-"""Kinds of artefacts, one file each; `lambent.bake.context` says what belongs into one."""
+"""Kinds of artefacts, one file each; `lambent.bake.context` describes its contents."""

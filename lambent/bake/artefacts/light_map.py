@@ -33,7 +33,7 @@ NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
 PHOTONS, MOMENTS = "light_map/photons", "light_map/leaning"
 SIGNS = (1.0, -1.0)  # of the normal, by side
-Maps = list[tuple[Floats, dict[str, float]]]  # by side: irradiance (H, W, 3), and what to note of it
+Maps = list[tuple[Floats, dict[str, float]]]  # by side: irradiance (H, W, 3) and its notes
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ SETTINGS = {
 
 
 def keys(context: BakeContext) -> dict[str, str]:
-    """Irradiance, its noise and the dominant direction have a key of their own: they are filtered, samples are not."""
+    """Samples share one key; filtered arrays, the irradiance, its noise and the dominant direction, another."""
     how: Settings = context.settings(KIND)
     effort: list[object] = [how.samples, how.noise, how.gather_samples, how.gather_noise]
     effort += [how.tile_texels, how.max_depth, context.seed]
@@ -111,7 +111,7 @@ def _sides(context: BakeContext) -> int:
 
 
 def _stages(how: Settings) -> tuple[str, ...]:
-    """The samples of path traced maps, the last being those of the final one."""
+    """Arrays of samples of path traced maps, the final map's last."""
     return (TRACED, GATHERED) if how.gather_samples else (TRACED,)
 
 

@@ -1,4 +1,4 @@
-"""Probes: what objects mirror, from one point each, with planes that stand for it."""
+"""Probes: the surroundings of objects from one point each, and bounding planes of them."""
 
 from __future__ import annotations
 

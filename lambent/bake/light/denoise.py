@@ -11,7 +11,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import luminance
 
 RINGS = 16  # texels grown into gutters; farther from any chart nothing is looked up
-CONTRAST = 8.0  # times as bright: of such neighbours the filter carries light across a gutter
+CONTRAST = 8.0  # times as bright: from such a neighbour the filter carries light across a gutter
 NEAR = 6  # texels that it reaches
 LAYERS = 4
 BLOCK = 64  # texels: regions to denoise are cut out in blocks, with the blocks around them

@@ -3,7 +3,7 @@
 - Where the scene says so; else
 - above a flat object (floor, mirror, table top), on the side that faces the middle of the scene: half the object's
   length, half the free distance and EYE_HEIGHT_M are upper bounds of the height. Over its middle, or, where something
-  hides from there much of what viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
+  hides from there much of the scene that viewers see mirrored, over another point (`places_above`, `ProbeSet`); else
 - in the middle of the object's bounds, moved out by the shortest way where that is within another solid.
 """
 
@@ -26,7 +26,7 @@ from lambent.scenes.scene import EYE_HEIGHT_M, Mesh
 
 GRID = 5  # points along each side of a flat object that a probe may stand over
 FLAT_SHARE = 0.9  # of an object's area with normals along one axis
-CONTACT_M = 1e-3  # over a flat object: what lies closer to it does not limit the height of its probe
+CONTACT_M = 1e-3  # over a flat object: things closer to it do not limit the height of its probe
 CLEARANCE_M = 0.02  # beyond the surface of the solid that a centre is moved out of
 MOVES = 4
 ENCLOSING_SHARE = 0.5  # of the other objects, and of the directions that see the object's own outer sides

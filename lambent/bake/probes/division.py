@@ -1,8 +1,8 @@
 """Objects that one probe cannot stand for, cut into parts that have a probe each.
 
-Where more than HIDDEN of what an object's surface sees is hidden from its probe, the object is halved across the axis
-that leaves the least hidden, and so are its parts, where that lowers the share to WORTH of it. A face belongs to the
-half that its middle lies in, and is drawn with the probe of that part.
+The surface of an object sees points that are hidden from its probe. Where their share is above HIDDEN, the object is
+halved across the axis that leaves the least hidden, and so are its parts, if that lowers the share to WORTH of it. A
+face belongs to the half that its middle lies in, and is drawn with the probe of that part.
 
 Flat objects are left whole: planar reflectors show them.
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.solids import SolidTest
 
-PARTS = "parts"  # document: the cuts, with the key of all that they were found from
+PARTS = "parts"  # document: the cuts, and the key of everything they depend on
 HIDDEN = 0.2  # share above which one probe does not do
 WORTH = 0.85  # times the share: a cut that leaves more is not made
 DEPTH = 2  # cuts of cuts: at most four parts
@@ -36,7 +36,7 @@ FACES = 24  # an object of fewer is left whole
 
 
 def divided(scene: Scene, store: Store, progress: Progress) -> Scene:
-    """The scene with such objects in parts; cuts are found again only where geometry has changed."""
+    """The scene with its objects in parts; the cuts are found again only where geometry has changed."""
     centres = sorted(scene.probe_centres.items())
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
     clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
@@ -111,7 +111,7 @@ def _cut(mesh: Mesh, faces: Indices, share: Callable[[Indices], float], depth: i
 
 
 def split(scene: Scene, cuts: Mapping[str, str]) -> Scene:
-    """The scene with objects in the parts of `cuts_of`; `Scene.parts` says whose parts they are."""
+    """The scene with objects in the parts of `cuts_of`; `Scene.parts` maps each to its whole."""
     cut = {o.name: _parts_of(o, cuts[o.name]) for o in scene.objects if o.name in cuts}
     if not cut:
         return scene
@@ -130,7 +130,7 @@ def _parts_of(o: SceneObject, digits: str) -> tuple[SceneObject, ...]:
 
 
 def family(parts: Mapping[str, str], name: str) -> set[str]:
-    """The object itself and the other parts of what it is a part of: a probe leaves them all out."""
+    """The object and all other parts of its whole: a probe leaves them all out."""
     owner = parts.get(name)
     return {name} if owner is None else {part for part, other in parts.items() if other == owner}
 

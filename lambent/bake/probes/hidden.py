@@ -1,4 +1,4 @@
-"""What a surface sees, and what of that is hidden from its probe.
+"""The points that a surface sees, and the share of them that is hidden from its probe.
 
 A probe shows what its centre sees; a surface mirrors what it sees itself. Rays from points all over an object, which is
 left out as in its probe, find what its surface sees; other things hide a share of these hits from the centre.
@@ -25,7 +25,7 @@ SHORT = 1e-3  # metres, and share of the distance, by which a hit may be missed:
 
 @dataclass(frozen=True)
 class Seen:
-    """What points of a surface see: origins, unit directions, hits (n, 3), and whether there is a hit (n,)."""
+    """Rays from a surface: origins, unit directions, hits (n, 3), and whether there is a hit (n,)."""
 
     origins: Floats
     directions: Floats
@@ -41,7 +41,7 @@ def seen_from(mesh: Mesh, without: Any, count: int = RAYS) -> Seen:
 
 
 def seen_along(origins: Floats, directions: Floats, without: Any) -> Seen:
-    """What rays (n, 3) meet first in a Mitsuba scene."""
+    """First hits of rays (n, 3) in a Mitsuba scene."""
     distance = distances(without, rays_from(origins, directions))
     valid = np.isfinite(distance)
     return Seen(origins, directions, origins + directions * np.where(valid, distance, 0.0)[:, None], valid)
@@ -60,7 +60,7 @@ def hidden_share(seen: Seen, centre: Floats, without: Any) -> float:
 def parallax_deg(seen: Seen, centre: Floats, planes: Floats) -> float:
     """Angle in degrees, not exceeded by OFTEN of the rays, from the hit as the centre sees it to the look-up.
 
-    `planes` (P, 4) are those about the centre.
+    `planes` (P, 4) are about the centre.
     """
     if not seen.valid.any():
         return 0.0

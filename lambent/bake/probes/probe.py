@@ -1,4 +1,4 @@
-"""Probes: what an object would mirror, as cube maps of radiance and distance from one point.
+"""Probes: the surroundings of an object as cube maps of radiance and distance from one point.
 
 Rays from the centre pass the object; the surfaces they meet are lit by the whole scene, and mirror it. With the light
 map as radiance cache, a diffuse surface shows its baked light and a glossy one is traced on through its lobes, so that
@@ -59,8 +59,8 @@ class Surroundings:
 def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: int, noise: float = NOISE) -> Probe:
     """Trace a probe.
 
-    Every texel gets `samples` paths; those that are still noisy, mostly glossy surfaces seen in the probe, get as many
-    more as they need to come down to `noise`, at most MOST times as many in all.
+    Every texel gets `samples` paths. Texels that are noisy still, mostly of glossy surfaces, get as many more as they
+    need to come down to `noise`, at most MOST times as many in all.
     """
     rng = np.random.default_rng(seed)
     block = next(size for size in BLOCKS if size <= samples)
@@ -132,7 +132,7 @@ def _up_to_first(scene: Any, ray: Any) -> Any:
 
 
 def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:
-    """Metres to the first surface behind all holes, FAR where there is none, and what is met there."""
+    """Metres to the first surface behind all holes, FAR where there is none, and the interaction."""
     si = rays.intersect(scene, ray, mi.Bool(True), rays.has_holes(scene))
     return dr.select(si.is_valid(), dr.minimum(dr.norm(si.p - ray.o), FAR), FAR), si
 

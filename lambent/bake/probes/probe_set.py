@@ -42,14 +42,14 @@ class ProbeSet:
         return SolidTest(self._builder, self._whole)
 
     def _without(self, names: frozenset[str]) -> Any:
-        """The scene without these objects; kept until others are asked for, as parts of one object share it."""
+        """The scene without these objects, kept until others are left out: parts of one object share it."""
         if self._left_out is None or self._left_out[0] != names:
             self._left_out = None
             self._left_out = names, self._builder.build(leave_out=names)
         return self._left_out[1]
 
     def _mirrored(self, name: str, seed: int) -> Mirrored | None:
-        """What viewers see mirrored in an object, or through it; None where that is too little."""
+        """Rays that viewers see mirrored in an object, or through it; None where there are too few."""
         if self._cache is None:
             return None
         o = self._scene.object(name)
@@ -65,10 +65,9 @@ class ProbeSet:
         return judged(rays, bake_probe(around, centre, TRIAL_TEXELS, TRIAL_SAMPLES, seed), centre).best
 
     def _centre(self, name: str, without: Any, rays: Mirrored | None, seed: int) -> Floats:
-        """Where the probe stands: over a flat object, where it shows best what viewers see mirrored.
+        """Where the probe stands: over the middle of a flat object if little is hidden from there.
 
-        That is its middle where little is hidden from there; else one of the places that see more, if it shows it
-        better.
+        Else it stands at the place, among those that see more, with the least error in viewers' mirrored rays.
         """
         scene, mesh = self._scene, self._scene.object(name).mesh
         if name in scene.probe_centres or rays is None or self._transmits(name) or flat_axis(mesh) is None:
@@ -89,12 +88,12 @@ class ProbeSet:
     def bake(
         self, name: str, texels: int, samples: int, noise: float, seed: int
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays radiance, distance and planes of one object's probe, and what to note.
+        """Arrays radiance, distance and planes of one object's probe, and its notes.
 
         Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
         `hidden_share` and `parallax_deg` (`hidden`), `mirror_error` and `seen_irradiance` (`selection`).
 
-        Planes that the scene gives are taken as they are; others are found from what the probe sees.
+        Planes that the scene gives are taken as they are; others are found from the probe itself.
         """
         without = self._without(frozenset(family(self._scene.parts, name)))
         rays = self._mirrored(name, seed)

@@ -1,7 +1,7 @@
-"""How a probe is best taken and looked up: measured by what viewers see mirrored in its object.
+"""How a probe is best taken and looked up, measured by rays that viewers see mirrored in its object.
 
 Rays leave points that viewers see along the mirror direction, and are path traced; the same rays are looked up in the
-probe. The error decides three things, each where it falls to WORTH of what it was:
+probe. The error decides three things, each where a choice lowers it to WORTH of the error without:
 
 - A probe leaves its object out, as convex objects need it, or holds it, as hollow ones may, whose surfaces mirror each
   other (a window reveal, a frame). Tried where OWN of the rays meet the object itself.
@@ -9,7 +9,7 @@ probe. The error decides three things, each where it falls to WORTH of what it w
   beside a bottle).
 - Light from the probe is scaled by a specular occlusion: the ratio of the light map's irradiance to the irradiance of
   the probe alone, at most 1 (Lazarov 2013, "Getting more physical in Call of Duty: Black Ops II"). Near things hide
-  from a surface within a niche most of what the probe sees. Sharp mirrors do not gain by it and are left as they are.
+  from a surface within a niche most of the probe's light. Sharp mirrors do not gain by it and are left as they are.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ def mirrored(
     points: Floats, normals: Floats, places: Floats, material: Material, scene: Any, cache: LightMapCache, depth: int,
     family: list[int], seed: int,
 ) -> Mirrored | None:  # fmt: skip
-    """What viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3): each in one point.
+    """Rays that viewers at `places` (m, 3) see mirrored in points (n, 3) of unit normals (n, 3), one viewer a point.
 
-    Through a transmitting material they see what is behind: rays go straight on. None where too few points are in view.
+    Through a transmitting material rays go straight on. None where too few points are in view.
     `family` are the numbers of the Mitsuba shapes of the object and of its other parts.
     """
     rng = np.random.default_rng(seed)
@@ -108,7 +108,7 @@ def _free(scene: Any, points: Floats, normals: Floats, eyes: Floats) -> Flags:
 
 
 def error(rays: Mirrored, looked_up: Floats) -> float:
-    """Mean difference of luminances (n,) to what is mirrored, as the eye counts: in log(1 + L/m), m the median."""
+    """Mean difference of luminances (n,) to those of the rays, in log(1 + L/m), m the median, as the eye sees it."""
     true, shown = luminance(rays.radiance) * rays.fresnel, looked_up * rays.fresnel
     m = max(float(np.median(true)), 1e-6)
     return float(np.abs(np.log1p(shown / m) - np.log1p(true / m)).mean())
@@ -180,9 +180,9 @@ class Judged:
 def judged(
     rays: Mirrored, probe: Probe, centre: Floats, planes: Floats | None = None, *, through: bool = False
 ) -> Judged:
-    """How well a probe shows what is mirrored, by `planes` (P, 4) about its centre, or those that are found for it.
+    """Errors of a probe in mirrored rays, by `planes` (P, 4) about its centre, or those that are found for it.
 
-    What is seen `through` an object is not scaled.
+    Light seen `through` an object is not scaled.
     """
     if planes is None:
         planes = bounding_planes(probe.distance, probe.normals)

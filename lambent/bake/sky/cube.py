@@ -30,7 +30,9 @@ def environment_cube(environment: Environment | None, n: int) -> NDArray[np.floa
             texels = np.arange(start, min(start + TEXELS_AT_ONCE, len(cube)))
             cube[texels] = _means(emitter, texels, n, GRID)
         if isinstance(environment, SunSky):
-            sunny = _near(normalize(np.asarray(environment.sun_direction, float)), n)
+            sun = normalize(np.array(environment.sun_direction, float))
+            near = np.cos(SUN_RADIUS_RAD + 2 * np.sqrt(2) / n)  # texels that the disc may touch
+            sunny = np.flatnonzero(normalize(face_directions(n)).reshape(-1, 3) @ sun > near)
             cube[sunny] = _means(emitter, sunny, n, FINE_GRID)
     return np.minimum(cube, HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
 
@@ -44,9 +46,3 @@ def _means(emitter: Any, texels: Indices, n: int, grid: int) -> Floats:
     s, t = np.broadcast_arrays(s, t)
     w = normalize(directions_at(np.broadcast_to(face[:, None, None], s.shape), s, t)).reshape(-1, 3)
     return np.asarray(radiance_from(emitter, w).reshape(len(texels), -1, 3).mean(axis=1))
-
-
-def _near(sun: Floats, n: int) -> Indices:
-    """Texels that the sun disc may touch."""
-    cosine = normalize(face_directions(n)).reshape(-1, 3) @ sun
-    return np.flatnonzero(cosine > np.cos(SUN_RADIUS_RAD + 2 * np.sqrt(2) / n))

@@ -33,10 +33,8 @@ def sunsky_dict(sky: SunSky, sun: bool = True) -> dict[str, Any]:
         "type": "sunsky",
         "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90),
         "sun_direction": list(sky.sun_direction),
-        "turbidity": sky.turbidity,
-        "albedo": sky.albedo,
         "sun_scale": sky.sun_scale if sun else 0.0,
-        "sky_scale": sky.sky_scale,
+        **{name: getattr(sky, name) for name in ("turbidity", "albedo", "sky_scale")},
     }
 
 

@@ -37,8 +37,8 @@ RAYS, LEAST = 4096, 16  # for a table: shared out by the light of the bins, and 
 OPEN = 0.9  # share of the light of its hemisphere that a group sees: from here on it needs no table
 FEW = 0.2  # of the groups that see any sky: where fewer need a table, there is no guide
 DEFENSIVE = 0.15  # of a table's samples go by luminance alone: light that the pre-pass has missed is not lost
-EVERYWHERE = 0.01  # of those go anywhere: no direction is left out
-SPREAD = 0.4  # of what a bin brings comes from the eight around it
+EVERYWHERE = 0.01  # of these go anywhere: no direction is left out
+SPREAD = 0.4  # share of a bin's light that is that of the eight bins around it
 RAYS_AT_ONCE = 1 << 20
 
 
@@ -69,7 +69,7 @@ class Groups:
 
 
 def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
-    """The grid over a scene's bounds; its cells are as small as asked for, or as MOST_CELLS allow."""
+    """The grid over a scene's bounds; its cells are of `size_m`, or as small as MOST_CELLS allow."""
     low, high = (np.asarray(corner, float) for corner in scene.bounds)
     size_m = max(size_m, float(np.prod(np.maximum(high - low, size_m)) / MOST_CELLS) ** (1 / 3))
     while True:
@@ -215,7 +215,7 @@ def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats, Flags
 
 
 def _both_sides(whole: Any, position: Floats, normal: Floats, crossed: Flags) -> tuple[Floats, Floats, Flags]:
-    """The points, and once more, turned round, those whose other side is not within a solid: it faces the surface."""
+    """The points, and, turned round, all points again whose other side is not within a solid."""
     behind = whole.ray_intersect(leaving(whole, position, normal, -normal))
     inside = behind.is_valid() & (dr.dot(behind.n, vectors(mi.Vector3f, normal)) < 0)
     sheet = np.flatnonzero(~np.array(inside))

@@ -28,7 +28,7 @@ from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.scenes.scene import Scene
 
 MOST_PATCHES = 1 << 18
-BLOCK = 4  # groups along each axis that share what their own photons cannot tell
+BLOCK = 4  # groups along each axis that share an estimate of I, where their own photons are too few
 PRIOR, OWN = 0.5, 64.0  # photons' worth of the mean of all in a block's I, and of the block's in a group's
 LEAST = 0.2  # of the photons land without regard to E: the pre-pass may have missed some sky
 
@@ -58,7 +58,7 @@ class SkyPhotons:
         self._over_density = mi.Float((self._area / share).astype(np.float32))
 
     def weigh(self, sums: Floats, counts: Floats) -> None:
-        """Take sums of I and numbers of photons by group for what comes next."""
+        """Take sums of I and numbers of photons by group; photons are drawn by these from now on."""
         mean = sums.sum() / max(counts.sum(), 1)
         if mean > 0:
             block = self._blocks()

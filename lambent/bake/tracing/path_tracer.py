@@ -51,16 +51,12 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     """
     return _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
-        mi.Bool(start.direct), max_depth, cache or _nothing, rays.has_holes(scene),
+        mi.Bool(start.direct), max_depth, cache or (lambda si, active: mi.Color3f(0.0)), rays.has_holes(scene),
     )  # fmt: skip
 
 
-def _nothing(si: Any, active: Any) -> Any:
-    return mi.Color3f(0.0)
-
-
 def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tuple[Any, Any]:
-    """DirectionSample3f of Mitsuba's `sample_emitter_direction`, and what arrives over its density, 0 in shadow."""
+    """DirectionSample3f of Mitsuba's `sample_emitter_direction`, and the light over its density, 0 in shadow."""
     ds, value = scene.sample_emitter_direction(si, u, False, active)
     lit = active & (ds.pdf > 0)
     lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)

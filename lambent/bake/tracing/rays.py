@@ -1,4 +1,4 @@
-"""Rays: their way to Dr.Jit, where they leave surfaces, and what they meet.
+"""Rays: arrays on the device, the offset from surfaces, and intersections.
 
 Where a texture says that there is no surface (`eval_null_transmission` of the BSDF), rays go on as if nothing were
 there. `holes` is `has_holes(scene)` everywhere: where no shape has holes, nothing is spent on looking for them.
@@ -103,7 +103,7 @@ def cosine_directions(normals: Floats) -> Floats:
 
 
 def distances(scene: Any, ray: Any) -> NDArray[np.float64]:
-    """Distances (n,) to what rays meet first, infinite where there is nothing."""
+    """Distances (n,) to the first hits of rays, infinite where there is none."""
     return np.array(scene.ray_intersect_preliminary(ray).t).astype(float)
 
 
@@ -113,7 +113,7 @@ def has_holes(scene: Any) -> bool:
 
 
 def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
-    """What a ray meets behind all holes; `si.t` counts from the last of them."""
+    """The interaction (mi.SurfaceInteraction3f) behind all holes; `si.t` counts from the last of them."""
     if not holes:
         return scene.ray_intersect(ray, active)
     return _behind_holes(scene, mi.Ray3f(ray), mi.Bool(active))

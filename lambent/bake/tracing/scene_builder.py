@@ -41,7 +41,7 @@ class SceneBuilder:
     Parameters
     ----------
     scene : Scene
-        What to build.
+        The scene to build.
     uv2 : mapping, optional
         Light map coordinates (V, 2) per object name; they become the mesh attribute `vertex_uv2` (third component 0).
     diffuse : bool
@@ -110,7 +110,7 @@ class SceneBuilder:
             parameters.update()
 
     def shape_number(self, name: str) -> int:
-        """Mitsuba's number of an object's shape: what `si.shape` is, reinterpreted."""
+        """Mitsuba's number of an object's shape, `si.shape` reinterpreted."""
         return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(self.meshes[name]))[0])
 
     def object_numbers(self) -> Any:

@@ -53,7 +53,7 @@ class SolidTest:
         self._solid = mi.UInt32(np.array(solid, np.uint32))
 
     def within(self, scene: Any) -> SolidTest:
-        """The same test in another Mitsuba scene of the same builder; what is closed is not asked again."""
+        """The same test in another Mitsuba scene of the same builder, with the same closed objects."""
         other = copy.copy(self)
         other._scene = scene
         return other

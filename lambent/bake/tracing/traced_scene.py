@@ -44,7 +44,7 @@ class TracedScene:
         self._views: dict[float, tuple[Sides, Indices]] = {}
 
     def builder(self, *, diffuse: bool, photons: bool = False) -> SceneBuilder:
-        """Builder of the scene, with or without diffuse terms; kept until another one is asked for.
+        """Builder of the scene, with or without diffuse terms; kept until another one is needed.
 
         Kernels contain every live BSDF, traced or not: two builders would double the time to compile. All builders
         sample emitters as the pre-pass of the first one found.

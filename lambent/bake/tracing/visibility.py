@@ -26,7 +26,7 @@ RAYS_AT_ONCE = 1 << 21
 
 
 def viewing_places(scene: Scene, traced: Any) -> Floats:
-    """Free places (PLACES, 3) in what the scene's cameras see: along their rays, and along one diffuse bounce of those.
+    """Free places (PLACES, 3) in view of the scene's cameras: along their rays, and along one diffuse bounce.
 
     Rays that meet nothing have no places. (0, 3) where there are no cameras, or they see nothing.
     """
