@@ -35,7 +35,8 @@ def decode(file: Path, max_pixels: int) -> Image:
     """
     with _opened(file, header_only=True) as exr:
         header = exr.header()
-        height, width, channels = *_size(header), len(header["channels"])
+        (x0, y0), (x1, y1) = (corner.tolist() for corner in header["dataWindow"])
+        height, width, channels = y1 - y0 + 1, x1 - x0 + 1, len(header["channels"])
         flat = len(exr.parts) == 1 and "deep" not in str(header["type"])
     if not flat:
         raise UserError("deep and multi-part EXR files are not read", file=file, hint="save it as one flat part")
@@ -64,12 +65,6 @@ def encode(image: Image, path: Path) -> None:
         raise OSError(
             errno.ENOSPC if full else errno.EIO, str(error).rsplit('". ', 1)[-1].rstrip("."), str(path)
         ) from error
-
-
-def _size(header: dict[str, Any]) -> tuple[int, int]:
-    """(height, width) of the data window."""
-    (x0, y0), (x1, y1) = (corner.tolist() for corner in header["dataWindow"])
-    return y1 - y0 + 1, x1 - x0 + 1
 
 
 @contextmanager

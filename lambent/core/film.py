@@ -1,4 +1,4 @@
-"""Films: H.264 in MP4, frame by frame, whole or not at all; or pictures in a row, each of them whole."""
+"""Films: H.264 in MP4, frame by frame, whole or not at all; or sequences of pictures, each of them whole."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import errno
 import re
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,9 @@ _CONSTANT_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart
 
 @contextmanager
 def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterator[Callable[[Frame], None]]:
-    """Function that takes the next frame, (height, width, 3) uint8 encoded; the film is there on leaving.
+    """Function that takes the next frame, (height, width, 3) uint8 encoded; the film is complete on leaving.
 
-    Nothing is left where an error or an interruption leaves the block. No frame is kept in memory.
+    An error or an interruption within the block leaves no file. No frame is kept in memory.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
                 yield write
             finally:
                 writer.close()
-            if not _is_whole(beside):  # ffmpeg's fault at the end, on a full disk above all, comes without an error
+            if not _is_whole(beside):  # ffmpeg does not report errors at its end, such as a full disk
                 raise OSError(errno.ENOSPC, "the end of the film could not be written: is the disk full?")
         except (OSError, RuntimeError) as error:
             raise UserError(f"film could not be written ({error})", file=path) from error
@@ -96,7 +96,7 @@ def even_size(width: int, height: int) -> tuple[int, int]:
 
 
 def sequence_file(path: Path, number: int) -> Path:
-    """Name of a sequence's picture: `number` in the place of the # signs of `path`, else four digits at its end."""
+    """Name of a sequence's picture: `number` replaces the # signs of `path`, or is added with four digits."""
     stem, signs, rest = re.fullmatch(r"([^#]*)(#*)(.*)", path.stem, re.DOTALL).groups()  # type: ignore[union-attr]
     if "#" in rest:
         raise UserError("name of a picture sequence", file=path, expected="one run of # signs, as in tour-####.png")
@@ -106,9 +106,9 @@ def sequence_file(path: Path, number: int) -> Path:
 
 @contextmanager
 def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
-    """Function that takes the next picture of a sequence and writes it whole: see `sequence_file`, from number 1.
+    """Function that takes the next picture of a sequence and writes it, named by `sequence_file` from number 1.
 
-    PNG takes (height, width, 3) uint8 encoded, EXR linear radiance. An interruption leaves the pictures before.
+    PNG takes (height, width, 3) uint8 encoded, EXR linear radiance. An interruption leaves the earlier pictures.
 
     Raises
     ------
@@ -133,12 +133,11 @@ def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
     yield write
 
 
-@contextmanager
-def pictures_writer(path: Path, width: int, height: int, fps: float) -> Iterator[Callable[[NDArray[Any]], None]]:
+def pictures_writer(
+    path: Path, width: int, height: int, fps: float
+) -> AbstractContextManager[Callable[[NDArray[Any]], None]]:
     """`film_writer` or `sequence_writer`, by the suffix."""
-    film = film_writer(path, width, height, fps) if path.suffix.lower() == FILM else sequence_writer(path)
-    with film as write:
-        yield write
+    return film_writer(path, width, height, fps) if path.suffix.lower() == FILM else sequence_writer(path)
 
 
 def radiance_wanted(path: Path) -> bool:

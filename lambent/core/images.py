@@ -1,8 +1,8 @@
-"""Pictures in and out: float32, linear Rec.709, (H, W, 3), row 0 at the top.
+"""Reading and writing pictures: float32, linear Rec.709, (H, W, 3), row 0 at the top.
 
-Reading goes by content, not by name: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
-promises more than `MAX_PIXELS`, or more than its file can hold, is refused before anything is allocated.
-Writing goes by the suffix: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
+The content decides how a file is read: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
+promises more than `MAX_PIXELS`, or more than its file can hold, is refused before anything is allocated. The suffix
+decides how a file is written: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def read_image(path: Path) -> Image:
 
 
 def read_encoded(path: Path) -> Image:
-    """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as they stand in the file: for normal maps, masks and alpha."""
+    """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as stored: for normal maps, masks and alpha."""
     from PIL import Image as Pillow
 
     data = read_bytes(Path(path), LIMIT_BYTES)
@@ -84,7 +84,7 @@ def write_image(path: Path, image: NDArray[Any]) -> None:
 
 
 def write_shown(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write what a display shows, (H, W, 3) uint8 encoded, as PNG, atomically."""
+    """Write display values, (H, W, 3) uint8 encoded, as PNG, atomically."""
     check_writable(path, (".png",))
     with atomic_path(path) as beside:
         _save_png(beside, picture)
@@ -97,14 +97,14 @@ def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
-    """`UserError` where a picture cannot be written there, or not under this suffix: to ask before long work."""
+    """`UserError` where a picture cannot be written at `path`, or not with its suffix; called before long work."""
     if Path(path).suffix.lower() not in suffixes:
         raise UserError("unknown kind of file", file=path, got=Path(path).suffix or None, expected=", ".join(suffixes))
     check_place(path)
 
 
 def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:
-    """Encoded values in [0, 1] as rounded bytes; what is not finite becomes 0."""
+    """Encoded values in [0, 1] as rounded bytes; NaN becomes 0."""
     return np.asarray(np.clip(np.nan_to_num(encoded), 0, 1) * 255 + 0.5, np.uint8)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError
+from lambent.core.plain import is_number
 
 Image = NDArray[np.float32]
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
@@ -34,8 +35,10 @@ def decode(data: bytes, file: Path, max_pixels: int) -> Image:
     pixels = _pixels(data, match.end(), height, width, file)
     scale = np.ldexp(1.0, pixels[..., 3].astype(np.int32) - 136) * (pixels[..., 3] > 0)
     image = (pixels[..., :3] * scale[..., None]).astype(np.float32)
-    for exposure in re.findall(rb"^EXPOSURE=\s*([-+.\deE]+)\s*$", header, re.MULTILINE):
-        image /= _positive(exposure, file)
+    for exposure in re.findall(r"^EXPOSURE=\s*([-+.\deE]+)\s*$", header.decode("latin-1"), re.MULTILINE):
+        if not (is_number(exposure) and 0 < float(exposure) < float("inf")):
+            raise UserError("not a positive number", file=file, field="EXPOSURE", got=exposure)
+        image /= float(exposure)
     if b"32-bit_rle_xyze" in header:
         image = xyz_to_rgb(image).astype(np.float32)
     return np.ascontiguousarray(image[:: 1 if match[1] == b"-" else -1, :: 1 if match[3] == b"+" else -1])
@@ -50,16 +53,6 @@ def encode(image: Image) -> bytes:
     pixels = np.concatenate([mantissa, exponent[..., None]], axis=-1).astype(np.uint8)
     height, width = image.shape[:2]
     return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + pixels.tobytes()
-
-
-def _positive(text: bytes, file: Path) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0 < value < float("inf"):
-        raise UserError("not a positive number", file=file, field="EXPOSURE", got=text.decode("ascii", "replace"))
-    return value
 
 
 def _pixels(data: bytes, at: int, height: int, width: int, file: Path) -> NDArray[np.uint8]:
@@ -112,7 +105,7 @@ def _run_length(data: bytes, at: int, height: int, width: int) -> NDArray[np.uin
 
 
 def _old_run_length(data: bytes, at: int, count: int) -> NDArray[np.uint8]:
-    """Before 1991: a pixel (1, 1, 1, n) repeats the last one n times; several in a row are the digits, low first."""
+    """The scheme before 1991: a pixel (1, 1, 1, n) repeats the last one n times; several in a row are digits of n."""
     pixels = np.empty((count, 4), np.uint8)
     done, digit = 0, 0
     while done < count:

@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.latlong import lat_long_uv
-
-Floats = NDArray[np.floating]
 
 
 def studio(n: int = 256) -> Floats:

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt, label, maximum_filter, uniform_filter
 
+from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import basis
 from lambent.core.geometry import cross_2d
 
-Floats = NDArray[np.floating]
-Mask = NDArray[np.bool_]
 CELLS = 600  # per size of the reflector, the root of its area
 MOST_CELLS = 2048  # along one side
 HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, over the reflector, in shares of its size
@@ -90,7 +89,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | No
     return FloorPlan(corner @ axes.T + height * normal, across, along, cell, steps)
 
 
-def _without_strips(covered: Mask, standing: Mask, width: float) -> Mask:
+def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
     pieces, count = label(covered & ~standing)
     inner = binary_erosion(pieces > 0)
@@ -102,13 +101,13 @@ def _without_strips(covered: Mask, standing: Mask, width: float) -> Mask:
     return np.asarray(covered & ~strip[pieces])
 
 
-def _edge_from(share: Floats, covered: Mask) -> Floats:
+def _edge_from(share: Floats, covered: Flags) -> Floats:
     """Cells from the centre of a covered cell to the edge, by the covered shares of it and of its neighbours."""
     around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
     return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
 
 
-def _filled(triangles: Floats, shape: tuple[int, int]) -> Mask:
+def _filled(triangles: Floats, shape: tuple[int, int]) -> Flags:
     """Cells whose centre, at whole coordinates (column, row), lies in a triangle (K, 3, 2): by rows, summed up."""
     change = np.zeros((shape[0], shape[1] + 1), np.int32)
     for triangle in triangles:
@@ -141,7 +140,7 @@ def _cut(height: Floats, corners: Floats) -> Floats:
     return np.stack(ends, axis=1)
 
 
-def _drawn(segments: Floats, shape: tuple[int, int]) -> Mask:
+def _drawn(segments: Floats, shape: tuple[int, int]) -> Flags:
     """Cells that segments (S, 2, 2) of (column, row) pass, in steps of half a cell."""
     standing = np.zeros(shape, bool)
     last = np.array(shape[::-1]) - 1

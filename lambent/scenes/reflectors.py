@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from lambent.core.arrays import Floats
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.materials.document import Material
 from lambent.scenes.floor_plan import FloorPlan, floor_plan
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 
-Floats = NDArray[np.floating]
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
 ROUGHEST = 0.2  # sqrt(mx my) of the narrowest lobe: a mirrored view covers hardly more than such a lobe
 LEAST_PART_M2 = 0.02  # of one object in a plane: less is an edge that lies there by chance

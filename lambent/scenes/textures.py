@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.scenes.scene import MaterialTextures, Texture
 
-Floats = NDArray[np.floating]
 CHANNELS: Mapping[str, int] = {
     "diffuse": 3, "specular": 3, "roughness": 1, "normal": 3, "direction": 2, "opacity": 1,
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""`lambent edit`: the mode that edits what it is given."""
+"""`lambent edit`: opens the mode that edits a file."""
 
 from __future__ import annotations
 
@@ -27,6 +27,6 @@ def run(file: Path, material: Path | None = None, environments: Sequence[Path] =
 
 
 def editing_mode(file: Path) -> str:
-    """The mode that says it edits such a file, else the material editor, which says what it cannot use."""
+    """Name of the mode that edits this kind of file; the material editor by default, which names faults of the file."""
     found = app.starts().items()
     return next((name for name, mode in found if hasattr(mode, "edits") and mode.edits(file)), "material")

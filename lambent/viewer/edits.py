@@ -1,4 +1,4 @@
-"""Materials that were changed in the window: steps with undo and redo, and what is saved when the window is lost."""
+"""Materials that were changed in the window: undo and redo; names of files; rescue when the window is lost."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class MaterialEdits:
     saved: dict[str, Material] = field(default_factory=dict)  # as they were saved last
     _undo: list[dict[str, Material]] = field(default_factory=list)
     _redo: list[dict[str, Material]] = field(default_factory=list)
-    _before: dict[str, Material] | None = None  # what the open stroke started from
+    _before: dict[str, Material] | None = None  # at the start of the open stroke
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
@@ -90,7 +90,7 @@ def rescue(edits: MaterialEdits, names: Iterable[str], folder: Path) -> Iterator
 
 
 def rescue_file(folder: Path, name: str) -> Path:
-    """A file that is not there yet, for what would else be lost."""
+    """A file that is not there yet, for unsaved work."""
     return folder / f"{unused(folder, f'{plain_name(name)}-rescued', '.json')}.json"
 
 

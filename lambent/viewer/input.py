@@ -20,7 +20,7 @@ LEFT, RIGHT, MIDDLE = 1, 2, 3
 
 
 class Input:
-    """Carries events into a mode's state. What begins over the interface belongs to it, wherever it ends."""
+    """Carries events into a mode's state. A drag that begins over the interface belongs to it, wherever it ends."""
 
     def __init__(self, screen: Screen, navigation: Navigation, edits: MaterialEdits) -> None:
         self.screen, self.navigation, self.edits = screen, navigation, edits
@@ -87,7 +87,7 @@ class Input:
         else:
             self.pressed_key(key)
 
-    # What a mode may answer besides: nothing here.
+    # Further events, which a mode may answer.
 
     def pointed(self, at: tuple[float, float] | None) -> None:
         """The mouse is at shares of the picture, or elsewhere."""

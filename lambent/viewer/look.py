@@ -1,4 +1,4 @@
-"""How the picture is made: exposure, view transform, what of the light is shown, integrator, samples, look-up."""
+"""Settings of the picture: exposure, view transform, component of light, integrator, samples, look-up."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _IoErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 
 def rescued(what: str, write: Callable[[], Iterable[object]]) -> None:
-    """Say on stderr where `write` put what was not saved, or why it could not."""
+    """Say on stderr where `write` put unsaved work, or why it could not."""
     try:
         for place in write():
             sys.stderr.write(f"lambent: note: {what} is in {place}\n")
@@ -43,7 +43,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
     def lost() -> None:
         nonlocal over
         if not over:
-            over = True  # what follows may fail in its turn
+            over = True  # the rescue may fail in its turn
             rescue()
 
     def on_signal(number: int, _: FrameType | None) -> None:
@@ -57,7 +57,7 @@ def kept(rescue: Callable[[], None]) -> Iterator[None]:
         finally:
             sys.stderr.write("lambent: error: the connection to the display was lost\n")
             sys.stderr.flush()
-            os._exit(1)  # Xlib would do the same, by way of the graphics driver's own farewells
+            os._exit(1)  # Xlib would exit, too, but run the graphics driver's exit handlers first
         return 0
 
     main = threading.current_thread() is threading.main_thread()

@@ -92,17 +92,17 @@ class Drawing:
         """Write the picture into the screen's folder, and say so, or why not."""
 
     def close(self) -> None:
-        """End what goes on in the background; harmless when repeated."""
+        """End work in the background; harmless when repeated."""
 
 
 class Mode:
-    """What a window shows, and how it answers; a mode overrides what it does differently."""
+    """Content and behaviour of a window; a mode overrides the methods where it differs."""
 
-    head: Callable[[], None] | None = None  # draws what stays in sight above the panels
+    head: Callable[[], None] | None = None  # draws the lines above the panels that do not scroll
 
     def __init__(self, title: str, screen: Screen, input: Input, drawing: Drawing, panels: Sequence[Panel]) -> None:
         self.title, self.screen, self.input, self.drawing, self.panels = title, screen, input, drawing, panels
-        self.across, self.down = 0.5, 0.6  # borders of the picture and the plots, as shares of what the column leaves
+        self.across, self.down = 0.5, 0.6  # where the plots begin, as shares of the window left of the column
 
     @property
     def beside(self) -> Beside | None:
@@ -117,7 +117,7 @@ class Mode:
         return False
 
     def advance(self, dt_s: float) -> None:
-        """Go on for `dt_s` seconds of motion (0 after a sleep), and take what ended in the background."""
+        """Go on for `dt_s` seconds of motion (0 after a sleep), and take results of work in the background."""
 
     def wait_s(self) -> float | None:
         """Seconds until `advance` has something to do although nothing moves; None: never."""
@@ -127,7 +127,7 @@ class Mode:
         """Take a file that was dropped onto the window."""
 
     def rescue(self) -> None:
-        """The window is lost: write what was not saved to files of new names, and say where on stderr."""
+        """The window is lost: write unsaved work to files of new names, and say where on stderr."""
 
     def close(self) -> None:
-        """The window was closed in order: end the work in the background, and say on stderr what was not saved."""
+        """The window was closed in order: end the work in the background, and name unsaved materials on stderr."""

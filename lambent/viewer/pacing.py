@@ -1,9 +1,9 @@
 """When to draw the picture, how large, and with which integrator.
 
-While anything the picture shows changes: the few-sample integrator, on fewer pixels where the adapter is too slow for
-them, and without mirror pictures of planar reflectors (which show their probes then) where even half of the width and
-height takes too long with them. `REST_S` after the last change: the same once more, whole and with everything; then
-every frame adds samples of `qmc` to the picture, up to a stated count; then nothing is drawn any more.
+In motion: the few-sample integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of
+planar reflectors (which show their probes then) where even half of the width and height takes too long with them.
+`REST_S` after the last change: the same once more, whole and with everything; then every frame adds samples of `qmc`
+to the picture, up to a stated count; then nothing is drawn any more.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ REST_S = 0.25
 BUDGET_S = 1 / 15  # a frame in motion should take no longer
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
 PROBE_FRAMES = 8
-FIXED_SHARE = 1.5  # a frame in motion may take so many times what it takes without pixels
-LEAST_MIRRORED = 0.5  # mirror pictures are not worth fewer pixels than that
-MIRROR_COST = 4.0  # times that a frame may take with them; measured in software: 3 to 4
-PRIOR_SAMPLES = 16  # of `qmc` that the last picture of few samples counts for, as long as there are few of those
+FIXED_SHARE = 1.5  # a frame in motion may take this many times its cost without pixels
+LEAST_MIRRORED = 0.5  # in motion, mirrored views are not worth a smaller scale
+MIRROR_COST = 4.0  # of a frame with mirrored views, in frames without; measured in software: 3 to 4
+PRIOR_SAMPLES = 16  # of `qmc` that the last picture in motion counts for, while few are accumulated
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One picture to draw: its size relative to the window, its index in the accumulation (None: few samples), and
-    whether planar reflectors get mirror pictures."""
+    """One picture to draw: its size relative to the window, its index in the accumulation (None: in motion), and
+    whether planar reflectors get mirrored views."""
 
     scale: float
     accumulate: int | None
@@ -34,7 +34,7 @@ WHOLE = Plan(1.0, None)
 
 
 class Resolution:
-    """The size of frames of one kind in motion, by what they took so far."""
+    """Chooses the size of frames of one kind in motion from the times of those before."""
 
     def __init__(self, scale: float) -> None:
         self.scale = scale
@@ -44,17 +44,17 @@ class Resolution:
         self._fixed_s = self._pixels_s = 0.0  # of a frame of no pixels, and of all pixels besides
 
     def seconds(self, scale: float) -> float:
-        """What a frame would take."""
+        """Estimated time of a frame."""
         return self._fixed_s + self._pixels_s * scale * scale
 
     def learn(self, scale: float, seconds: float, budget_s: float) -> None:
-        """Take in what a frame took, and choose the size of the next."""
+        """Take in the time of a frame, and choose the size of the next."""
         before = self._times.get(scale, seconds)
         # A mean, but one that forgets a stall (a shader being compiled) at the next frame of this size.
         self._times[scale] = min((before + seconds) / 2, 1.2 * seconds)
         self._fixed_s = min(self._without_pixels_s(), seconds)
         self._pixels_s = (seconds - self._fixed_s) / scale**2
-        # Fewer pixels do not buy what costs the same with any number of them.
+        # Fewer pixels save nothing of the cost that does not depend on pixels.
         budget_s = max(budget_s, FIXED_SHARE * self._fixed_s)
         fits = next((s for s in SCALES if self.seconds(s) <= budget_s), SCALES[-1])
         fits_well = next((s for s in SCALES if self.seconds(s) <= 0.7 * budget_s), SCALES[-1])
@@ -64,13 +64,13 @@ class Resolution:
             self.scale = fits_well
         elif seconds > budget_s:
             self._late += 1
-            if self._late == self._probe_at:  # what more pixels cost may have been learnt from a stall
+            if self._late == self._probe_at:  # the cost of pixels may have been learnt from a stall
                 self._probe_at *= 4  # but each probe is seen: rarer from time to time
                 self.scale = SCALES[max(0, SCALES.index(self.scale) - 1)]
                 self._times = {scale: time for scale, time in self._times.items() if scale < self.scale}
 
     def _without_pixels_s(self) -> float:
-        """What a frame of no pixels would take, by the least and the most pixels drawn so far."""
+        """Estimated time of a frame without pixels, from the smallest and the largest drawn so far."""
         small, large = min(self._times), max(self._times)
         if small == large:
             return 0.0
@@ -79,13 +79,13 @@ class Resolution:
 
 
 class Pacer:
-    """Tells what to draw next. Everything it knows it is told: the time, what changed, what a frame cost."""
+    """Decides what to draw next. It is told everything: the time, the wanted picture, the cost of a frame."""
 
     def __init__(self, *, accumulate_to: int, slow_adapter: bool) -> None:
         self.accumulate_to = accumulate_to
         self._mirrors = not slow_adapter  # in motion
         start = 0.5 if slow_adapter else 1.0
-        self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirror pictures, and without
+        self._sizes = {True: Resolution(start), False: Resolution(start)}  # with mirrored views, and without
         self.shown: object = None  # the picture that the window shows or is about to
         self.accumulated = 0  # frames that it is the mean of; 0: it is one of motion
         self._changed_s = 0.0
@@ -102,7 +102,7 @@ class Pacer:
         self._budget_s = seconds
 
     def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
-        """What to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
+        """Plan to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
         if picture != self.shown:
             self.shown, self._changed_s, self.accumulated = picture, now_s, 0
             return self.moving if adaptive else WHOLE
@@ -113,7 +113,7 @@ class Pacer:
         return None if self._next(refine) is None else max(0.0, self._changed_s + REST_S - now_s)
 
     def _next(self, refine: bool) -> Plan | None:
-        """What a resting camera still lacks."""
+        """Next step of refinement for a resting camera."""
         if not (self.accumulated or self._last == WHOLE):
             return WHOLE
         return Plan(1.0, self.accumulated) if refine and self.accumulated < self.accumulate_to else None
@@ -123,7 +123,7 @@ class Pacer:
         self.accumulated = 0 if plan.accumulate is None else plan.accumulate + 1
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
-        """Learn what a frame in motion took, with so many mirror pictures, and choose the next."""
+        """Learn the time of a frame in motion with this many mirrored views, and choose the next."""
         if plan.accumulate is not None:
             return
         size = self._sizes[plan.mirrors]
@@ -136,10 +136,10 @@ class Pacer:
 
 
 def prior_share(accumulated: int, accumulate_to: int, samples: int) -> float:
-    """How much of the last picture of few samples is shown beside the mean of `accumulated` frames of `samples` each.
+    """Share of the last picture in motion that is blended with the mean of `accumulated` frames of `samples` each.
 
-    Few frames of `qmc` are noise, and to show them at once would be a step back: with share a/(a + N) of the sharp
-    picture, the noise shown is never more than that of 4 a frames. It is 0 at the end.
+    Few frames of `qmc` are noise, worse than that sharp picture: with its share at a/(a + N), the noise shown is never
+    more than that of 4 a frames. The share is 0 at the end.
     """
     weight = PRIOR_SAMPLES / samples
     share = weight / (accumulated + weight)

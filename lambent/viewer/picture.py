@@ -152,7 +152,7 @@ class Picture:
 
         Returns the files' name without suffix, None where they could not be written.
         """
-        self._under_way = None  # the renderer draws one frame at a time; what is lost is drawn again
+        self._under_way = None  # the renderer draws one frame at a time; this one is drawn again later
         folder, say = self._screen.folder, self._screen.say
         stem = "".join(c if c.isalnum() or c in "._-" else "-" for c in name).strip(".-") or "picture"
         stem = unused(folder, stem, ".png", ".exr")

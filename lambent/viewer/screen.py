@@ -1,4 +1,4 @@
-"""The window itself, whatever its mode: the picture's place, messages, the pace of drawing, what a frame cost."""
+"""The window itself, whatever its mode: the picture's place, messages, the pace of drawing, the cost of a frame."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from lambent.viewer.mode import Image, Mode
 from lambent.viewer.screen import least
 
 MAX_FPS = 60
-BEFORE_IMGUI = -100  # its own handlers stand at -99 and stop what they use, so that ours would not see a hover
+BEFORE_IMGUI = -100  # its handlers (order -99) stop the events they use, so that ours would not see a hover
 SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
 FOR_IMGUI_ONLY = ("char", "resize")
 EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)

@@ -9,7 +9,7 @@ from typing import Any
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled, Progress
 
-POLL_S = 0.1  # between two looks at what goes on in the background
+POLL_S = 0.1  # between two looks at work in the background
 
 
 class Work:
@@ -34,7 +34,7 @@ class Work:
         self._thread.start()
 
     def cancel(self) -> None:
-        """Ask to stop; `run` decides what that leaves."""
+        """Ask to stop; `run` decides what remains."""
         self._cancelled.set()
 
     @property

@@ -14,6 +14,7 @@ from lambent.core.directions import (
     normalize,
     raised,
     reflect,
+    rotation_about,
 )
 
 
@@ -47,3 +48,12 @@ def test_frames_are_orthonormal_and_right_handed(w):
     t, b = basis(w)
     np.testing.assert_allclose(np.cross(t, b), w, atol=1e-15)
     np.testing.assert_allclose(np.sum(t * b, axis=-1), 0, atol=1e-15)
+
+
+def test_rotations_are_right_handed():
+    np.testing.assert_allclose(rotation_about(np.array([0.0, 0.0, 1.0]), np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    axis = normalize(np.array([1.0, -2.0, 0.5]))
+    m = rotation_about(axis, 0.7)
+    np.testing.assert_allclose(m @ m.T, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(m @ axis, axis, atol=1e-15)
+    assert np.linalg.det(m) == pytest.approx(1) and np.trace(m) == pytest.approx(1 + 2 * np.cos(0.7))

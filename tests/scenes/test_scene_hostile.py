@@ -223,6 +223,7 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
         (sound["ascii"].replace(b"3 0 1 2", b"3 0 1 9"), r"face index out of range; found 9"),
         (sound["ascii"].replace(b"3 0 1 2", b"3 0 1 x"), r"no number"),
         (sound["ascii"].replace(b"float x", b"floot x"), r"header cannot be read"),
+        (sound["ascii"].replace(b"format ascii 1.0\n", b""), r"header cannot be read"),
         (sound["ascii"].replace(b"property float y\n", b""), r"."),
     ]
     for data, said in broken:

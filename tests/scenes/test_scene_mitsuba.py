@@ -10,7 +10,7 @@ import pytest
 
 from lambent.bake.engine import engine
 from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
-from lambent.core.camera import camera_axes
+from lambent.core.camera import Camera, camera_axes
 from lambent.core.directions import normalize
 from lambent.core.images import write_image
 from lambent.materials.bsdf import MaterialBSDF
@@ -138,6 +138,15 @@ def test_cameras_see_what_mitsubas_see(tmp_path: Path, kind: str, said: str, wid
         assert camera.position == pytest.approx(
             np.array(theirs.sensors()[0].world_transform().matrix)[:3, 3].ravel(), abs=1e-4
         )
+
+
+def test_an_up_along_the_view_gives_the_axes_of_our_cameras(tmp_path: Path) -> None:
+    """Where `up` tells nothing, the loader and core.camera take the same axis instead."""
+    stand = '<lookat origin="0, 5, 0" target="0, 0, 0" up="0, 1, 0"/>'
+    body = f'<sensor type="perspective"><transform name="to_world">{stand}</transform></sensor>{BALL}'
+    (camera,) = load_scene(written(tmp_path, body)).cameras
+    expected = camera_axes(Camera("", (0.0, 5.0, 0.0), (0.0, 0.0, 0.0)))
+    np.testing.assert_allclose(camera_axes(camera), expected, atol=1e-12)
 
 
 def test_a_scene_that_stands_along_z_is_turned(tmp_path: Path) -> None:
@@ -291,7 +300,7 @@ def test_skies(tmp_path: Path) -> None:
     assert isinstance(scene.environment, SunSky) and scene.environment.sun_direction == pytest.approx((0, 0.6, 0.8))
     assert scene.environment.turbidity == 5
     dark = load_scene(written(tmp_path, BALL))
-    assert isinstance(dark.environment, SunSky) and "nothing in it gives light: it is under daylight" in dark.warnings
+    assert isinstance(dark.environment, SunSky) and "nothing in it emits light: it gets daylight" in dark.warnings
 
 
 def test_the_living_room(shared_data: Path) -> None:

@@ -151,7 +151,7 @@ map_Kd gone.png
     assert gold.r0 == pytest.approx((1, 0.8, 0.3)) and m["pbr"].kd == (0, 0, 0)
     assert gold.mx * gold.my == pytest.approx(0.25**2) and gold.mx > gold.my
     assert "material pbr: its bump map is not read" in notes
-    assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "seen through" in notes
+    assert m["pane"].transmission_lobes[0].k == (0.75,) * 3 and "is transparent (75%)" in notes
     lamp = next(o for o in parts.objects if o.material == "lamp")
     assert lamp.emission == (5, 4, 3) and "material lamp: picture gone.png is not there" in notes
     assert {p.name for p in parts.sources} == {

@@ -52,7 +52,7 @@ def walk(p, with_mirrors_s, without_s, frames):
     return plans
 
 
-def test_mirror_pictures_are_left_out_where_half_the_size_is_too_slow_with_them():
+def test_mirrored_views_are_left_out_where_half_the_size_is_too_slow_with_them():
     p = pacer()
     plans = walk(p, 6 * BUDGET_S, 1.5 * BUDGET_S, 30)
     assert plans[0].mirrors and not plans[1].mirrors
@@ -61,7 +61,7 @@ def test_mirror_pictures_are_left_out_where_half_the_size_is_too_slow_with_them(
     assert all(plan.mirrors for plan in walk(p, 2 * BUDGET_S, 0.5 * BUDGET_S, 30)), "half the size is enough"
 
 
-def test_mirror_pictures_come_back_when_there_is_time_for_them():
+def test_mirrored_views_come_back_when_there_is_time_for_them():
     p = pacer()
     p.cost(p.moving, 50 * BUDGET_S, 1)  # a shader being compiled
     plans = walk(p, 0.3 * BUDGET_S, 0.1 * BUDGET_S, 10)

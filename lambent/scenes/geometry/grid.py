@@ -60,13 +60,10 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
     """One mesh of several."""
     parts = list(meshes)
     starts = np.cumsum([0] + [len(m.positions) for m in parts[:-1]]).astype(np.uint32)
-    return Mesh(
-        np.concatenate([m.positions for m in parts]),
-        np.concatenate([m.normals for m in parts]),
-        np.concatenate([m.tangents for m in parts]),
-        np.concatenate([m.uv for m in parts]),
-        np.concatenate([m.faces + start for m, start in zip(parts, starts, strict=True)]),
-    )
+    names = ("positions", "normals", "tangents", "uv")
+    positions, normals, tangents, uv = (np.concatenate([getattr(m, name) for m in parts]) for name in names)
+    faces = np.concatenate([m.faces + start for m, start in zip(parts, starts, strict=True)])
+    return Mesh(positions, normals, tangents, uv, faces)
 
 
 def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:

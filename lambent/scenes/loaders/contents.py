@@ -1,4 +1,4 @@
-"""What a geometry file gives to a scene."""
+"""The contents of a geometry file, and a scene of them."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lambent.core.camera import Camera
+from lambent.core.camera import Camera, overview
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.scenes.scene import Environment, Light, MaterialTextures, SceneObject
+from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky, bounds_of
+
+DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
+EXPOSURE_EV = 2.0  # sunlit white is about .25 W/(sr m^2) in the sky model's units
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Objects in world space, and what else the file holds.
+    """Objects in world space, and everything else in the file that Lambent reads.
 
     `variants` are its material sets: variant -> object -> its material there and the radiance it then emits;
     `materials` holds those of all variants. A scene of this file alone gets daylight unless `tells_its_light`, or if
@@ -31,6 +34,24 @@ class Contents:
     environment: Environment | None = None
     tells_its_light: bool = False
     variants: Mapping[str, Mapping[str, tuple[str, Triple]]] = field(default_factory=dict)
+
+    def scene(self, name: str) -> Scene:
+        """A scene of this file alone, with daylight, exposure and a camera if it lacks them."""
+        shines = bool(self.environment or self.lights or any(any(o.emission) for o in self.objects))
+        own_light = self.environment is not None or (self.tells_its_light and shines)
+        notes = ("nothing in it emits light: it gets daylight",) if self.tells_its_light and not own_light else ()
+        return Scene(
+            name=name,
+            objects=self.objects,
+            materials=self.materials,
+            environment=self.environment if own_light else DAYLIGHT,
+            lights=self.lights,
+            cameras=self.cameras or (overview(*bounds_of(self.objects)),),
+            exposure_ev=0.0 if own_light else EXPOSURE_EV,
+            sources=self.sources,
+            warnings=(*self.warnings, *notes),
+            textures=self.textures,
+        )
 
 
 def unique_name(name: str, taken: set[str]) -> str:

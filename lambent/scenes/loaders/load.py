@@ -19,7 +19,6 @@ from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
-from lambent.scenes.loaders.defaults import with_defaults
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.scene import Scene, SceneObject
@@ -56,7 +55,8 @@ def _load(path_or_builtin: str | Path) -> Scene:
     path = Path(path_or_builtin)
     if path.suffix.lower() == TOML:
         return load_toml(path, read_geometry)
-    return with_defaults(path.stem, _format_of(path).load(path, None))
+    contents: Contents = _format_of(path).load(path, None)
+    return contents.scene(path.stem)
 
 
 def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Contents:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.loaders.contents import Contents
-from lambent.scenes.loaders.meshes.polygons import Ints, ranges, triangulate
+from lambent.scenes.loaders.meshes.polygons import ranges, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
 from lambent.scenes.scene import SceneObject
 
@@ -142,7 +142,7 @@ class _Rows:
         self._at += array.nbytes
         return array
 
-    def faces(self, element: _Element) -> tuple[Ints, Ints]:
+    def faces(self, element: _Element) -> tuple[Indices, Indices]:
         """Corners of all faces, one face after the other, and the number (F,) of each."""
         if element.count == 0:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -197,5 +197,5 @@ def _columns(vertex: dict[str, Floats], *choices: tuple[str, ...]) -> Floats | N
     return None if names is None else np.stack([vertex[n] for n in names], axis=-1)
 
 
-def _integers(values: np.ndarray[Any, Any]) -> Ints:
+def _integers(values: np.ndarray[Any, Any]) -> Indices:
     return np.nan_to_num(values, nan=-1).astype(np.int64) if values.dtype.kind == "f" else values.astype(np.int64)

@@ -14,7 +14,7 @@ HINT = "put the file into the scene's folder or below"
 class SceneFiles:
     """The files of one scene, below the folder `root`, which is that of its first file if not given.
 
-    `sources` are those used so far, in order.
+    `sources` are the files used so far, in order.
     """
 
     def __init__(self, first: Path, root: Path | None = None) -> None:

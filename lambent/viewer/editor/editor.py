@@ -121,7 +121,7 @@ class Editor:
         return [work for work in (self.fit.work, self.files.loading, self.shown.exact_work) if work is not None]
 
     def tick(self) -> None:
-        """Take what has ended in the background, and bring what is shown up to date."""
+        """Take results of work in the background, and bring the plots up to date."""
         queue, self._queue = self._queue, []
         for act in queue:
             act()
@@ -133,7 +133,7 @@ class Editor:
             self.shown.update(self.subject, self.metric, self.plots)
 
     def close(self) -> None:
-        """Stop what goes on in the background; nothing is shown any more."""
+        """Stop work in the background; nothing is shown any more."""
         self._closed = True
         for work in self._works:
             work.cancel()

@@ -1,4 +1,4 @@
-"""Files of the editor: what a file is, what is loaded, and what is saved, with its provenance."""
+"""Files of the editor: their kinds, loading, and saving a material with its provenance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BY_HAND = "edited by hand"
 
 
 def kind_of(path: Path) -> Kind:
-    """Kind of a file, as far as its beginning and its ending tell; `UserError` where it cannot be read."""
+    """Kind of a file, by its suffix and its first bytes; `UserError` where it cannot be read."""
     if path.suffix.lower() in ENVIRONMENTS:
         return "environment"
     try:
@@ -77,7 +77,7 @@ def typed_path(text: str) -> Path:
 
 
 class Files:
-    """What is opened and saved is said on the screen; so is what cannot be, and nothing is lost.
+    """Opens and saves files, and says so, or why not, on the screen; a failure changes nothing.
 
     `show` gets a measurement once it is read. The document is saved as `name`.
     """
@@ -85,7 +85,7 @@ class Files:
     def __init__(self, subject: Subject, screen: Screen, show: Callable[[Measurement], None]) -> None:
         self._subject, self._screen, self._show = subject, screen, show
         self.name = f"{plain_name(subject.material.name)}.json"
-        self.typed: dict[str, str] = {}  # fields for paths, by what they are for
+        self.typed: dict[str, str] = {}  # texts of the fields for paths, by label
         self.loading: Work | None = None
         self.open_environment: Callable[[Path], None] | None = None  # where there is a preview
         self._may_replace: set[Path] = set()

@@ -32,7 +32,7 @@ class Restrictions:
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def fix(self, name: str, fixed: bool) -> None:
-        """Fix a parameter, or set it free; what is fixed has no interval."""
+        """Fix a parameter, or set it free; a fixed one has no interval."""
         if fixed:
             self.fixed.add(name)
             self.ranges.pop(name, None)
@@ -40,7 +40,7 @@ class Restrictions:
             self.fixed.discard(name)
 
     def narrow(self, name: str, interval: tuple[float, float] | None) -> None:
-        """Give a parameter an interval, or none; what has one is not fixed."""
+        """Give a parameter an interval, or none; one with an interval is not fixed."""
         if interval is None:
             self.ranges.pop(name, None)
         else:
@@ -50,7 +50,7 @@ class Restrictions:
     def for_fit(
         self, material: Material, lobes: int
     ) -> tuple[dict[str, Value], dict[str, tuple[float, float]], list[str]]:
-        """`fix` and `ranges` of a fit with so many lobes a side, and the names that such a fit does not know."""
+        """`fix` and `ranges` of a fit with `lobes` a side, and the names that are no parameters of that fit."""
         from lambent.materials.fitting.parameters import known_parameters
 
         values = dict(_values(material))

@@ -38,7 +38,7 @@ class Plots:
     channel: Channel = "mean"
     scale: Scale = "cube root"
     visible: bool = True
-    fit_axes: bool = True  # the axes have yet to take the extent of what they show
+    fit_axes: bool = True  # the axes have yet to take the extent of the curves
 
     def choose(self, incident: int) -> None:
         """Plot the plane of another incident direction."""
@@ -63,7 +63,7 @@ class Shown:
         self.moving_seconds = 0.0  # of the last update while a slider moved
         self.exact_work: Work | None = None
         self._white = 1.0
-        self._done: dict[str, Any] = {}  # part -> what it was last made of
+        self._done: dict[str, Any] = {}  # part -> the inputs it was last made from
         self._disks: dict[tuple[bool, int], Disks] = {}
         self._exact_of: Material | None = None
         self._changed_s = 0.0

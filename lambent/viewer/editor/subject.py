@@ -20,12 +20,12 @@ class Subject:
     edits: MaterialEdits
     name: str
     restrictions: Restrictions = field(default_factory=Restrictions)  # of its parameters in a fit
-    reference: B = "nothing"  # what it is compared with
+    reference: B = "nothing"  # the choice of the material B
     document: Material | None = None
 
     def __post_init__(self) -> None:
         self.loaded = self.material
-        self._origins = [self.loaded]  # as they were loaded or fitted: what their provenance is about
+        self._origins = [self.loaded]  # as they were loaded or fitted, with their provenance
 
     @property
     def material(self) -> Material:

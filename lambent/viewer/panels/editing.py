@@ -24,7 +24,7 @@ RANGE_PX = 26
 
 
 def draw_head(editor: Editor) -> None:
-    """Error, history and files: what stays in sight above the sections."""
+    """Error, history and files, above the panels."""
     _names(editor)
     _error(editor)
     _history(editor)
@@ -33,7 +33,7 @@ def draw_head(editor: Editor) -> None:
 
 
 def draw(editor: Editor) -> None:
-    """Every number of the material, what to do with its lobes, and what to compare it with."""
+    """Every number of the material, adding lobes, and the choice of B."""
     subject = editor.subject
     material = subject.material
     edited, editor.linked_roughness = _numbers(editor, material)

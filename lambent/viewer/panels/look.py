@@ -1,4 +1,4 @@
-"""How the picture is made: exposure, view transform, what is shown, integrator, samples, pacing."""
+"""Controls of the picture: exposure, view transform, component of light, integrator, samples, pacing."""
 
 from __future__ import annotations
 

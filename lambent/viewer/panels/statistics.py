@@ -23,7 +23,7 @@ def draw(screen: Screen, editor: Editor | None, notes: Sequence[str] = ()) -> No
         ("samples per pixel", str(s.samples)),
         ("at rest", f"{s.accumulated} of {s.accumulate_to}" if s.accumulated else "-"),
         ("draw calls", str(s.draw_calls)),
-        ("mirror pictures", "left out in motion" if s.mirrors is None else str(s.mirrors)),
+        ("planar reflections", "left out in motion" if s.mirrors is None else str(s.mirrors)),
     ]
     if editor is not None:
         table.append(("disks, curves, error", f"{1e3 * editor.shown.moving_seconds:.1f} ms while a slider moves"))

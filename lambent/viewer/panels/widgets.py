@@ -103,9 +103,9 @@ def wrapped(lines: Sequence[str], colour: Colour = AMBER) -> None:
     imgui.pop_text_wrap_pos()
 
 
-def shadowed(lines: imgui.ImDrawList, at: tuple[float, float], text: str, colour: Colour) -> None:
+def shadowed(lines: imgui.ImDrawList, at: tuple[float, float], text: str, colour: Colour, shade: float = 0.8) -> None:
     """Text that can be read over any picture."""
-    lines.add_text((at[0] + 1, at[1] + 1), imgui.get_color_u32((0, 0, 0, 0.8)), text)
+    lines.add_text((at[0] + 1, at[1] + 1), imgui.get_color_u32((0, 0, 0, shade)), text)
     lines.add_text(at, imgui.get_color_u32(colour), text)
 
 

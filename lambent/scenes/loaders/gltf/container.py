@@ -69,14 +69,14 @@ class Gltf:
             array = np.zeros((a.count, width), dtype)
         else:
             array = self._elements(a.bufferView, a.byteOffset, dtype, (a.count, width), field)
-        if a.sparse is not None and a.sparse.count:
-            at, put = a.sparse.indices, a.sparse.values
-            kind = np.dtype(COMPONENTS[at.componentType])
-            places = self._elements(at.bufferView, at.byteOffset, kind, (a.sparse.count, 1), f"{field}.sparse.indices")
+        s, field = a.sparse, f"{field}.sparse"
+        if s is not None and s.count:
+            kind = np.dtype(COMPONENTS[s.index_type])
+            places = self._elements(s.index_view, s.index_offset, kind, (s.count, 1), f"{field}.indices")
             if int(places.max()) >= a.count:
-                raise self.error("index out of range", f"{field}.sparse", int(places.max()), f"below {a.count}")
-            shape = (a.sparse.count, width)
-            array[places[:, 0]] = self._elements(put.bufferView, put.byteOffset, dtype, shape, f"{field}.sparse.values")
+                raise self.error("index out of range", field, int(places.max()), f"below {a.count}")
+            values = self._elements(s.value_view, s.value_offset, dtype, (s.count, width), f"{field}.values")
+            array[places[:, 0]] = values
         return array
 
     def _elements(
@@ -143,9 +143,8 @@ def read(path: Path, root: Path | None = None) -> Gltf:
         document = GltfDocument.model_validate(raw)
     except ValidationError as error:
         raise invalid(error, path) from error
-    if not document.asset.version.startswith("2."):
-        version = document.asset.version
-        raise UserError("unknown glTF version", file=path, field="asset.version", got=version, expected=2)
+    if not document.version.startswith("2."):
+        raise UserError("unknown glTF version", file=path, field="asset.version", got=document.version, expected=2)
     unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
     if unread:
         hint = "export without compression" if any("compression" in name for name in unread) else None

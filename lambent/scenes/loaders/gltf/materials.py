@@ -15,8 +15,7 @@ from lambent.core.plain import Triple
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, MaterialDocument, SpecularGlossiness, TextureReference
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
-from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, coated, rgb, seen_through
+from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, metallic_roughness, rgb
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture
@@ -59,7 +58,7 @@ class _Reading:
         if through and transmission.transmissionTexture is not None:
             texture = self._values(transmission.transmissionTexture)
             through *= float(texture.channel(0).mean[0]) if texture is not None else 1.0
-            notes.append("its transmission is averaged over its picture")
+            notes.append("its transmission is averaged over its texture")
         surface = metallic_roughness(
             base, metallic, along, plain, notes, weight=specular.specularFactor, aspect=aspect, through=through
         )
@@ -102,7 +101,7 @@ class _Reading:
         if texture is None:
             return strength, (absolute(constant(turned)) if turn_rad else None)
         if float(np.ptp(texture.values[..., 2])) > 0.02:
-            self._notes.append("the strength of its anisotropy is averaged over its picture")
+            self._notes.append("the strength of its anisotropy is averaged over its texture")
         strength *= float(texture.channel(2).mean[0])
         x, y = (texture.values[..., i] * 2 - 1 for i in range(2))
         length = np.maximum(np.hypot(x, y), 1e-3)
@@ -135,7 +134,7 @@ class _Reading:
         if coat.clearcoatTexture or coat.clearcoatRoughnessTexture or coat.clearcoatNormalTexture:
             self._notes.append("the textures of its clear coat are not read")
         k = constant(np.full(3, coat.clearcoatFactor))
-        return coated(surface, SpecularLobe(constant(coat.clearcoatRoughnessFactor**2), k, np.full(3, 0.04)))
+        return surface.coated(SpecularLobe(constant(coat.clearcoatRoughnessFactor**2), k, np.full(3, 0.04)))
 
     def _normal(self) -> Texture | None:
         reference = self._document.normalTexture
@@ -152,7 +151,7 @@ class _Reading:
             return 0.0, 0.0, 0.0
         texture = self._values(self._document.emissiveTexture, srgb=True)
         if texture is not None:
-            self._notes.append("its emission is averaged over its picture")
+            self._notes.append("its emission is averaged over its texture")
             radiance = radiance * texture.mean
         return rgb(radiance)
 
@@ -173,7 +172,7 @@ class _Reading:
         if even >= 1:
             return surface
         self._notes.append(f"alpha BLEND lets {1 - even:.0%} of the light through")
-        return seen_through(surface, np.full(3, even))
+        return surface.seen_through(np.full(3, even))
 
 
 def _srgb(image: TextureImage | None) -> Textured | None:

@@ -166,13 +166,13 @@ class _Reading:
     def _add_camera(self, index: int, node_name: str | None, world: Floats) -> None:
         camera = self._gltf.pick(self._gltf.document.cameras, index, "cameras")
         wanted = node_name or camera.name or f"camera_{index}"
-        if camera.perspective is None:
+        if camera.yfov is None:
             self._warnings.append(f"{wanted}: left out, a camera without perspective")
             return
         name = unique_name(wanted, self._camera_names)
         position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
-        fov_y_deg = math.degrees(camera.perspective.yfov)
-        self._cameras.append(Camera(name, triple(position), triple(position + forward), triple(up), fov_y_deg))
+        target, fov_y_deg = triple(position + forward), math.degrees(camera.yfov)
+        self._cameras.append(Camera(name, triple(position), target, triple(up), fov_y_deg))
 
     def _add_light(self, index: int, world: Floats) -> None:
         light = self._gltf.pick(self._gltf.document.lights, index, "lights")
@@ -183,7 +183,7 @@ class _Reading:
         elif light.type == "point":
             self._lights.append(PointLight(position, power))
         else:
-            inner, outer = math.degrees(light.spot.innerConeAngle), math.degrees(light.spot.outerConeAngle)
+            inner, outer = math.degrees(light.inner_rad), math.degrees(light.outer_rad)
             self._lights.append(PointLight(position, power, direction, min(inner, outer), outer))
 
 

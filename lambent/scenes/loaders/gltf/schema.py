@@ -1,6 +1,6 @@
 """The part of glTF 2.0 that Lambent reads; everything else in a file is ignored.
 
-The fields of an extension are fields of the object that it extends; `_extension` names their place.
+Fields of extensions and of small inner objects are fields of the object around them; `_at` names their place.
 """
 
 from __future__ import annotations
@@ -20,10 +20,15 @@ Colour = tuple[NotNegative, NotNegative, NotNegative]
 READ_EXTENSIONS = {"KHR_mesh_quantization"}  # needs no field of its own; `_extension` adds the others
 
 
+def _at(*place: str, default: Any = ...) -> Any:
+    """A field at a place further in, by default required."""
+    return Field(default, validation_alias=AliasPath(*place))
+
+
 def _extension(name: str, *place: str, default: Any = None) -> Any:
     """A field at a place within an extension."""
     READ_EXTENSIONS.add(name)
-    return Field(default, validation_alias=AliasPath("extensions", name, *place))
+    return _at("extensions", name, *place, default=default)
 
 
 class _Part(BaseModel):
@@ -32,10 +37,6 @@ class _Part(BaseModel):
 
 class _Extended(_Part):
     extensions: dict[str, dict[str, Any]] = {}
-
-
-class Asset(_Part):
-    version: str
 
 
 class Buffer(_Part):
@@ -50,21 +51,13 @@ class BufferView(_Part):
     byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
 
 
-class SparseIndices(_Part):
-    bufferView: Index
-    componentType: Literal[5121, 5123, 5125]
-    byteOffset: Index = 0
-
-
-class SparseValues(_Part):
-    bufferView: Index
-    byteOffset: Index = 0
-
-
 class Sparse(_Part):
     count: Index
-    indices: SparseIndices
-    values: SparseValues
+    index_view: Index = _at("indices", "bufferView")
+    index_offset: Index = _at("indices", "byteOffset", default=0)
+    index_type: Literal[5121, 5123, 5125] = _at("indices", "componentType")
+    value_view: Index = _at("values", "bufferView")
+    value_offset: Index = _at("values", "byteOffset", default=0)
 
 
 class Accessor(_Part):
@@ -220,30 +213,22 @@ class MaterialDocument(_Extended):
     specular_glossiness: SpecularGlossiness | None = _extension("KHR_materials_pbrSpecularGlossiness")
 
 
-class Perspective(_Part):
-    yfov: Annotated[float, Field(gt=0, lt=3.1)]
-
-
 class CameraDocument(_Part):
     type: str
     name: str | None = None
-    perspective: Perspective | None = None
+    yfov: Annotated[float, Field(gt=0, lt=3.1)] | None = _at("perspective", "yfov", default=None)
 
 
 class SceneNodes(_Part):
     nodes: list[Index] = []
 
 
-class Spot(_Part):
-    innerConeAngle: NotNegative = 0
-    outerConeAngle: Annotated[float, Field(gt=0, le=1.5708)] = 0.7854
-
-
 class LightDocument(_Part):
     type: Literal["directional", "point", "spot"]
     color: Colour = (1, 1, 1)
     intensity: NotNegative = 1
-    spot: Spot = Spot()
+    inner_rad: NotNegative = _at("spot", "innerConeAngle", default=0)
+    outer_rad: Annotated[float, Field(gt=0, le=1.5708)] = _at("spot", "outerConeAngle", default=0.7854)
 
 
 class Variant(_Part):
@@ -253,7 +238,7 @@ class Variant(_Part):
 class GltfDocument(_Extended):
     """A whole glTF document."""
 
-    asset: Asset
+    version: str = _at("asset", "version")
     scene: Index = 0
     scenes: list[SceneNodes] = []
     nodes: list[Node] = []

@@ -36,17 +36,17 @@ class Textures:
         texture = gltf.pick(gltf.document.textures, reference.index, "textures")
         image = None if texture.image is None else self._image(texture.image, notes)
         if texture.image is None:
-            notes.append(f"texture {reference.index} has no picture of a kind that is read: its factor stands alone")
+            notes.append(f"texture {reference.index} has no image of a readable kind: only its factor counts")
         if image is None:
             return None
         if uv_set_of(reference) != uv_set:
-            notes.append("uses two sets of uv: what lies on the second is averaged")
+            notes.append("uses two sets of uv: textures on the second are averaged")
             mean = image.texels.mean(axis=(0, 1), keepdims=True)
             return TextureImage(np.rint(mean).astype(np.uint8), image.alpha)
         if texture.sampler is not None:
             sampler = gltf.pick(gltf.document.samplers, texture.sampler, "samplers")
             if (sampler.wrapS, sampler.wrapT) != (REPEAT, REPEAT):
-                notes.append("its pictures are repeated beyond their edges, not clamped or mirrored")
+                notes.append("its textures are repeated beyond their edges, not clamped or mirrored")
         return replace(image, uv_transform=_uv_transform(reference))
 
     def rgb(self, reference: TextureReference | None, uv_set: int, notes: list[str], *, srgb: bool) -> Textured | None:
@@ -59,7 +59,7 @@ class Textures:
         gltf, field = self._gltf, f"images.{number}"
         document = gltf.pick(gltf.document.images, number, "images")
         if document.uri is not None and gltf.is_missing(document.uri, field):
-            notes.append(f"picture {document.uri} is not there: its factor stands alone")
+            notes.append(f"picture {document.uri} is not there: only its factor counts")
             return None
         if document.uri is not None:
             data = gltf.resource(document.uri, field)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, basis, normalize
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import basis, normalize
 from lambent.core.geometry import area_vectors, cross_2d
 
-Ints = NDArray[np.int64]
-Indices = NDArray[np.integer]
 
-
-def triangulate(positions: Floats, corners: Ints, sizes: Ints) -> tuple[Ints, Ints]:
+def triangulate(positions: Floats, corners: Indices, sizes: Indices) -> tuple[Indices, Indices]:
     """Triangles of polygons.
 
     Parameters
@@ -55,7 +53,7 @@ def _newell(points: Floats) -> Floats:
     return normal
 
 
-def _convex(points: Floats) -> NDArray[np.bool_]:
+def _convex(points: Floats) -> Flags:
     """(F,) whether polygons (F, n, 3) turn one way at every corner; one that is not finite counts as convex."""
     with np.errstate(invalid="ignore", over="ignore"):
         edges = np.roll(points, -1, axis=1) - points
@@ -64,7 +62,7 @@ def _convex(points: Floats) -> NDArray[np.bool_]:
     return np.asarray(~hollow)
 
 
-def _clipped(points: Floats) -> Ints:
+def _clipped(points: Floats) -> Indices:
     """Triangles (T, 3) of one polygon (n, 3) by ear clipping in its own plane."""
     from mapbox_earcut import triangulate_float64
 
@@ -77,18 +75,18 @@ def _clipped(points: Floats) -> Ints:
     return np.where((cross_2d(b - a, c - a) < 0)[:, None], cut[:, ::-1], cut)
 
 
-def _fan(corners: int) -> Ints:
+def _fan(corners: int) -> Indices:
     """Triangles (corners - 2, 3) of a convex polygon."""
     return np.stack([np.zeros(corners - 2, int), np.arange(1, corners - 1), np.arange(2, corners)], axis=-1)
 
 
-def ranges(counts: Ints) -> Ints:
+def ranges(counts: Indices) -> Indices:
     """0, 1, ..., c - 1 for each c of counts, one after the other."""
     starts = np.cumsum(counts) - counts
     return np.arange(int(counts.sum())) - np.repeat(starts, counts)
 
 
-def smooth_normals(positions: Floats, triangles: Indices, shared: Indices) -> Floats:
+def smooth_normals(positions: Floats, triangles: NDArray[np.integer], shared: NDArray[np.integer]) -> Floats:
     """Unit normals (K, 3), each the mean of its triangles' normals weighted by their angles there.
 
     Parameters

@@ -1,4 +1,4 @@
-"""From the arrays of a file to a mesh that can be baked: missing ones are made, broken triangles dropped, all noted."""
+"""From the arrays of a file to a mesh that can be baked: missing arrays made, broken triangles dropped, with notes."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, basis, normalize
+from lambent.core.arrays import Floats
+from lambent.core.directions import basis, normalize
 from lambent.core.errors import UserError
 from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.scenes.geometry import tangents_along
 from lambent.scenes.geometry.grid import FLAT
-from lambent.scenes.loaders.meshes.polygons import Indices, smooth_normals
+from lambent.scenes.loaders.meshes.polygons import smooth_normals
 from lambent.scenes.scene import Mesh
 
 TRIANGLES_MAX = 20_000_000  # of one file
@@ -27,7 +29,7 @@ class MeshArrays:
     """
 
     positions: Floats
-    triangles: Indices
+    triangles: NDArray[np.integer]
     normals: Floats | None = None
     uv: Floats | None = None
     tangents: Floats | None = None
@@ -50,7 +52,7 @@ def check_triangles(count: int, file: Path) -> None:
 
 
 def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, list[str]]:
-    """Mesh of arrays read from a file, and what was repaired; None where no triangle is left.
+    """Mesh of arrays read from a file, None if no triangle is left, and notes of repairs.
 
     Missing normals become flat ones, missing uv box-mapped metres, missing tangents the direction of u.
 
@@ -78,7 +80,7 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
         normals = _unit_normals(positions, faces, normals, notes)
     if uv is None:
         uv = _box_mapped(positions, normals)
-        notes.append("no uv: box-mapped, one unit a metre")
+        notes.append("no uv: box-mapped, one unit per metre")
     elif not np.isfinite(uv).all():
         uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
         notes.append("uv not finite: set to 0")
@@ -95,16 +97,16 @@ def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, 
 
 
 def _tame(values: Floats) -> Floats:
-    """`values`, and NaN for those too large to be meant: their squares would overflow in single precision."""
+    """`values`, with NaN for absurdly large ones, whose squares would overflow in single precision."""
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(values) < ABSURD, values, np.nan)
 
 
-def _at(values: Floats | None, index: Indices) -> Floats | None:
+def _at(values: Floats | None, index: NDArray[np.integer]) -> Floats | None:
     return None if values is None else values[index]
 
 
-def _usable(positions: Floats, faces: Indices, notes: list[str]) -> Indices:
+def _usable(positions: Floats, faces: NDArray[np.integer], notes: list[str]) -> NDArray[np.integer]:
     """Faces with finite corners and an area, in float32, as they will be stored."""
     finite = np.asarray(np.isfinite(positions).all(axis=-1))[faces].all(axis=-1)
     if not finite.all():
@@ -119,7 +121,7 @@ def _usable(positions: Floats, faces: Indices, notes: list[str]) -> Indices:
     return faces[wide]
 
 
-def _unit_normals(positions: Floats, faces: Indices, normals: Floats, notes: list[str]) -> Floats:
+def _unit_normals(positions: Floats, faces: NDArray[np.integer], normals: Floats, notes: list[str]) -> Floats:
     """Unit normals; those without a direction become the mean of their faces'."""
     length = np.linalg.norm(np.nan_to_num(normals), axis=-1)
     broken = np.asarray(~np.isfinite(normals).all(axis=-1) | (length < 1e-6))
@@ -131,7 +133,7 @@ def _unit_normals(positions: Floats, faces: Indices, normals: Floats, notes: lis
         for corner in range(3):
             np.add.at(mean, faces[:, corner], vectors)
         unit[broken] = normalize(mean)[broken]
-        notes.append(f"{int(broken.sum())} normals were no direction: taken from the faces")
+        notes.append(f"{int(broken.sum())} normals had no direction: taken from the faces")
     unit[np.linalg.norm(unit, axis=-1) < 0.5] = (0.0, 1.0, 0.0)  # of faces that cancel, of vertices that nothing uses
     return unit
 
@@ -142,7 +144,7 @@ def _box_mapped(positions: Floats, normals: Floats) -> Floats:
     return np.take_along_axis(np.nan_to_num(positions), kept, axis=-1)
 
 
-def _along_u(positions: Floats, faces: Indices, uv: Floats) -> Floats:
+def _along_u(positions: Floats, faces: NDArray[np.integer], uv: Floats) -> Floats:
     """Direction (V, 3) in which u grows, the mean over the faces of each vertex; +x where uv does not tell."""
     finite = np.nan_to_num(positions)
     a, b, c = (finite[faces[:, i]] for i in range(3))

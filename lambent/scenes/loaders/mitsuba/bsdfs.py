@@ -25,18 +25,9 @@ from lambent.scenes.loaders.mitsuba.metals import IOR, METALS
 from lambent.scenes.loaders.mitsuba.principled import principled
 from lambent.scenes.loaders.mitsuba.textures import colour, number, opacity, raw_values
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surfaces.surface import (
-    BLACK,
-    ROUGHNESS_MIN,
-    SpecularLobe,
-    Surface,
-    blended,
-    coated,
-    seen_through,
-)
+from lambent.scenes.loaders.surfaces.surface import BLACK, GREY, ROUGHNESS_MIN, SpecularLobe, Surface, blended
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 
-GREY = 0.5
 LOBES_MAX = 16
 OREN_NAYAR_MEAN = 0.21396  # mean over both hemispheres of max(0, cos phi) sin alpha tan beta
 WHITE = np.ones(3)
@@ -78,14 +69,10 @@ def surface_of(plugin: Plugin) -> Surface:
 def _unknown(plugin: Plugin) -> Surface:
     inner = plugin.objects("bsdf")
     if plugin.type == "measured":
-        plugin.note("measured files in it are not read, it is grey: fit it and assign the fit")
+        plugin.note("its measured file is not read, it is grey: fit the file and assign the fit")
     else:
-        plugin.note(f"unknown, {'what is nested in it stands' if inner else 'it is grey'}")
-    return surface_of(inner[0]) if inner else grey()
-
-
-def grey() -> Surface:
-    return Surface(kd=constant(np.full(3, GREY)))
+        plugin.note(f"unknown, {'the BSDF nested in it is used' if inner else 'it is grey'}")
+    return surface_of(inner[0]) if inner else Surface.grey()
 
 
 def _diffuse(plugin: Plugin) -> Surface:
@@ -177,7 +164,7 @@ def _nested(plugin: Plugin) -> Surface:
         plugin.note("only the first of its sides is read")
     if not inner:
         plugin.note("holds no BSDF, it is grey")
-        return grey()
+        return Surface.grey()
     return surface_of(inner[0])
 
 
@@ -185,7 +172,7 @@ def _coating(plugin: Plugin) -> Surface:
     """A clear coat; its absorption is not read."""
     below = _nested(plugin)
     eta = _eta(plugin, "bk7")
-    return coated(below, _specular(plugin, _facets(plugin, plugin.type == "roughcoating"), eta))
+    return below.coated(_specular(plugin, _facets(plugin, plugin.type == "roughcoating"), eta))
 
 
 def _mask(plugin: Plugin) -> Surface:
@@ -195,8 +182,8 @@ def _mask(plugin: Plugin) -> Surface:
         return replace(surface, opacity=absolute(held))
     share = float(np.clip(held.mean[0], 0, 1))
     if share < 1:
-        plugin.note("what shines through it loses .13 of itself at 75 degrees")
-    return surface if share == 1 else seen_through(surface, np.full(3, share))
+        plugin.note("light that passes through it loses .13 at 75 degrees")
+    return surface if share == 1 else surface.seen_through(np.full(3, share))
 
 
 def _normal_map(plugin: Plugin) -> Surface:
@@ -225,7 +212,7 @@ def _blend(plugin: Plugin) -> Surface:
         return _nested(plugin)
     weight = number(plugin, "weight", 0.5)
     if weight.is_texture:
-        plugin.note("its weight is averaged over its picture")
+        plugin.note("its weight is averaged over its texture")
     share = float(np.clip(weight.mean[0], 0, 1))
     return _blended(plugin, [(surface_of(inner[0]), 1 - share), (surface_of(inner[1]), share)])
 
@@ -248,7 +235,7 @@ def _blended(plugin: Plugin, shares: list[tuple[Surface, float]]) -> Surface:
 
 
 def _nothing(plugin: Plugin) -> Surface:
-    return seen_through(Surface(), BLACK)
+    return Surface().seen_through(BLACK)
 
 
 KINDS: dict[str, Callable[[Plugin], Surface]] = {

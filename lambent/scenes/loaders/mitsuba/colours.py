@@ -110,7 +110,7 @@ def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]
 
 
 def _observer() -> tuple[Floats, Floats]:
-    """Wavelengths (K,) in nm, and what a value at each adds to XYZ, (K, 3)."""
+    """Wavelengths (K,) in nm, and the XYZ (K, 3) of a unit value at each."""
     from colour import MSDS_CMFS
 
     observer = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]

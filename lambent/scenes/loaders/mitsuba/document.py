@@ -78,17 +78,12 @@ class Element:
 
 @dataclass
 class Document:
-    """A scene file with its includes; `ids` are the elements by their id, `files` those it was read from."""
+    """A scene file with its includes; `ids` are the elements by their id, `files` the files it was read from."""
 
-    version: str
+    is_old: bool  # of version 0.6 or before
     elements: list[Element]
     ids: dict[str, Element]
     files: SceneFiles
-
-    @property
-    def is_old(self) -> bool:
-        """Whether it is of version 0.6 or before."""
-        return self.version.startswith("0.")
 
 
 def snake(name: str) -> str:
@@ -128,7 +123,7 @@ def read(path: Path, files: SceneFiles) -> Document:
             if wanted not in ids:
                 raise element.error("unknown id", got=wanted, hint=did_you_mean(wanted, ids))
             ids[new] = ids[wanted]
-    return Document(scene.attributes.get("version", ""), scene.children, ids, files)
+    return Document(scene.attributes.get("version", "").startswith("0."), scene.children, ids, files)
 
 
 def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
@@ -151,7 +146,7 @@ def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
 
 
 class _Parser:
-    """Reads a scene file and those it includes."""
+    """Reads a scene file and its includes."""
 
     def __init__(self, files: SceneFiles) -> None:
         self.parameters: dict[str, str] = {}

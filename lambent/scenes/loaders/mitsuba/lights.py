@@ -9,7 +9,7 @@ import numpy as np
 from lambent.core.camera import Camera
 from lambent.core.directions import Floats, normalize
 from lambent.core.plain import Triple, triple
-from lambent.scenes.loaders.defaults import DAYLIGHT
+from lambent.scenes.loaders.contents import DAYLIGHT
 from lambent.scenes.loaders.mitsuba.textures import colour
 from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.surface import rgb
@@ -50,9 +50,9 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
     plugin.reading.files.use(path)
     axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
     if axes[1, 1] < UPRIGHT:
-        plugin.note("its picture is tilted: it stands upright here")
+        plugin.note("its image is tilted: it stands upright here")
     if np.linalg.det(axes) < 0:
-        plugin.note("its picture is mirrored: it is not here")
+        plugin.note("its image is mirrored: it is not here")
     gamma = plugin.number("gamma", 0.0)
     if gamma > 0:
         plugin.note("its gamma is not read")
@@ -126,10 +126,10 @@ def emission_of(shape: Plugin) -> Triple:
 
 
 def _emitted(plugin: Plugin, name: str) -> Triple:
-    """Linear RGB of what an emitter emits, times its scale."""
+    """Linear RGB of an emitter's parameter, times its scale."""
     value = colour(plugin, name, 1.0, emitted=True)
     if value.is_texture:
-        plugin.note(f"its {name} is averaged over its picture")
+        plugin.note(f"its {name} is averaged over its texture")
     return rgb(plugin.number("scale", 1.0) * value.mean)
 
 
@@ -150,7 +150,7 @@ def camera_of(plugin: Plugin, name: str, world: Floats) -> Camera | None:
         raise plugin.element.error("film has no size", got=f"{width} x {height}")
     matrix = world @ plugin.transform()
     if np.linalg.det(matrix[:3, :3]) < 0:
-        plugin.note("its picture is mirrored: it is not here")
+        plugin.note("its image is mirrored: it is not here")
     fov_y_deg = min(max(_fov_y_deg(plugin, width / height), 1.0), 150.0)
     plugin.objects("sampler")
     plugin.ignore("focus_distance")

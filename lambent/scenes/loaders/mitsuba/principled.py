@@ -14,11 +14,8 @@ from lambent.core.directions import Floats
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.mitsuba.textures import LUMINANCE, colour, number
 from lambent.scenes.loaders.mitsuba.values import Plugin
-from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import SpecularLobe, Surface
+from lambent.scenes.loaders.surfaces.surface import GREY, SpecularLobe, Surface, metallic_roughness
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, scaled
-
-GREY = 0.5
 
 
 def principled(plugin: Plugin, thin: bool = False) -> Surface:

@@ -19,12 +19,13 @@ from lambent.core.errors import UserError
 from lambent.scenes.loaders.contents import Contents, unique_name
 from lambent.scenes.loaders.meshes.repair import check_triangles
 from lambent.scenes.loaders.mitsuba import lights
-from lambent.scenes.loaders.mitsuba.bsdfs import grey, surface_of
+from lambent.scenes.loaders.mitsuba.bsdfs import surface_of
 from lambent.scenes.loaders.mitsuba.document import read
 from lambent.scenes.loaders.mitsuba.shapes import Made, mesh_of_shape, stem_of
 from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
+from lambent.scenes.loaders.surfaces.surface import Surface
 from lambent.scenes.scene import Environment, Light, SceneObject
 
 GROUPS = ("shapegroup", "instance", "merge")
@@ -91,7 +92,7 @@ class _Scene:
             self._add_instance(shape, world)
             return
         if shape.type == "shapegroup":
-            return  # what instances show
+            return  # shown by instances
         if shape.type == "merge":
             for inner in shape.objects("shape", refs=False):
                 self._add_shape(inner, world)
@@ -134,7 +135,7 @@ class _Scene:
         if key not in self._by_element:
             wanted = "default" if bsdf is None else bsdf.element.id or f"{shape}_{bsdf.type}"
             name = self._by_element[key] = unique_name(wanted, self._material_names)
-            self._made.make(name, lambda _: grey() if bsdf is None else surface_of(bsdf))
+            self._made.make(name, lambda _: Surface.grey() if bsdf is None else surface_of(bsdf))
         return self._by_element[key]
 
     def _lights(self) -> tuple[Environment | None, list[Light]]:
@@ -160,7 +161,7 @@ class _Scene:
         return cameras
 
     def _say_the_rest(self) -> None:
-        """Note what stands at the top of the file and is not read."""
+        """Note the elements at the top of the file that are not read."""
         kinds = Counter(e.tag for e in self._reading.document.elements)
         for tag, words in UNREAD.items():
             if kinds[tag]:

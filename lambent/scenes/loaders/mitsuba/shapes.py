@@ -1,4 +1,4 @@
-"""Mitsuba's shapes as meshes in world space, with Mitsuba's texture coordinates (v turned to point up)."""
+"""Mitsuba's shapes as meshes in world space, with Mitsuba's texture coordinates (v flipped to point up)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 80, 40  # quads of a sphere
 UNSCALED = 1e-18  # determinant of a transform that leaves nothing
-Made = tuple[Mesh | None, list[str], bool]  # the mesh, what was repaired, whether its normals come from its faces
+Made = tuple[Mesh | None, list[str], bool]  # the mesh, notes of repairs, whether its normals come from its faces
 
 
 def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Made]) -> tuple[Mesh | None, list[str]]:
-    """Mesh of a shape under `world` (4, 4) and what was repaired; None if nothing is left.
+    """Mesh of a shape under `world` (4, 4), None if nothing is left, and notes of repairs.
 
-    `known` remembers the shapes of instances before they are moved.
+    `known` holds the shapes of instances before they are moved.
     """
     make = KINDS.get(plugin.type)
     if make is None:
@@ -55,7 +55,7 @@ def flipped(mesh: Mesh) -> Mesh:
 
 
 def stem_of(plugin: Plugin) -> str:
-    """The name of a shape: its id, its file's, or its kind."""
+    """The name of a shape: its id, its file's name, or its kind."""
     written = plugin.text("filename").replace("\\", "/")
     return plugin.element.id or Path(written).stem or plugin.type
 
@@ -119,7 +119,7 @@ def _sheet(normal: Floats, place: Callable[[Floats, Floats], tuple[Floats, Float
 
 
 def _cube(plugin: Plugin, name: str) -> Made:
-    """Each side as Mitsuba has it: which way u (x here) and v (y here) run on it."""
+    """The sides with Mitsuba's directions of u (x here) and v (y here)."""
     one = np.ones((2, 2))
     sides = (
         ((0, 0, 1), lambda x, y: (y, x, one)), ((0, 0, -1), lambda x, y: (y, -x, -one)),

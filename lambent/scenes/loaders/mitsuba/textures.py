@@ -8,12 +8,12 @@ import numpy as np
 
 from lambent.core.directions import Floats
 from lambent.scenes.loaders.mitsuba.values import Plugin
+from lambent.scenes.loaders.surfaces.surface import GREY
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage
 from lambent.scenes.loaders.surfaces.textured import Textured, combined, constant, flipped_uv
 from lambent.scenes.scene import UvTransform
 
 CHECKS = 128  # texels along a checkerboard of 2 x 2 fields
-GREY = 0.5
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169], np.float32)  # Mitsuba's own weights, for parity with it
 
 
@@ -43,7 +43,7 @@ def opacity(plugin: Plugin, name: str) -> Textured:
         image = _image(texture)
         if image is not None and image.alpha:
             texture.ignore("gamma", "raw")
-            plugin.note("its mask is the picture's alpha channel")
+            plugin.note("its mask is the image's alpha channel")
             return image.opacity()
     return number(plugin, name, GREY)
 
@@ -89,7 +89,7 @@ def _bitmap(texture: Plugin) -> Textured:
     for side in ("wrap_mode", "wrap_mode_u", "wrap_mode_v"):
         mode = texture.text(side, "repeat").lower()
         if mode != "repeat":
-            texture.note(f"its picture is repeated beyond its edges, not {mode}")
+            texture.note(f"its texture is repeated beyond its edges, not {mode}")
     channel = texture.text("channel").lower()
     if channel in ("r", "g", "b"):
         texels = np.repeat(texels[..., ["r", "g", "b"].index(channel), None], 3, axis=-1)

@@ -21,8 +21,7 @@ from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
-from lambent.scenes.loaders.surfaces.metallic import metallic_roughness
-from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, SpecularLobe, Surface, coated, rgb, seen_through
+from lambent.scenes.loaders.surfaces.surface import GREY, ROUGHNESS_MIN, SpecularLobe, Surface, metallic_roughness, rgb
 from lambent.scenes.loaders.surfaces.texture_images import TextureImage, TextureImages
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, UvTransform
@@ -30,7 +29,6 @@ from lambent.scenes.scene import Texture, UvTransform
 LIMIT_BYTES = 16 << 20
 MATERIALS_MAX = 65536
 DEFAULT = "default"
-GREY = 0.5
 PLASTIC_R0_MAX = 0.08
 MIRRORS = range(3, 10)  # illum that asks for reflections
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-texres": 1, "-type": 1,
@@ -94,7 +92,7 @@ class Library:
             return _Reading(entry, self._images, notes).surface()
         if name != DEFAULT:
             notes.append("is not described: it is grey")
-        return Surface(kd=constant(np.full(3, GREY)))
+        return Surface.grey()
 
 
 def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
@@ -211,7 +209,7 @@ class _Reading:
         if not share:
             return surface
         m = max(self._number("Pcr", 0.03), 0.0) ** 2
-        return coated(surface, SpecularLobe(constant(m), constant(np.full(3, share)), np.full(3, self._r0())))
+        return surface.coated(SpecularLobe(constant(m), constant(np.full(3, share)), np.full(3, self._r0())))
 
     def _r0(self) -> float:
         ior = self._number("Ni", 1.5)
@@ -221,7 +219,7 @@ class _Reading:
         ke = np.maximum(self._colour("Ke", 0.0), 0)
         image = self._image("map_Ke") if ke.any() or "Ke" not in self._entry.numbers else None
         if image is not None:
-            self._notes.append("its emission is averaged over its picture")
+            self._notes.append("its emission is averaged over its texture")
             ke = (ke if ke.any() else np.ones(3)) * image.rgb(srgb=True).mean
         return rgb(ke)
 
@@ -233,10 +231,10 @@ class _Reading:
         if mask is not None:
             return replace(surface, opacity=absolute(mask.opacity() if mask.alpha else _first_channel(mask)))
         if cut is not None and cut.alpha and float(cut.opacity().values.min()) < 0.5:
-            self._notes.append("the alpha of its picture cuts it out")
+            self._notes.append("the alpha channel of its texture cuts it out")
             return replace(surface, opacity=absolute(cut.opacity()))
         if opacity < 1:
-            self._notes.append(f"is seen through ({1 - opacity:.0%}), without refraction")
+            self._notes.append(f"is transparent ({1 - opacity:.0%}), without refraction")
             return self._pane(surface, opacity)
         return surface
 
@@ -245,7 +243,7 @@ class _Reading:
         tint = np.clip(self._colour("Tf", 1.0), 0, 1)
         tint = tint if tint.any() else np.ones(3)
         if int(self._number("illum", 2)) not in GLASS:
-            covered = seen_through(surface, np.full(3, opacity))
+            covered = surface.seen_through(np.full(3, opacity))
             *others, straight = covered.lobes
             return replace(covered, lobes=(*others, replace(straight, k=scaled(straight.k, tint))))
         r0 = np.full(3, self._r0())

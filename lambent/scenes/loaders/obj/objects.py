@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
 from lambent.scenes.loaders.contents import Contents, unique_name
-from lambent.scenes.loaders.meshes.polygons import Ints, smooth_normals, triangulate
+from lambent.scenes.loaders.meshes.polygons import smooth_normals, triangulate
 from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
 from lambent.scenes.loaders.obj.mtl import Library
 from lambent.scenes.loaders.obj.text import ObjText, read
@@ -27,11 +26,11 @@ UNREAD = {"l": "lines", "p": "points", "curv": "curves", "surf": "surfaces", "vp
 class Triangles:
     """Corners (T, 3, 3) as places in v, vt, vn of every triangle, its line's number and its smoothing group (T,)."""
 
-    corners: Ints
-    lines: Ints
-    smoothing: Ints
+    corners: Indices
+    lines: Indices
+    smoothing: Indices
 
-    def of(self, which: Ints) -> Triangles:
+    def of(self, which: Indices) -> Triangles:
         return Triangles(self.corners[which], self.lines[which], self.smoothing[which])
 
 
@@ -91,7 +90,7 @@ def triangles_of(text: ObjText, file: Path) -> Triangles:
     return Triangles(text.corners[places], lines, np.array(groups)[np.searchsorted(at, lines) - 1])
 
 
-def _owners(text: ObjText, lines: Ints, warnings: list[str]) -> tuple[list[tuple[str, int]], list[str], Ints]:
+def _owners(text: ObjText, lines: Indices, warnings: list[str]) -> tuple[list[tuple[str, int]], list[str], Indices]:
     """Objects as (name, number of the material), names of the materials, and the object of each triangle."""
     by = "o" if any(word == "o" for _, word, _ in text.words) else "g"
     things, thing_at = _changes(text, by, "object")
@@ -112,7 +111,7 @@ def _owners(text: ObjText, lines: Ints, warnings: list[str]) -> tuple[list[tuple
     return names, materials, rank[owner.reshape(-1)]
 
 
-def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[Ints, Ints]]:
+def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[Indices, Indices]]:
     """Names in order of appearance; and the lines that begin one, with its number."""
     numbers = {start: 0}
     at, which = [0], [0]
@@ -126,7 +125,7 @@ def _changes(text: ObjText, keyword: str, start: str) -> tuple[list[str], tuple[
 def mesh_of_triangles(
     text: ObjText, triangles: Triangles, name: str, file: Path, *, faceted: bool | None = None
 ) -> tuple[Mesh | None, list[str]]:
-    """Mesh of some of a file's triangles, and what was repaired.
+    """Mesh of some of a file's triangles, None if nothing is left, and notes of repairs.
 
     Missing normals come from the smoothing groups; with `faceted` True all normals are flat, with False missing ones
     are smooth everywhere.
@@ -160,7 +159,7 @@ def mesh_of_triangles(
     return mesh, notes + repaired
 
 
-def _made_normals(positions: Floats, vertices: Ints, smoothing: Ints, smooth: NDArray[np.bool_]) -> tuple[Floats, Ints]:
+def _made_normals(positions: Floats, vertices: Indices, smoothing: Indices, smooth: Flags) -> tuple[Floats, Indices]:
     """Normals, and the number of each corner's (T, 3): shared within a smoothing group, else the triangle's own."""
     triangle = np.arange(len(vertices))[:, None] + np.zeros((1, 3), int)
     group = np.where(smooth, smoothing, -1)[:, None]

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
-from lambent.scenes.loaders.meshes.polygons import Ints
 
 LIMIT_BYTES = 4 << 30
 BLOCK_BYTES = 8 << 20
@@ -46,9 +45,9 @@ class ObjText:
     v: Floats
     vt: Floats
     vn: Floats
-    corners: Ints
-    sizes: Ints
-    lines: Ints
+    corners: Indices
+    sizes: Indices
+    lines: Indices
     words: list[tuple[int, str, str]]
 
 
@@ -63,7 +62,7 @@ def parse(data: bytes, file: Path) -> ObjText:
     Raises
     ------
     UserError
-        Where a number cannot be read, or a corner names what is not there; with the line.
+        Where a number cannot be read, or a corner's index leads nowhere; with the line.
     """
     values: dict[str, list[Floats]] = {kind: [np.zeros((0, width))] for kind, width in WIDTHS.items()}
     counts = dict.fromkeys(WIDTHS, 0)
@@ -130,14 +129,14 @@ class _Block:
             "v": self._begins(b"v "), "vt": self._begins(b"vt "), "vn": self._begins(b"vn "), "f": self._begins(b"f ")
         }  # fmt: skip
 
-    def _begins(self, word: bytes) -> Ints:
+    def _begins(self, word: bytes) -> Indices:
         matches = np.logical_and.reduce([self._head[i] == c for i, c in enumerate(word)])
         return np.flatnonzero(matches)
 
-    def lines_of(self, kind: str) -> Ints:
+    def lines_of(self, kind: str) -> Indices:
         return self._kinds[kind]
 
-    def _text(self, lines: Ints, kind: str) -> bytes:
+    def _text(self, lines: Indices, kind: str) -> bytes:
         """The lines without keyword and comments, each with its line end."""
         breaks = np.flatnonzero(np.diff(lines) > 1) + 1  # lines of one kind mostly stand together
         first, last = lines[np.concatenate([[0], breaks])], lines[np.concatenate([breaks, [len(lines)]]) - 1]
@@ -146,7 +145,7 @@ class _Block:
         text = text.replace(kind.encode() + b" ", b"")
         return re.sub(rb"#[^\n]*", b"", text) if b"#" in text else text
 
-    def numbers(self, lines: Ints, kind: str, width: int) -> Floats:
+    def numbers(self, lines: Indices, kind: str, width: int) -> Floats:
         """(N, width) numbers of lines of one kind; more than `width` on a line are ignored."""
         if not len(lines):
             return np.zeros((0, width))
@@ -162,7 +161,7 @@ class _Block:
         given = np.arange(width) < per_line[:, None]
         return np.where(given, values[np.minimum(index, len(values) - 1)], 0.0)
 
-    def faces(self, before: dict[str, Ints]) -> Iterator[tuple[Ints, Ints, Ints]]:
+    def faces(self, before: dict[str, Indices]) -> Iterator[tuple[Indices, Indices, Indices]]:
         """Corners, sizes and lines of the faces; `before` counts v, vt and vn before each line."""
         lines = self.lines_of("f")
         if not len(lines):
@@ -205,7 +204,7 @@ class _Block:
             found.append((int(i) + self.first_line, word, rest.strip()))
         return found
 
-    def _parsed(self, text: bytes, kind: type, lines: Ints) -> np.ndarray[Any, Any]:
+    def _parsed(self, text: bytes, kind: type, lines: Indices) -> np.ndarray[Any, Any]:
         with suppress(ValueError):  # the line is found below
             return np.fromstring(text, dtype=kind, sep=" ")
         for line, words in zip(lines, text.split(b"\n"), strict=False):
@@ -228,24 +227,24 @@ def _joined(match: re.Match[bytes]) -> bytes:
     return match[0].replace(b"\\\n", b" ").rstrip(b"\n") + b"\n" * match[0].count(b"\n")
 
 
-def _per_line(marks: NDArray[np.bool_], ends: Ints) -> Ints:
+def _per_line(marks: Flags, ends: Indices) -> Indices:
     """Number of marks on each line; `ends` are the lines' ends."""
     return np.diff(np.searchsorted(np.flatnonzero(marks), ends), prepend=0)
 
 
-def _begins(flat: Bytes) -> NDArray[np.bool_]:
+def _begins(flat: Bytes) -> Flags:
     """Where words begin."""
     blank = flat <= 32
     return np.asarray(~blank & np.concatenate([[True], blank[:-1]]))
 
 
-def _tokens(text: bytes) -> Ints:
+def _tokens(text: bytes) -> Indices:
     """Words on each line."""
     flat = np.frombuffer(text, np.uint8)
     return _per_line(_begins(flat), np.flatnonzero(flat == 10))
 
 
-def _forms(text: bytes) -> Ints:
+def _forms(text: bytes) -> Indices:
     """The form of each corner as an index of `FORMS`, -1 if it has none."""
     flat = np.frombuffer(text, np.uint8)
     starts = np.flatnonzero(_begins(flat))

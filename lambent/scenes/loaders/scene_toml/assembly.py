@@ -63,7 +63,7 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
 def _own_names(
     contents: Contents, materials: Mapping[str, Material], textures: Mapping[str, MaterialTextures], warnings: list[str]
 ) -> dict[str, str]:
-    """Names of a file's materials beside those of other files."""
+    """Names of a file's materials that differ from those of other files."""
     called: dict[str, str] = {}
     taken = set(materials) | set(contents.materials)
     for name, material in contents.materials.items():

@@ -15,6 +15,7 @@ from lambent.scenes.scene import Texture
 
 ROUGHNESS_MIN = 0.003  # slope; below, single precision loses the lobe
 BLACK = np.zeros(3)
+GREY = 0.5  # of surfaces that are not described
 
 
 @dataclass(frozen=True)
@@ -48,28 +49,31 @@ class Surface:
     cutoff: float = 0.5
     emission: Triple = (0.0, 0.0, 0.0)
 
+    @staticmethod
+    def grey() -> Surface:
+        """A surface that is not described."""
+        return Surface(kd=constant(np.full(3, GREY)))
 
-def seen_through(surface: Surface, opacity: Floats) -> Surface:
-    """A surface that covers a share (3,) of the background; the rest of the light goes straight through."""
-    held = constant(opacity)
+    def seen_through(self, opacity: Floats) -> Surface:
+        """A surface that covers a share (3,) of the background; the rest of the light goes straight through."""
+        held = constant(opacity)
 
-    def part(v: Textured) -> Textured:
-        return combined(lambda a, b: a * b, v, held, notes=[])
+        def part(v: Textured) -> Textured:
+            return combined(lambda a, b: a * b, v, held, notes=[])
 
-    lobes = tuple(replace(lobe, k=part(lobe.k)) for lobe in surface.lobes)
-    return replace(surface, kd=part(surface.kd), kt_d=part(surface.kt_d), lobes=(*lobes, straight_through(1 - opacity)))
+        lobes = (*(replace(lobe, k=part(lobe.k)) for lobe in self.lobes), straight_through(1 - opacity))
+        return replace(self, kd=part(self.kd), kt_d=part(self.kt_d), lobes=lobes)
 
+    def coated(self, coat: SpecularLobe) -> Surface:
+        """A surface below a clear coat, which takes the light that it reflects: more at grazing incidence.
 
-def coated(surface: Surface, coat: SpecularLobe) -> Surface:
-    """A surface below a clear coat, which takes the light that it reflects: more at grazing incidence.
-
-    1 - k F is nearly (1 - k r0) cos^(k/4) up to 80 degrees: lobes get that factor, the diffuse term is coupled.
-    """
-    share = float(np.clip(coat.k.mean.mean(), 0, 1))
-    left = 1 - share * float(np.mean(coat.r0))
-    under = tuple(replace(lobe, k=scaled(lobe.k, left), falloff=lobe.falloff + share / 4) for lobe in surface.lobes)
-    coupled = surface.coupled or share > 0.5
-    return replace(surface, kd=scaled(surface.kd, left), coupled=coupled, lobes=(*under, coat))
+        1 - k F is nearly (1 - k r0) cos^(k/4) up to 80 degrees: lobes get that factor, the diffuse term is coupled.
+        """
+        share = float(np.clip(coat.k.mean.mean(), 0, 1))
+        left = 1 - share * float(np.mean(coat.r0))
+        under = (replace(o, k=scaled(o.k, left), falloff=o.falloff + share / 4) for o in self.lobes)
+        coupled = self.coupled or share > 0.5
+        return replace(self, kd=scaled(self.kd, left), coupled=coupled, lobes=(*under, coat))
 
 
 def straight_through(k: Floats) -> SpecularLobe:
@@ -92,6 +96,60 @@ def blended(parts: Sequence[tuple[Surface, float]], notes: list[str]) -> Surface
         lobes += [replace(lobe, k=scaled(lobe.k, share)) for lobe in surface.lobes]
         coupled += float(surface.kd.mean.mean()) * share * (1 if surface.coupled else -1)
     return replace(first, kd=kd, kt_d=kt_d, coupled=coupled > 0, lobes=tuple(lobes))
+
+
+def metallic_roughness(
+    base: Textured,
+    metallic: Textured,
+    alpha: Textured,
+    plain: Floats,
+    notes: list[str],
+    *,
+    weight: float = 1.0,
+    aspect: float = 1.0,
+    through: float = 0.0,
+) -> Surface:
+    """Surface of a base colour: metals reflect it without a diffuse term, dielectrics have it below a clear coat.
+
+    Parameters
+    ----------
+    base : Textured
+        Base colour, 3 channels.
+    metallic, alpha : Textured
+        Share of metal, and GGX's roughness along t as a slope (roughness squared); 1 channel.
+    plain : (3,)
+        Reflectance of a dielectric at normal incidence.
+    weight : float
+        Factor of the dielectric's reflection, at grazing incidence too.
+    aspect : float
+        Roughness across t divided by that along t.
+    through : float
+        Share of the dielectric's light that is transmitted, as by a thin sheet.
+
+    Notes
+    -----
+    Partial metals are blends (glTF 2.0, appendix B). The diffuse term is coupled to Fresnel. Where the reflectance
+    varies, r0 is the highest and the lobe's coefficient varies: exact at normal incidence and never above 1, but places
+    of low reflectance lack Fresnel's rise at grazing incidence.
+    """
+    plain = np.clip(plain, 0, 1)
+    left = 1 - weight * float(plain.max())
+    kd = combined(lambda b, m: b * (1 - m) * (1 - through) * left, base, metallic, notes=notes)
+    reflectance = combined(lambda b, m: (1 - m) * weight * plain + m * b, base, metallic, notes=notes)
+    highest = np.maximum(reflectance.highest, 1e-6)
+    if reflectance.is_texture and float((reflectance.highest - reflectance.values.min(axis=(0, 1))).max()) > 1e-3:
+        share = np.asarray(reflectance.values / highest.astype(np.float32), np.float32)
+        k, r0 = Textured(share, reflectance.uv_transform), highest
+        if metallic.is_texture:
+            notes.append("its metallic texture is right at normal incidence alone: bare parts lack Fresnel's rise")
+    else:
+        grazing = weight + (1 - weight) * float(np.clip(metallic.mean[0], 0, 1))
+        k, r0 = constant(np.full(3, grazing)), reflectance.mean / max(grazing, 1e-6)
+    lobes = [SpecularLobe(alpha, k, r0, aspect)]
+    if through > 0:
+        passed = combined(lambda b, m: through * b * (1 - m), base, metallic, notes=notes)
+        lobes.append(SpecularLobe(alpha, passed, weight * plain, aspect, side="transmission"))
+    return Surface(kd=kd, coupled=bool(weight > 0.5 and plain.max() > 0), lobes=tuple(lobes))
 
 
 def rgb(values: Floats) -> Triple:

@@ -73,7 +73,7 @@ def combined(function: Callable[..., Any], *inputs: Textured, notes: list[str], 
     values = []
     for v in inputs:
         if v.is_texture and v.uv_transform != lead.uv_transform:
-            notes.append(f"{what} lie differently on the surface: one is averaged")
+            notes.append(f"{what} have different uv transforms: one is averaged")
             values.append(v.mean)
         else:
             values.append(_resized(v.values, height, width) if v.is_texture else v.values)

@@ -68,7 +68,7 @@ class MaterialState:
 
 
 def _materials(file: Path, material: Path | None) -> tuple[Measurement | None, Material, Material | None, Path | None]:
-    """What to show: the measurement, the material A, the material B, and the document that A came from."""
+    """The measurement, the material A, the material B, and the document that A came from."""
     if material is not None and (kind_of(file), kind_of(material)) == ("material", "measurement"):
         file, material = material, file  # the other way round is as clear
     if kind_of(file) == "environment":

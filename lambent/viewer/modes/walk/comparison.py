@@ -57,7 +57,7 @@ class Figures:
 
 
 class Comparison:
-    """The picture B, how it is compared with A, and what came of it; brought up to date while nothing moves."""
+    """Choice of the picture B, and figures and maps of its difference from A, brought up to date at rest."""
 
     def __init__(self) -> None:
         self.mode: Mode = "off"
@@ -89,7 +89,7 @@ class Comparison:
         return accumulated >= self._next
 
     def forget(self) -> None:
-        """Drop what was found for other pictures; the figures stay."""
+        """Drop maps and work of other pictures; the figures stay."""
         if self._work is not None:
             self._work.cancel()
         self._work = self._difference = self._flip = self.map = self._painted = self._of = None
@@ -107,7 +107,7 @@ class Comparison:
             self._start_flip(pair, samples)
 
     def tick(self) -> None:
-        """Take what has ended in the background, and paint the map."""
+        """Take FLIP once it is computed, and paint the map."""
         self._work = pending(self._work)
         values = self._flip if self.kind == "FLIP" else self._difference
         if self.mode != "error map" or values is None:

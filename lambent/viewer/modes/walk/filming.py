@@ -26,7 +26,7 @@ LONGEST_FRAMES = 100_000
 
 @dataclass
 class Films:
-    """What the Film panel asks for, and the film under way. `quality` names the samples, see `Filming`."""
+    """Options of the Film panel, and the film under way. `quality` names the samples, see `Filming`."""
 
     size: str = next(iter(SIZES))
     fps: int = 30

@@ -1,4 +1,4 @@
-"""What the mouse and the keys do in the walk mode."""
+"""Mouse and keys of the walk mode."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class WalkInput(Input):
         self._state.meter.cursor = at
 
     def pressed(self, x: float) -> None:
-        """Dear ImGui would see a press on the divider only once it was drawn hovered, and such a frame can be slow."""
+        """Take the divider: Dear ImGui would only after a frame with the mouse over it, and frames can be slow."""
         place, divider = self.screen.picture, self._state.comparison.divider
         beside = self._state.comparison.mode == "side by side"
         self._on_divider = beside and abs(x - place.x - divider.share * place.width) <= CLICK_PX

@@ -52,7 +52,7 @@ class Marks:
         self.lines: tuple[Line, ...] = ()
 
     def update(self, camera: Camera, size: Size, view: str, exposure_ev: float) -> None:
-        """Make what is wanted, for a picture of `size`."""
+        """Make the wanted marks for a picture of `size`."""
         key = (camera, size, view, exposure_ev, self.probes, self.reflectors)
         if key == self._made_for:
             return
@@ -110,7 +110,7 @@ def outline(corners: Floats, camera: Camera, size: Size) -> Line | None:
 def mirror_ball(
     cube: Floats, camera: Camera, centre: tuple[float, float, float], size: int, view: str, exposure_ev: float
 ) -> Image:
-    """RGBA (size, size, 4) of a perfect mirror ball at `centre` that shows what the probe sees."""
+    """RGBA (size, size, 4) of a perfect mirror ball at `centre` that reflects the probe's cube map."""
     _, up, ahead = camera_axes(camera)
     sight = np.subtract(centre, camera.position, dtype=float)
     sight = normalize(sight) if np.linalg.norm(sight) > 1e-6 else ahead

@@ -1,4 +1,4 @@
-"""What the walk mode draws: the picture, the one it is compared with, their difference, marks, readings and films."""
+"""The drawing of the walk mode: the picture, its comparison with another integrator's, marks, readings and films."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Pictures(Pair):
         return self._state.comparison.divider if beside else None
 
     def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Draw what is due, and read what somebody looks at."""
+        """Draw what is due, and read the picture for the meter where it is looked at."""
         state = self._state
         self._film()
         wanted = self._frame(size_px(place, pixel_ratio))
@@ -87,7 +87,7 @@ class Pictures(Pair):
             screen.say(f"saved {name}-error.png")
 
     def close(self) -> None:
-        """Give FLIP and the film under way up."""
+        """Cancel FLIP and the film under way."""
         self._state.comparison.forget()
         if self._state.films.under_way is not None:
             self._state.films.under_way.cancel()

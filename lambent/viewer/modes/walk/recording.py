@@ -48,7 +48,7 @@ class Recording:
 
     @property
     def _start_s(self) -> float:
-        """When the first movement began: what was waited for before belongs to nobody's walk."""
+        """When the first movement began; the time before it is left out."""
         waited = len(self.cameras) > 1 and self.cameras[1] == self.cameras[0]
         return self.times_s[1] if waited else self.times_s[0]
 
@@ -94,7 +94,7 @@ class Recorder:
         return self.on and now_s - self.began_s > LONGEST_S
 
     def stop(self) -> CameraPath | None:
-        """Make a draft of what was recorded; None where nothing moved."""
+        """Make a draft of the recording; None where nothing moved."""
         self.on = False
         self.smooth(self.smooth_s)
         return self.draft
@@ -120,12 +120,12 @@ class Recordings:
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
-        """The scene's, and those that were saved."""
+        """Cameras of the scene, then saved ones."""
         return self.views.all.cameras
 
     @property
     def paths(self) -> tuple[CameraPath, ...]:
-        """The scene's, those that were saved, and the one just recorded."""
+        """Paths of the scene, saved ones, and the one just recorded."""
         paths = self.views.all.paths
         return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
 
@@ -137,7 +137,7 @@ class Recordings:
             self.screen.say(f"saved the view {added.name}")
 
     def rename(self, kind: Kind, name: str) -> None:
-        """Call what was saved by the typed name, and show it."""
+        """Give a saved camera or path the typed name, and show it."""
         if self.views.rename(kind, name, self.views.typed_name):
             new, self.views.renaming = self.views.typed_name.strip(), None
             if kind == "camera":
@@ -146,7 +146,7 @@ class Recordings:
                 self.navigation.scrub(next(path for path in self.views.saved.paths if path.name == new), 0.0)
 
     def delete(self, kind: Kind, name: str) -> None:
-        """Delete what was saved; the camera stays where it is."""
+        """Delete a saved camera or path; the view stays where it is."""
         if self.views.delete(kind, name):
             self.navigation.path = None
             if kind == "camera":
@@ -186,7 +186,7 @@ class Recordings:
             self.screen.say(f"saved the path {added.name}")
 
     def keep(self) -> str | None:
-        """Save what was recorded and not yet saved, because the window closes; returns the path's name."""
+        """Save an unsaved recording because the window closes; returns the path's name."""
         if self.recorder.on:
             self.record()
         draft = self.recorder.draft

@@ -1,4 +1,4 @@
-"""The state of the walk mode, by what it is about. Panels and input read and write it; the drawing shows it."""
+"""The state of the walk mode, in parts. Panels and input read and write it; the drawing shows it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Materials:
     editor: Editor | None = None
 
     def file_name(self, material: str) -> str:
-        """Where `material` will be saved: what was typed, else its name."""
+        """File that `material` will be saved as: the typed one, else its name."""
         return self.file_names.get(material, f"{plain_name(material)}.json")
 
     def save(self, name: str) -> None:
@@ -79,7 +79,7 @@ class Materials:
         return tuple(name for name, now in self.edits.edited.items() if now != saved.get(name, scene[name]))
 
     def rescue(self) -> Iterator[Path]:
-        """Write what was not saved to files of new names."""
+        """Write unsaved materials to files of new names."""
         return rescue(self.edits, self.unsaved, self.screen.folder)
 
     def open_editor(self, name: str) -> None:
@@ -112,7 +112,7 @@ class WalkState:
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
     films: Films = field(default_factory=Films)
-    missing: tuple[str, ...] = ()  # what the store lacks
+    missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map
     knows_noise: bool = False  # whether the store says how exact its light map is
 

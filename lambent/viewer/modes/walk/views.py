@@ -41,7 +41,7 @@ class SavedViews:
 
     @property
     def all(self) -> SceneRecord:
-        """The scene record with what was saved."""
+        """The scene record with the saved cameras and paths."""
         return with_views(self.scene, self.saved)
 
     def free_name(self, kind: Kind) -> str:
@@ -61,7 +61,7 @@ class SavedViews:
         return named[0] if self._change(change) else None
 
     def rename(self, kind: Kind, old: str, new: str) -> bool:
-        """Whether what was saved as `old` is called `new` now."""
+        """Rename a saved camera or path; whether that was possible."""
 
         def change(views: Views) -> Views:
             names = self._names(kind, views)
@@ -73,7 +73,7 @@ class SavedViews:
         return self._change(change)
 
     def delete(self, kind: Kind, name: str) -> bool:
-        """Whether it is gone."""
+        """Delete a saved camera or path; whether that was possible."""
         return self._change(lambda views: _with(views, kind, (i for i in _of(views, kind) if i.name != name)))
 
     def _names(self, kind: Kind, views: Views) -> set[str]:
@@ -89,7 +89,7 @@ class SavedViews:
             return False
 
         def seen(views: Views) -> Views:
-            self.saved = views  # what another window saved is shown even where this change is refused
+            self.saved = views  # changes of another window are shown even where this one is refused
             return change(views)
 
         try:

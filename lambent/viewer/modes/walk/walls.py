@@ -1,4 +1,4 @@
-"""What carries and what stops a walker: the floor below, and everything between knee and eye, seen from above.
+"""Floors that carry a walker, and obstacles between knee and eye, seen from above.
 
 The walker is a circle of `BODY_M` around the eye, obstacles are the triangles' outlines on the floor plan. A step that
 would come nearer than that to one slides along it; whoever stands too near already may always step away.
@@ -29,7 +29,7 @@ class Walls:
         self._plan = triangles[:, :, [0, 2]]
         self._low, self._high = triangles.min(axis=1), triangles.max(axis=1)
         normals = area_vectors(triangles)
-        # One can stand on what is not steeper than 45 degrees, on either side: some floors are modelled upside down.
+        # Floors are at most 45 degrees steep, on either side: some are modelled upside down.
         level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(np.linalg.norm(normals, axis=-1), 1e-20)
         self._floors, self._floors_low, self._floors_high = triangles[level], self._low[level], self._high[level]
 
@@ -65,7 +65,7 @@ class Walls:
 
 
 def _slid(at: Floats, move: Floats, outlines: Floats) -> Floats:
-    """`move` without what leads into an outline; nothing where a corner leaves no way."""
+    """`move` without its part into outlines; zero in a corner with no way out."""
     before, _ = nearest_points(at, outlines)
     for _ in range(SLIDES):
         distances, points = nearest_points(at + move, outlines)

@@ -27,5 +27,5 @@ def draw(marks: Marks, selected: str | None, picture: Rect, textures: Textures) 
             behind.add_image(texture, (x - r, y - r), (x + r, y + r))
         behind.add_circle((x, y), r + 1, imgui.get_color_u32(AMBER), 0, 1.5)
         if ball.name == selected or r > 14:
-            shadowed(behind, (x - imgui.calc_text_size(ball.name).x / 2, y + r + 4), ball.name, AMBER)
+            shadowed(behind, (x - imgui.calc_text_size(ball.name).x / 2, y + r + 4), ball.name, AMBER, 1.0)
     behind.pop_clip_rect()

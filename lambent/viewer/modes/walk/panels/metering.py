@@ -1,4 +1,4 @@
-"""The exposure meter with its histogram, and what is under the mouse."""
+"""The Light meter panel, and the luminance under the mouse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Scene panel: walking or orbiting, cameras and saved views, camera paths; and what the store lacks."""
+"""The Scene panel: walking or orbiting, cameras and saved views, camera paths; warnings."""
 
 from __future__ import annotations
 
