@@ -45,17 +45,17 @@ def command(
 
 def inspector_of(file: str) -> Callable[..., Facts]:
     """The function that describes a file, chosen by its place and its first bytes."""
-    from lambent.scenes.loaders.mitsuba.document import is_scene as is_mitsuba_scene
+    from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene
 
     path = Path(file)
-    if file.startswith("builtin:") or path.suffix.lower() in (".toml", ".glb", ".gltf", ".obj", ".ply"):
+    if file.startswith(BUILTIN_PREFIX):
         return inspect_scene
     if path.is_dir():
         return inspect_store
     head = head_of(path, HEAD_BYTES)
     if head.startswith(PICTURES):
         return inspect_picture
-    if is_mitsuba_scene(head):
+    if is_scene(path, head):
         return inspect_scene
     return inspect_material if is_document(head) else inspect_table
 

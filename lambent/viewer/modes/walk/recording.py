@@ -173,7 +173,7 @@ class Recordings:
             self.record()
 
     def save(self) -> None:
-        """Save the draft under the typed name; nobody asked for the suggested one, the next free one is as good."""
+        """Save the draft under the typed name; in the place of a suggested name, the next free one is as good."""
         recorder = self.recorder
         if recorder.draft is not None:
             name = None if recorder.name == recorder.suggested else recorder.name
