@@ -162,9 +162,8 @@ def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
             found.append(f"the density integrates to {one.pdf_integral:.4f} {where}, the sampler keeps {kept:.4f}")
         tolerance = 5 * one.albedo_error + INTEGRAL_LIMIT * one.albedo_quadrature
         if abs(one.albedo_sampled - one.albedo_quadrature) > tolerance:
-            found.append(
-                f"albedo {one.albedo_sampled:.4f} by sampling, {one.albedo_quadrature:.4f} by quadrature {where}"
-            )
+            both = f"{one.albedo_sampled:.4f} by sampling, {one.albedo_quadrature:.4f} by quadrature"
+            found.append(f"albedo {both} {where}")
     return found
 
 
@@ -194,9 +193,8 @@ def furnace(subject: Material | Scatters, *, samples: int = 1 << 14, seed: int =
 
     bsdf = MaterialBSDF(subject) if isinstance(subject, Material) else subject
     u = qmc.Sobol(3, rng=np.random.default_rng(seed)).random(samples)
-    albedo = np.array(
-        [[_weights(bsdf, direction(np.radians(t), np.radians(p)), u).mean(axis=0) for p in PHI_DEG] for t in THETA_DEG]
-    )
+    wo = direction(*np.radians(np.meshgrid(THETA_DEG, PHI_DEG, indexing="ij")))
+    albedo = np.array([[_weights(bsdf, w, u).mean(axis=0) for w in row] for row in wo])
     return Furnace(tuple(map(float, THETA_DEG)), PHI_DEG, albedo, mean_albedo(albedo))
 
 

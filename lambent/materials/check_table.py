@@ -134,9 +134,8 @@ def _failures(reciprocity: float, energy: Furnace, integrals: list[IntegralCheck
     found += check.energy_failures(energy, ENERGY_LIMIT)
     for one in integrals:
         if one.deviation > INTEGRAL_LIMIT:
-            found.append(
-                f"r + t is {one.from_table:.4f}, its quadrature {one.quadrature:.4f} at theta {one.theta_deg:g} degrees"
-            )
+            both = f"r + t is {one.from_table:.4f}, its quadrature {one.quadrature:.4f}"
+            found.append(f"{both} at theta {one.theta_deg:g} degrees")
     return found
 
 
@@ -147,7 +146,6 @@ def _warnings(resampling: float, energy: Furnace) -> list[str]:
         where = "beyond what was measured well" if theta > LAST_THETA_DEG else "more than arrives"
         found.append(f"returns {albedo:.3f} of the light at theta {theta:g}, phi {phi:g} degrees: {where}")
     if resampling > 0.05:
-        found.append(
-            f"the path tracer's look-up deviates from the table by {resampling:.0%} of the light: steps or spikes"
-        )
+        share = f"{resampling:.0%} of the light"
+        found.append(f"the path tracer's look-up deviates from the table by {share}: steps or spikes")
     return found

@@ -15,7 +15,7 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 
-Function = Callable[[Floats], Floats]  # (..., 3) directions -> (...) or (..., m) values
+Function = Callable[[Floats], Floats]  # (..., 3) directions -> (...) values
 
 CHUNK = 1 << 18
 LEAST_EXPECTED = 5.0  # cells with fewer expected samples are pooled: their statistic is not chi-square
@@ -98,25 +98,25 @@ def adapted_cells(pilot: Floats) -> Floats:
 
 
 def integrate_cells(function: Function, cells: Floats, pilot: Floats) -> Floats:
-    """Integral over solid angle of `function` on each cell (N, 4): (N) or (N, m).
+    """Integral (N) over solid angle of `function` on each cell (N, 4).
 
     Gauss-Legendre 4 x 4. A cell is halved across its longer side, up to LEVELS times, while its halves disagree with
     it or it hides a peak: a value at a `pilot` direction (n, 3) far above the mean at the nodes. The pilots only steer;
     they add nothing to the sum. A step away from the horizon costs about 1e-3.
     """
     probe = _rule(function, cells)
-    total, floor = np.zeros_like(probe), 0.02 * RTOL * np.abs(probe).sum(axis=0) / len(cells)
+    total, floor = np.zeros_like(probe), 0.02 * RTOL * np.abs(probe).sum() / len(cells)
     owner, rects, coarse = np.arange(len(cells)), cells, probe
-    where, points, heights = _cell_of(pilot, cells), np.stack(_z_phi(pilot), axis=-1), _highest(function(pilot))
+    where, points, heights = _cell_of(pilot, cells), np.stack(_z_phi(pilot), axis=-1), np.abs(function(pilot))
     for level in range(LEVELS):
         halves, along_phi = _halved(rects)
         fine = _rule(function, halves)
-        together = fine.reshape(len(rects), 2, *probe.shape[1:]).sum(axis=1)
+        together = fine.reshape(len(rects), 2).sum(axis=1)
         peak = np.zeros(len(rects))
         np.maximum.at(peak, where, heights)
         area = (rects[:, 1] - rects[:, 0]) * (rects[:, 3] - rects[:, 2])
-        hides = (peak * area > HIDDEN_PEAK * _highest(together)) & (peak * area > 1e-7)
-        rough = hides | _any(np.abs(together - coarse) > RTOL * np.abs(together) + floor)
+        hides = (peak * area > HIDDEN_PEAK * np.abs(together)) & (peak * area > 1e-7)
+        rough = hides | (np.abs(together - coarse) > RTOL * np.abs(together) + floor)
         if level == LEVELS - 1:
             rough[:] = False
         np.add.at(total, owner[~rough], together[~rough])
@@ -130,16 +130,6 @@ def integrate_cells(function: Function, cells: Floats, pilot: Floats) -> Floats:
         again = np.repeat(rough, 2)
         owner, rects, coarse = np.repeat(owner, 2)[again], halves[again], fine[again]
     return total
-
-
-def _highest(values: Floats) -> Floats:
-    highest: Floats = np.abs(values if values.ndim == 1 else values.max(axis=-1))
-    return highest
-
-
-def _any(flags: Flags) -> Flags:
-    anywhere: Flags = flags if flags.ndim == 1 else np.any(flags, axis=-1)
-    return anywhere
 
 
 def _z_phi(w: Floats) -> tuple[Floats, Floats]:
@@ -167,9 +157,8 @@ def _rule(function: Function, rects: Floats) -> Floats:
         z, phi = (a.reshape(-1) for a in np.broadcast_arrays(z[:, :, None], phi[:, None, :]))
         r = np.sqrt(np.maximum((1 - z) * (1 + z), 0.0))
         values = function(np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1))
-        values = values.reshape(len(z0), 4, 4, *values.shape[1:])
         area = (z1 - z0) * (p1 - p0) / 4
-        parts.append(np.einsum("n,i,j,nij...->n...", area, _WEIGHTS, _WEIGHTS, values))
+        parts.append(np.einsum("n,i,j,nij->n", area, _WEIGHTS, _WEIGHTS, values.reshape(len(z0), 4, 4)))
     return np.concatenate(parts)
 
 

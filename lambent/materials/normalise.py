@@ -117,7 +117,7 @@ def normalised(material: Material, seed: int = 0, progress: Progress = silent) -
 
 def with_less_k(material: Material, seed: int = 0) -> Material:
     """The material with all k scaled, per channel, until nothing exceeds 1."""
-    highest, room = _highest(material, seed), _room(material)
+    highest, room = _highest(material, seed), 1 - np.add(material.kd, material.kt_d)
     scale = np.where(highest > room, MARGIN * room / np.maximum(highest, 1e-12), 1.0)
     lobes = tuple(lobe.model_copy(update={"k": triple(np.asarray(lobe.k) * scale)}) for lobe in material.lobes)
     return material.model_copy(update={"lobes": lobes})
@@ -146,16 +146,13 @@ def change(before: Material, after: Material, seed: int = 0) -> float:
 
 def _excess(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
     """Excess (3,) of the lobes' albedo over 1 minus the diffuse terms; 0 where there is none."""
-    return np.maximum(_highest(material, seed, samples) - _room(material), 0.0)
+    room = 1 - np.add(material.kd, material.kt_d)
+    return np.asarray(np.maximum(_highest(material, seed, samples) - room, 0.0))
 
 
 def _highest(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
     """(3,) largest albedo of the lobes alone."""
     return np.asarray(furnace(specular_only(material), seed=seed, samples=samples).albedo.max(axis=(0, 1)))
-
-
-def _room(material: Material) -> Floats:
-    return 1 - np.add(material.kd, material.kt_d)
 
 
 def _flatter(material: Material, factor: float) -> Material:

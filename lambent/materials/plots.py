@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredTable
 
 Eval = Callable[[Floats, Floats], Floats]
+Placed = tuple[Incidence, bool, tuple[int, int]]  # whether of the far side, row and column
 
 THETA_I_DEG = (0, 20, 40, 60, 75)
 STEPS = 721  # every quarter of a degree
@@ -60,17 +62,30 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
     samples = table.samples()
     gathered = [_both_sides(entry) for entry in incidences(samples)] if samples.info.isotropic else incidences(samples)
     shown = _thinned(gathered)
-    sides = (False, True) if samples.info.transmits else (False,)
-    thetas, phis = sorted({e.theta_deg for e in shown}), sorted({e.phi_deg for e in shown})
-    flat = len(phis) <= 1
-    rows, columns = (len(sides), len(thetas)) if flat else (len(thetas) * len(sides), len(phis))
+    placed, (rows, columns) = disk_places(shown, samples.info.transmits)
     matrix_inches = DISK_INCHES * max(rows, 1) + 0.6
     figure = new_figure(max(3.0 * len(THETA_I_DEG), DISK_INCHES * columns + 1), IN_PLANE_INCHES + matrix_inches)
     above, below = figure.subfigures(2, 1, height_ratios=(IN_PLANE_INCHES, matrix_inches))
     _draw_plane(above, {"measured": table.eval}, samples.info.transmits)
     above.suptitle(title, fontsize=10)
-    _draw_matrix(below, shown, sides, (rows, columns), (thetas, phis))
+    if shown:
+        _draw_matrix(below, placed, (rows, columns))
+    else:
+        below.text(0.5, 0.5, "too few tuples per incident direction for disks", ha="center", fontsize=9)
     _save(figure, path)
+
+
+def disk_places(shown: Sequence[Incidence], transmits: bool) -> tuple[list[Placed], tuple[int, int]]:
+    """Row and column of the disk of every incident direction and side, and the number of both.
+
+    Rows are theta_i and columns phi_i, the far side below the near one; with a single phi_i, theta_i is the column.
+    """
+    thetas, phis = sorted({e.theta_deg for e in shown}), sorted({e.phi_deg for e in shown})
+    sides, flat, placed = 1 + transmits, len(phis) <= 1, []
+    for entry, far in product(shown, range(sides)):
+        theta, phi = thetas.index(entry.theta_deg), phis.index(entry.phi_deg)
+        placed.append((entry, bool(far), (far, theta) if flat else (theta * sides + far, phi)))
+    return placed, (sides, len(thetas)) if flat else (len(thetas) * sides, len(phis))
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -130,30 +145,16 @@ def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None
     axes[-1].legend(fontsize=8)
 
 
-def _draw_matrix(
-    figure: Any,
-    shown: Sequence[Incidence],
-    sides: tuple[bool, ...],
-    shape: tuple[int, int],
-    angles_deg: tuple[list[float], list[float]],
-) -> None:
-    """Draw the disks of every incident direction and side."""
-    if not shown:
-        figure.text(0.5, 0.5, "too few tuples per incident direction for disks", ha="center", fontsize=9)
-        return
-    (rows, columns), (thetas, phis) = shape, angles_deg
-    flat = len(phis) <= 1
-    disks = {(e.theta_deg, e.phi_deg, far): measured_disk(e, far, DISK_PIXELS) for e in shown for far in sides}
-    white = white_of(disks.values())
-    axes = figure.subplots(rows, columns, squeeze=False)
+def _draw_matrix(figure: Any, placed: Sequence[Placed], shape: tuple[int, int]) -> None:
+    disks = [measured_disk(entry, far, DISK_PIXELS) for entry, far, _ in placed]
+    white = white_of(disks)
+    axes = figure.subplots(*shape, squeeze=False)
     for axis in axes.flat:
         axis.set_axis_off()
-    for (theta_deg, phi_deg, far), disk in disks.items():
-        row = int(far) if flat else thetas.index(theta_deg) * len(sides) + int(far)
-        axis = axes[row, thetas.index(theta_deg) if flat else phis.index(phi_deg)]
-        _draw_disk(axis, disk / white, theta_deg)
+    for (entry, far, place), disk in zip(placed, disks, strict=True):
+        _draw_disk(axes[place], disk / white, entry.theta_deg)
         side = ", transmitted" if far else ""
-        axis.set_title(f"{theta_deg:g}°, {phi_deg:g}°{side}", fontsize=7, pad=2)
+        axes[place].set_title(f"{entry.theta_deg:g}°, {entry.phi_deg:g}°{side}", fontsize=7, pad=2)
     figure.supxlabel(
         "raw tuples, theta_i and phi_i above each: cube root of the transfer probability; the dot is the source, "
         "blue was not measured",

@@ -13,14 +13,13 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check_table import check_table
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.protocol import TableInfo
-from lambent.materials.measured.table import IntegratedTable
+from lambent.materials.measured.protocol import MeasuredTable, TableInfo
 
 SMALL = GridShape(24, 1, 64, 32)
 GLOSSY = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.2, my=0.2, k=0.5, r0=0.5, alpha=0.2),))
 
 
-class Exact(IntegratedTable):
+class Exact(MeasuredTable):
     """A table without gaps, from a material document."""
 
     def __init__(self, material=GLOSSY):

@@ -24,18 +24,9 @@ from lambent.core.directions import Floats
 from lambent.core.files import atomic_path
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
+from lambent.materials.export import match
 from lambent.materials.export.contract import Cost, Kind, Subject
-from lambent.materials.export.match import (
-    ALPHA_MAX,
-    ALPHA_MIN,
-    brightness,
-    cost_of,
-    match,
-    material_of,
-    shape_losses,
-    slope_start,
-    three,
-)
+from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, three
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, is_isotropic, pairs_of
 from lambent.materials.fresnel import ior_of, r0_of
 
@@ -130,7 +121,7 @@ class GltfMaterial:
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write a .gltf with embedded buffers, or a .glb, of a sphere with the material."""
-    material = material_of(subject)
+    material = match.material_of(subject)
     fitted, cost = likeness(material, progress)
     document, buffer = _sphere(fitted, material)
     with atomic_path(path) as beside:
@@ -149,7 +140,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMater
     space = _Space(material, pairs.samples.f.shape[1])
 
     def best(metallic: float | None, starts: list[Floats]) -> tuple[Floats, float]:
-        return match(pairs, lambda x: space.read(x).eval(pairs), starts, space.bounds(metallic), progress, NAME)
+        return match.match(pairs, lambda x: space.read(x).eval(pairs), starts, space.bounds(metallic), progress, NAME)
 
     ends = [best(metallic, space.starts(metallic)) for metallic in (1.0, 0.0)]
     if not material.transmits:
@@ -157,7 +148,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMater
         ends.append((x, total / SIMPLER**2))
     fitted = space.read(min(ends, key=lambda end: end[1])[0], rounded=True)
     check = pairs_of(material, CHECK_LOG2, seed=1)
-    return fitted, cost_of(check, fitted.eval(check), _lost(material, fitted))
+    return fitted, match.cost_of(check, fitted.eval(check), _lost(material, fitted))
 
 
 class _Space:
@@ -166,7 +157,7 @@ class _Space:
     def __init__(self, material: Material, channels: int) -> None:
         self.material, self.channels = material, channels
         self.isotropic = is_isotropic(material)
-        ranked = sorted(material.lobes, key=brightness, reverse=True)
+        ranked = sorted(material.lobes, key=match.brightness, reverse=True)
         self.axis: Literal["t", "b"] = "b" if ranked and ranked[0].my > ranked[0].mx else "t"
         grey = all(len({k * r for k, r in zip(lobe.k, lobe.r0, strict=True)}) == 1 for lobe in ranked)
         self.f0 = slice(6 + channels, 6 + channels + (1 if grey else channels))
@@ -199,7 +190,7 @@ class _Space:
         c = self.channels
         starts = []
         for lobe in self.material.lobes or (None,):
-            mx, my = slope_start(lobe, "ggx") if lobe else (ALPHA_MAX, ALPHA_MAX)
+            mx, my = match.slope_start(lobe, "ggx") if lobe else (ALPHA_MAX, ALPHA_MAX)
             narrow, wide = min(mx, my), max(mx, my)
             strength = np.sqrt((wide - narrow) / max(1 - narrow, 1e-6))
             peak = np.array(lobe.k)[:c] * np.array(lobe.r0)[:c] if lobe else np.zeros(c)
@@ -233,7 +224,7 @@ def _near_ends(value: float) -> float:
 
 
 def _lost(material: Material, fitted: GltfMaterial) -> list[str]:
-    lost = shape_losses(material)
+    lost = match.shape_losses(material)
     for side, several in (("reflection", material.reflection_lobes), ("transmission", material.transmission_lobes)):
         if len(several) > 1:
             lost.append(f"{len(several)} lobes of {side} became one")

@@ -21,7 +21,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.pairs import is_grey
-from lambent.materials.export.patch_mean import Means, patch_means
+from lambent.materials.export.patch_mean import patch_means
 from lambent.materials.export.resampled import Scatterer, read_back, scatterer_of
 from lambent.materials.measured.equal_energy import xyz_of_rgb
 from lambent.materials.measured.klems import KLEMS_FULL
@@ -50,12 +50,8 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     scatterer = scatterer_of(subject)
     grey = scatterer.channels == 1 or (isinstance(subject, Material) and is_grey(subject))
     front, back = _means(subject, scatterer, progress)
-    blocks = {
-        "Reflection Back": front.reflected,  # the format's Back is our +z
-        "Reflection Front": back.reflected,
-        "Transmission Back": front.transmitted,
-        "Transmission Front": back.transmitted,
-    }
+    sides = (("Back", front), ("Front", back))  # the format's Back is our +z
+    blocks = {f"{way} {side}": f[k] for k, way in enumerate(("Reflection", "Transmission")) for side, f in sides}
     lit = {name: values for name, values in blocks.items() if values.any()}
     if not lit:
         raise UserError("scatters no light, so there is nothing to write", file=scatterer.name)
@@ -66,17 +62,17 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     return replace(cost, lost=(*_lost_detail(front), *cost.lost))
 
 
-def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[Means, Means]:
+def _means(subject: Subject, scatterer: Scatterer, progress: Progress) -> tuple[Floats, Floats]:
     """Means of light from +z and from -z. A material is equal from both and reciprocal; so are its means, exactly."""
     if isinstance(subject, Material):
         means = patch_means(scatterer.eval, BASIS, MaterialBSDF(subject), 1, progress)
-        means = Means(_reciprocal(means.reflected), _reciprocal(means.transmitted))
+        means = np.stack([_reciprocal(f) for f in means])
         return means, means
     proposal = MaterialBSDF(_search(scatterer.transmits))
     front = patch_means(scatterer.eval, BASIS, proposal, 1, progress)
     from_behind = direction(np.radians(180 - np.array(_ASKED_DEG)), np.radians(_ASKED_DEG))
     if not subject.albedo(from_behind).any():
-        return front, Means(np.zeros_like(front.reflected), np.zeros_like(front.transmitted))
+        return front, np.zeros_like(front)
     return front, patch_means(scatterer.eval, BASIS, proposal, -1, progress)
 
 
@@ -99,9 +95,9 @@ def _search(transmits: bool) -> Material:
     return Material(kd=quarter, kt_d=quarter if transmits else BLACK, lobes=tuple(lobes))
 
 
-def _lost_detail(front: Means) -> list[str]:
+def _lost_detail(front: Floats) -> list[str]:
     lost = ["detail finer than a patch, 10 to 15 degrees wide: a patch holds its mean"]
-    for name, values in (("reflected", front.reflected), ("transmitted", front.transmitted)):
+    for name, values in zip(("reflected", "transmitted"), front, strict=True):
         share = BASIS.direct_share(values.sum(axis=-1))
         if share > _DIRECT_SHARE:
             lost.append(f"the shape of the highlight: {100 * share:.0f} % of the {name} light is in one patch")

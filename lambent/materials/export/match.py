@@ -51,7 +51,7 @@ def match(
 
     low, high = bounds
     free = high > low
-    differences = _Differences(pairs)
+    differences = _differences(pairs)
     ends = []
     for i, start in enumerate(tracked(starts, progress, what)):
         margin = 1e-6 * (high - low)
@@ -74,30 +74,26 @@ def _moved(x: Floats, free: Flags, values: Floats) -> Floats:
     return x
 
 
-class _Differences:
-    """Residuals of a model against a material's values at the pairs."""
+def _differences(pairs: Pairs) -> Callable[[Floats], Floats]:
+    """The residuals of f (N, C) of a model against a material's values at the pairs."""
+    samples = pairs.samples
+    w, c = CUBEROOT.terms(samples)
+    target = CUBEROOT.transform(c[:, None] * samples.f)
+    black = CUBEROOT.error(samples, np.zeros_like(samples.f))
+    root = np.sqrt(w / samples.f.shape[1])[:, None] / max(black, 1e-6)
+    # Albedos in bins of theta_i, reflected and transmitted: (bins, N) shares of each pair.
+    order = np.argsort(np.argsort(samples.wi[:, 2], kind="stable"), kind="stable")
+    which = order * ALBEDO_BINS // len(order) + ALBEDO_BINS * pairs.far
+    share = samples.weight * np.abs(samples.wo[:, 2]) * ALBEDO_BINS / len(order)
+    gather = np.where(which == np.arange(2 * ALBEDO_BINS)[:, None], share, 0.0)
+    albedo = gather @ samples.f
+    albedo_root = np.sqrt(ALBEDO_WEIGHT) / max(float(np.sqrt(np.sum(albedo**2))), 1e-6)
 
-    def __init__(self, pairs: Pairs) -> None:
-        samples = pairs.samples
-        w, self._c = CUBEROOT.terms(samples)
-        self._target = CUBEROOT.transform(self._c[:, None] * samples.f)
-        black = CUBEROOT.error(samples, np.zeros_like(samples.f))
-        channels = samples.f.shape[1]
-        self._root = np.sqrt(w / channels)[:, None] / max(black, 1e-6)
-        # Albedos in bins of theta_i, reflected and transmitted: (bins, N) shares of each pair.
-        order = np.argsort(np.argsort(samples.wi[:, 2], kind="stable"), kind="stable")
-        which = order * ALBEDO_BINS // len(order) + ALBEDO_BINS * pairs.far
-        share = samples.weight * np.abs(samples.wo[:, 2]) * ALBEDO_BINS / len(order)
-        self._gather = np.where(which == np.arange(2 * ALBEDO_BINS)[:, None], share, 0.0)
-        albedo = self._gather @ samples.f
-        self._albedo = albedo
-        size = np.sqrt(np.sum(albedo**2))
-        self._albedo_root = np.sqrt(ALBEDO_WEIGHT) / max(float(size), 1e-6)
+    def differences(f: Floats) -> Floats:
+        seen = root * (CUBEROOT.transform(c[:, None] * f) - target)
+        return np.concatenate([seen.ravel(), (albedo_root * (gather @ f - albedo)).ravel()])
 
-    def __call__(self, f: Floats) -> Floats:
-        seen = self._root * (CUBEROOT.transform(self._c[:, None] * f) - self._target)
-        albedo = self._albedo_root * (self._gather @ f - self._albedo)
-        return np.concatenate([seen.ravel(), albedo.ravel()])
+    return differences
 
 
 def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:

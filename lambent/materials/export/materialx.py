@@ -65,9 +65,7 @@ def _eval(pairs: Pairs, part: Part) -> Floats:
 
 
 def _others(lobe: Lobe, channels: int) -> tuple[Floats, Floats, Floats]:
-    """Roots of color90; a lobe of transmission has none."""
-    if lobe.side == "transmission":
-        return np.zeros(0), np.zeros(0), np.zeros(0)
+    """Roots of color90."""
     return np.sqrt(np.clip(np.array(lobe.k)[:channels], 1e-4, 1)), np.zeros(channels), np.ones(channels)
 
 
@@ -121,12 +119,10 @@ def document(name: str, found: Likeness) -> str:
 
 
 def _lobe_node(root: ET.Element, part: Part, name: str) -> str:
-    roughness = (part.mx, part.my)
+    roughness, colour = (part.mx, part.my), three(part.colour)
     if part.lobe.side == "transmission":
-        return _node(
-            root, "dielectric_bsdf", name, tint=three(part.colour), ior=_ior(part.lobe), roughness=roughness, mode="T"
-        )
-    colours = {"color0": three(part.colour), "color90": three(part.others**2)}
+        return _node(root, "dielectric_bsdf", name, tint=colour, ior=_ior(part.lobe), roughness=roughness, mode="T")
+    colours = {"color0": colour, "color90": three(part.others**2)}
     return _node(root, "generalized_schlick_bsdf", name, **colours, exponent=5.0, roughness=roughness, mode="R")
 
 

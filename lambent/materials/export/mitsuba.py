@@ -74,9 +74,7 @@ def _eval(pairs: Pairs, part: Part) -> Floats:
 
 
 def _others(lobe: Lobe, channels: int) -> tuple[Floats, Floats, Floats]:
-    """eta and kappa; a lobe of transmission has none."""
-    if lobe.side == "transmission":
-        return np.zeros(0), np.zeros(0), np.zeros(0)
+    """eta and kappa."""
     low, high = zip(ETA_RANGE, KAPPA_RANGE, strict=True)
     return np.array([ior_of(np.clip(np.mean(lobe.r0), 0.001, 0.7)), 0.5]), np.array(low), np.array(high)
 
@@ -148,12 +146,9 @@ def _bsdf(found: Likeness) -> ET.Element:
         near.append(None)
     if any(found.kt_d):
         far.append(None)
-    sizes = [
-        float(np.mean(diffuse)) if part is None else brightness(part.lobe)
-        for parts, diffuse in ((near, found.kd), (far, found.kt_d))
-        for part in parts
-    ]
-    shares = _shares(sizes)
+    diffuse = [found.kd] * len(near) + [found.kt_d] * len(far)
+    parts = zip([*near, *far], diffuse, strict=True)
+    shares = _shares([float(np.mean(kd)) if part is None else brightness(part.lobe) for part, kd in parts])
     leaves_near = [(_near(found, part, share), share) for part, share in zip(near, shares, strict=False)]
     leaves_far = [(_far(found, part, share), share) for part, share in zip(far, shares[len(near) :], strict=True)]
     if leaves_near:

@@ -10,6 +10,7 @@ masking-shadowing function, eqs 72, 86, 99 (anisotropic, height-correlated).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -37,10 +38,8 @@ class Pairs:
         wi, wo, f (1 channel for a grey material) and the solid angle of wo.
     wi, wo, h : component tuples of (N,)
         Directions on the upper side (wo mirrored at the surface where it is below), and their half vector.
-    cos_d, schlick : (N,)
-        wo.h and (1 - wo.h)^5.
-    far : (N,) bool
-        Whether wo is on the far side.
+    cos_d : (N,)
+        wo.h.
     """
 
     samples: MeasuredSamples
@@ -48,11 +47,19 @@ class Pairs:
     wo: Vector
     h: Vector
     cos_d: Floats
-    schlick: Floats
-    far: Flags
 
     def __len__(self) -> int:
         return len(self.samples)
+
+    @property
+    def far(self) -> Flags:
+        """(N,) whether wo is on the far side."""
+        return self.samples.transmitted
+
+    @cached_property
+    def schlick(self) -> Floats:
+        """(N,) (1 - wo.h)^5."""
+        return schlick_weight(self.cos_d)
 
     def facets(
         self, mx: float, my: float, masking: Masking = "correlated", distribution: Distribution = "ggx"
@@ -66,14 +73,13 @@ class Pairs:
 
     def _masking(self, mx: float, my: float, masking: Masking, distribution: Distribution) -> Floats:
         """(N,) Smith's G in [0, 1]."""
-        slopes2 = [((mx * w[0]) ** 2 + (my * w[1]) ** 2) / w[2] ** 2 for w in (self.wi, self.wo)]
-        if distribution == "beckmann":
-            lambdas = [_beckmann_lambda(s) for s in slopes2]
-        else:
-            lambdas = [(np.sqrt(1 + s) - 1) / 2 for s in slopes2]
-        if masking == "correlated":
-            return np.asarray(1 / (1 + lambdas[0] + lambdas[1]))
-        return np.asarray(1 / ((1 + lambdas[0]) * (1 + lambdas[1])))
+        smith = _beckmann_lambda if distribution == "beckmann" else _ggx_lambda
+        one, other = (smith(((mx * w[0]) ** 2 + (my * w[1]) ** 2) / w[2] ** 2) for w in (self.wi, self.wo))
+        return np.asarray(1 / (1 + one + other) if masking == "correlated" else 1 / ((1 + one) * (1 + other)))
+
+
+def _ggx_lambda(slope2: Floats) -> Floats:
+    return np.asarray((np.sqrt(1 + slope2) - 1) / 2)
 
 
 def _beckmann_lambda(slope2: Floats) -> Floats:
@@ -119,12 +125,7 @@ def pairs_of(material: Material, log2_count: int, seed: int) -> Pairs:
     wi, wo, weight = wi[seen], wo[seen], 1 / density[seen]
     f = bsdf.eval(wi, wo)[:, : 1 if is_grey(material) else 3]
     info = TableInfo(material.name, "direction pairs", is_isotropic(material), material.transmits, f.shape[1], "f")
-    return pairs_from(MeasuredSamples(wi, wo, f, weight, LeftOut(), info))
-
-
-def pairs_from(samples: MeasuredSamples) -> Pairs:
-    """Pairs of any tuples with wi above the surface."""
-    wi, wo = components(samples.wi), components(raised(samples.wo))
-    h = lobes.half_vector(wi, wo)
-    cos_d = lobes.dot(wo, h)
-    return Pairs(samples, wi, wo, h, cos_d, schlick_weight(cos_d), samples.transmitted)
+    upper_wi, upper_wo = components(wi), components(raised(wo))
+    h = lobes.half_vector(upper_wi, upper_wo)
+    samples = MeasuredSamples(wi, wo, f, weight, LeftOut(), info)
+    return Pairs(samples, upper_wi, upper_wo, h, lobes.dot(upper_wo, h))

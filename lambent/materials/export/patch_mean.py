@@ -9,7 +9,6 @@ smallest value found is subtracted first, so that a constant comes out exactly.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,16 +24,8 @@ EVEN_LOG2, LOBES_LOG2 = 3, 13  # of the directions per pair of patches, and per 
 Evaluate = Callable[[Floats, Floats], Floats]
 
 
-@dataclass(frozen=True)
-class Means:
-    """Mean f in 1/sr, (outgoing patches, incident patches, C) each."""
-
-    reflected: Floats
-    transmitted: Floats
-
-
-def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, progress: Progress) -> Means:
-    """Means over all pairs of patches, for light from one side of the sheet.
+def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, progress: Progress) -> Floats:
+    """Mean f (2, outgoing patches, incident patches, C) in 1/sr of light from one side: reflected, then transmitted.
 
     Parameters
     ----------
@@ -47,7 +38,7 @@ def patch_means(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, s
     """
     patches = tracked(range(basis.count), progress, "averaging over patches")
     whole = np.stack([_column(evaluate, basis, proposal, side, i) for i in patches], axis=1)
-    return Means(whole[: basis.count], whole[basis.count :])
+    return whole.reshape(2, basis.count, *whole.shape[1:])
 
 
 def _column(evaluate: Evaluate, basis: AngleBasis, proposal: MaterialBSDF, side: int, i: int) -> Floats:

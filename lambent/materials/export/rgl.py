@@ -11,7 +11,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.core.colour import luminance
 from lambent.core.directions import Floats, direction, normalize, reflect
@@ -21,7 +20,7 @@ from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.resampled import LOST_TRANSMISSION, Scatterer, read_back, scatterer_of
 from lambent.materials.measured.marginal import Corners, Warp
 from lambent.materials.measured.rgl import d_wo_d_um, half_vectors_at
-from lambent.materials.measured.tensor_file import tensor_bytes
+from lambent.materials.measured.tensor_file import Tensors, tensor_bytes
 
 NAME = "RGL tensor file"
 ENDINGS = (".bsdf",)
@@ -35,8 +34,6 @@ _POWER = 0.35
 _FLOOR, _FLOOR_BELOW = 0.02, 0.002  # even share of the density, which keeps every direction in reach
 _LOWEST = 1e-4  # cosine of the directions that replace those below the horizon
 
-Tensors = dict[str, NDArray[np.generic]]
-
 
 def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write the file and return its losses."""
@@ -44,8 +41,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     content = tensor_bytes(_tensors(scatterer, progress))
     with atomic_path(Path(path)) as beside:
         beside.write_bytes(content)
-    lost = [LOST_TRANSMISSION] if scatterer.transmits else []
-    return read_back(subject, Path(path), tuple(lost))
+    return read_back(subject, Path(path), (LOST_TRANSMISSION,) if scatterer.transmits else ())
 
 
 def _tensors(scatterer: Scatterer, progress: Progress) -> Tensors:

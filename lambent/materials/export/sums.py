@@ -47,7 +47,8 @@ class Tool:
     eval : callable
         f (N, C) of a part at the pairs; zero on the other side.
     others : callable
-        (start, low, high), each (K,), of the parameters besides roughness and colour, for a lobe and C channels.
+        (start, low, high), each (K,), of a reflection lobe's parameters besides roughness and colour, for C channels;
+        transmission has none.
     colour_start : callable
         Start colour (C,) for a lobe, before limiting.
     distribution : callable
@@ -68,6 +69,10 @@ class Tool:
         """The part, rounded as in the file."""
         colour, others = rounded(part.colour), self.rounded_others(part.others)
         return replace(part, mx=round(part.mx, 6), my=round(part.my, 6), colour=colour, others=others)
+
+    def others_of(self, lobe: Lobe, channels: int) -> tuple[Floats, Floats, Floats]:
+        """`others` of any lobe."""
+        return self.others(lobe, channels) if lobe.side == "reflection" else (np.zeros(0),) * 3
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ def _space(lobe: Lobe, tool: Tool, pairs: Pairs) -> tuple[Floats, Floats, Floats
     """Start and bounds of a part's parameters: ln mx, ln my, roots of the colour, the others."""
     channels = pairs.samples.f.shape[1]
     mx, my = slope_start(lobe, tool.distribution(lobe))
-    others = tool.others(lobe, channels)
+    others = tool.others_of(lobe, channels)
     colour = np.sqrt(np.clip(tool.colour_start(lobe)[:channels], 1e-4, tool.colour_max))
     start = np.array([np.log(mx), np.log(my), *colour, *others[0]])
     small, large = np.log(ALPHA_MIN), np.log(ALPHA_MAX)
@@ -129,7 +134,7 @@ def _read(x: Floats, material: Material, tool: Tool, pairs: Pairs) -> Likeness:
     channels = pairs.samples.f.shape[1]
     kd, kt_d, at, parts = x[:channels] ** 2, x[channels : 2 * channels] ** 2, 2 * channels, []
     for lobe in material.lobes:
-        count = 2 + channels + len(tool.others(lobe, channels)[0])
+        count = 2 + channels + len(tool.others_of(lobe, channels)[0])
         own = x[at : at + count]
         at += count
         mx = float(np.exp(own[0]))

@@ -12,7 +12,7 @@ from lambent.materials.document import Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
 from lambent.materials.fitting.metrics import METRICS, light_ratios
 from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
-from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of, replace_metric
+from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.fresnel import schlick_weight
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -57,15 +57,14 @@ def evaluate(material: Material, samples: MeasuredSamples) -> Floats:
 
 
 def warnings_of(
-    samples: MeasuredSamples,
-    material: Material,
-    model: Floats,
-    found: Mapping[Side, tuple[Mixture, Sequence[Box]]],
-    metric: str,
+    samples: MeasuredSamples, material: Material, model: Floats, found: Mapping[Side, Found], metric: str
 ) -> tuple[str, ...]:
-    """A line for every doubt about a fit; `model` is its f (N, C) at the tuples."""
-    lines = [line for side, (one, boxes) in found.items() for line in _bounds(side, one.lobes, boxes)]
-    lines += _peaks(samples, model, metric)
+    """A line for every doubt about a fit; `model` is its f (N, C) at the tuples, `found` has the sides with a model."""
+    lines = [line for side, one in found.items() for line in _bounds(side, one.models[-1].lobes, one.boxes)]
+    share = peak_share(samples, model)
+    if share < UNDERSHOOT:
+        hint = "try more lobes" if metric == "l2_ngan" else "more lobes or the l2_ngan metric follow it better"
+        lines.append(f"the model reaches {share:.2f} of the measured peak; {hint}")
     for side, ratio in light_ratios(samples, model).items():
         if abs(ratio - 1) > TOTAL_TOLERANCE:
             word = "reflects" if side == "reflection" else "transmits"
@@ -104,14 +103,6 @@ def peak_share(samples: MeasuredSamples, model: Floats) -> float:
     fitted = (model * np.abs(samples.wo[:, 2:])).mean(axis=1)
     brightest = np.argsort(measured)[-max(int(PEAK_SHARE * len(measured)), 10) :]
     return float(fitted[brightest].sum() / max(measured[brightest].sum(), 1e-300))
-
-
-def _peaks(samples: MeasuredSamples, model: Floats, metric: str) -> list[str]:
-    share = peak_share(samples, model)
-    if share >= UNDERSHOOT:
-        return []
-    hint = "; more lobes or the l2_ngan metric follow it better" if metric != "l2_ngan" else "; try more lobes"
-    return [f"the model reaches {share:.2f} of the measured peak{hint}"]
 
 
 def _energy(material: Material) -> list[str]:

@@ -17,23 +17,13 @@ from lambent.core.files import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Lobe, Material, Provenance, Side
-from lambent.materials.fitting import account, gradient, grid
+from lambent.materials.fitting import account, gradient, grid, parameters
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.metrics import Metric, errors_of, metric_named
-from lambent.materials.fitting.parameters import (
-    SHAPE,
-    Box,
-    Fixed,
-    Ranges,
-    box_of,
-    check,
-    parameter,
-    per_channel,
-    scalar,
-)
-from lambent.materials.fitting.problem import Candidate, Mixture, Problem, problem_of
+from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, parameter
+from lambent.materials.fitting.problem import Candidate, Found, Mixture, problem_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 Method = Literal["grid", "gradient"]
@@ -88,15 +78,6 @@ class Task:
     ranges: Ranges
     schedule: Schedule
     seed: int
-
-
-@dataclass(frozen=True)
-class Found:
-    """The finished models of one side with one lobe, two, ..., and the boxes of their lobes."""
-
-    problem: Problem
-    boxes: tuple[Box, ...]
-    models: list[Mixture]
 
 
 def fit(
@@ -155,12 +136,14 @@ def fit(
     began = time.perf_counter()
     count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
     _check(count, gain, method, distribution)
-    check(fix, ranges, count)
+    parameters.check(fix, ranges, count)
     share = gain if lobes == "auto" else 0.0
     kinds = DISTRIBUTIONS[distribution]
     task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, schedule or Schedule(), seed)
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
-    _check_sides(samples, task.fix, task.ranges)
+    far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
+    if far and not samples.transmitted.any():
+        raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
     found: dict[Side, Found] = {}
     partial = False
     try:
@@ -173,11 +156,15 @@ def fit(
         kd=_diffuse_rgb("reflection", samples, task, found),
         kt_d=_diffuse_rgb("transmission", samples, task, found),
         kd_coupled=coupled,
-        lobes=tuple(lobe for side, one in found.items() for lobe in _document_lobes(side, one, task)),
+        lobes=tuple(
+            _lobe(side, i, lobe, one.problem.distribution, task.fix)
+            for side, one in found.items()
+            for i, lobe in enumerate(one.models[-1].lobes if one.models else ())
+        ),
     )
     model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
-    kept = {side: (one.models[-1], one.boxes) for side, one in found.items() if one.models}
+    kept = {side: one for side, one in found.items() if one.models}
     warnings = (*account.warnings_of(samples, material, model, kept, task.metric.name), *_fewer(found, lobes))
     if partial:
         warnings = ("cancelled: the best found so far", *warnings)
@@ -191,14 +178,9 @@ def fit(
         samples={"used": len(samples), **asdict(samples.left_out)},
         notes=(*samples.info.notes, *account.restrictions(task.fix, task.ranges), *_by_lobes(found), *warnings),
     )
-    return FitResult(
-        material.model_copy(update={"provenance": provenance}),
-        errors,
-        account.lambertian_errors(samples),
-        time.perf_counter() - began,
-        warnings,
-        partial,
-    )
+    material = material.model_copy(update={"provenance": provenance})
+    lambertian = account.lambertian_errors(samples)
+    return FitResult(material, errors, lambertian, time.perf_counter() - began, warnings, partial)
 
 
 def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
@@ -213,19 +195,31 @@ def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
 def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progress, found: dict[Side, Found]) -> None:
     """Put the side's models into `found`, including those finished when `progress` raises."""
     channels = samples.f.shape[1]
-    boxes = tuple(box_of(side, i, samples.info.isotropic, channels, task.fix, task.ranges) for i in range(task.lobes))
+    boxes = tuple(
+        parameters.box_of(side, i, samples.info.isotropic, channels, task.fix, task.ranges) for i in range(task.lobes)
+    )
     diffuse = _diffuse(samples, side, task.fix)
     problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled)
     for number, distribution in enumerate(task.distributions):
         one = Found(replace(problem, distribution=distribution), boxes, [])
         if number == 0:
             found[side] = one
-        report = _part(progress, side, number, len(task.distributions))
+
+        def report(done: float, total: float, what: str, number: int = number) -> None:
+            progress(done / total + number, len(task.distributions), f"{side}: {what}")
+
         if task.method == "grid":
-            grid.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule, task.gain, one.models)
+            models = grid.fit_lobes(one.problem, boxes, diffuse, report, task.seed, task.schedule)
         else:
             bounds = Bounds(boxes, ("kd" if side == "reflection" else "kt_d") not in task.fix)
-            gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed, task.gain, one.models)
+            models = gradient.fit_lobes(one.problem, bounds, diffuse, report, task.seed)
+        error = np.inf
+        for model in models:
+            reached = one.problem.remaining(model)
+            if reached >= error * (1 - task.gain) ** task.metric.power:
+                break
+            one.models.append(model)
+            error = reached
         one.models[:] = [_narrow_first(model, boxes) for model in one.models]
         if one.problem.remaining(one.models[-1]) < found[side].problem.remaining(found[side].models[-1]):
             found[side] = one
@@ -239,28 +233,12 @@ def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
     return replace(model, lobes=tuple(by_area)) if alike else model
 
 
-def _part(progress: Progress, side: Side, number: int, parts: int) -> Progress:
-    """Progress of one distribution of a side."""
-
-    def report(done: float, total: float, what: str) -> None:
-        progress(done / total + number, parts, f"{side}: {what}")
-
-    return report
-
-
-def _check_sides(samples: MeasuredSamples, fix: Fixed, ranges: Ranges) -> None:
-    """Raise `UserError` for a restriction of transmission if the table has none."""
-    far = [name for name in [*fix, *ranges] if name.startswith("t_") or name.startswith("kt")]
-    if far and not samples.transmitted.any():
-        raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
-
-
 def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
     """kd or kt_d (C,) from the mode of the side's values, or as the user fixed it."""
     name = "kd" if side == "reflection" else "kt_d"
     channels = samples.f.shape[1]
     if name in fix:
-        return np.array(per_channel(fix[name], channels))
+        return np.array(parameters.per_channel(fix[name], channels))
     here = samples.on(side)
     weight = samples.weight[here] * np.abs(samples.wo[here, 2])
     return np.array([diffuse_mode(samples.f[here, c], weight) for c in range(channels)])
@@ -274,16 +252,11 @@ def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[S
     return _rgb(_diffuse(samples, side, task.fix))
 
 
-def _document_lobes(side: Side, found: Found, task: Task) -> list[Lobe]:
-    """The lobes as a document holds them."""
-    lobes = found.models[-1].lobes if found.models else ()
-    return [_lobe(side, i, lobe, found.problem.distribution, task.fix) for i, lobe in enumerate(lobes)]
-
-
 def _lobe(side: Side, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
+    """The lobe as a document holds it."""
     names = [parameter(side, base, index) for base in SHAPE]
     mx, my, r0, alpha = (
-        scalar(fix[name], base) if name in fix else float(value)
+        parameters.scalar(fix[name], base) if name in fix else float(value)
         for name, base, value in zip(names, SHAPE, candidate.shape, strict=True)
     )
     if side == "transmission" and r0 < 2e-6:
@@ -300,10 +273,10 @@ def _by_lobes(found: dict[Side, Found]) -> list[str]:
     """A line per side with several models: its own E with one lobe, two, ..."""
     lines = []
     for side, one in found.items():
+        metric = one.problem.metric
         if len(one.models) > 1:
-            power = one.problem.metric.power
-            errors = ", ".join(f"{one.problem.remaining(model) ** (1 / power):.4g}" for model in one.models)
-            lines.append(f"{side}: {one.problem.metric.name} error {errors} with 1 to {len(one.models)} lobes")
+            errors = ", ".join(f"{one.problem.remaining(model) ** (1 / metric.power):.4g}" for model in one.models)
+            lines.append(f"{side}: {metric.name} error {errors} with 1 to {len(one.models)} lobes")
     return lines
 
 

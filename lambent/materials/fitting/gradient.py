@@ -3,7 +3,7 @@
 Lobes are added one by one to the best model so far. A new lobe starts at several widths, at either end of (r0, alpha),
 which are bimodal, and by splitting each existing lobe into a narrow and a wide one. Its coefficients are solved on the
 remainder of the others (subtracted and clamped); then every shape and coefficient moves at once. The best starts
-continue with more tuples. The model with one more lobe is kept only if it fits all tuples better.
+continue with more tuples. `fit` keeps the model with one more lobe only if it fits all tuples better.
 """
 
 from __future__ import annotations
@@ -32,67 +32,46 @@ SPLIT = 1.8  # a lobe is split into one narrower and one wider by this factor
 LEAST_START = 1e-6  # a coefficient of 0 has no logarithm
 
 
-def fit_lobes(
-    problem: Problem,
-    bounds: Bounds,
-    diffuse: Floats,
-    progress: Progress,
-    seed: int,
-    gain: float,
-    found: list[Mixture],
-) -> None:
-    """Append to `found` the best model with one lobe, two lobes, ... up to the number of boxes.
+def fit_lobes(problem: Problem, bounds: Bounds, diffuse: Floats, progress: Progress, seed: int) -> Iterator[Mixture]:
+    """The best model with one lobe, with two lobes, ... up to the number of boxes.
+
+    If `progress` raises before the first, the best so far comes first, then the exception.
 
     Parameters
     ----------
     diffuse : (C,)
         Start values of the diffuse coefficients, or their values where they are given.
-    gain : float
-        Share of E that another lobe must remove; otherwise the search ends early.
-    found : list
-        Holds the finished models if `progress` raises.
     """
     channels = len(problem.measured)
     stages = problem.thinned([v // channels for v in VALUES], seed, (np.float32,) * 3)
     model = Mixture(np.maximum(diffuse, LEAST_START) if bounds.diffuse_free else diffuse)
-    error = np.inf
     for count in range(1, len(bounds.boxes) + 1):
-        candidates = list(_starts(stages[0], bounds, model))
-        ranked = _descend(stages, bounds, candidates, progress, count, found)
-        reached = problem.remaining(ranked)
-        if reached >= error * (1 - gain) ** problem.metric.power:
-            return
-        found.append(ranked)
-        model, error = ranked, reached
+        best: list[Mixture] = []
+        try:
+            _descend(stages, bounds, list(_starts(stages[0], bounds, model)), progress, count, best)
+        except BaseException:
+            if count == 1 and best:
+                yield best[0]
+            raise
+        model = best[0]
+        yield model
 
 
 def _descend(
-    stages: Sequence[Problem],
-    bounds: Bounds,
-    starts: Sequence[Mixture],
-    progress: Progress,
-    lobe: int,
-    found: list[Mixture],
-) -> Mixture:
-    """The best end of all starts; if `progress` raises and `found` is empty, the best so far goes there."""
-    rounds, lobes = len(starts) + sum(KEPT), len(bounds.boxes)
-    done = 0
-    alive = list(starts)
-    ends: list[tuple[Mixture, float]] = []
-    try:
-        for stage, kept, steps, stop in zip(stages, (len(starts), *KEPT), STEPS, STOP_SHARE, strict=True):
-            ends = []
-            for start in alive[:kept]:
-                progress((lobe - 1) * rounds + done, lobes * rounds, f"lobe {lobe}, {len(stage)} tuples")
-                ends.append(minimise(stage, bounds, start, steps, stop))
-                done += 1
-            alive = _distinct(ends)
-        progress(lobe * rounds, lobes * rounds, f"lobe {lobe}")
-    except BaseException:
-        if not found and done:
-            found.append((_distinct(ends) or alive)[0])
-        raise
-    return alive[0]
+    stages: Sequence[Problem], bounds: Bounds, starts: list[Mixture], progress: Progress, lobe: int, best: list[Mixture]
+) -> None:
+    """Put the ends of the starts, best first, into `best`, which is up to date at any time."""
+    rounds, lobes, done = len(starts) + sum(KEPT), len(bounds.boxes), 0
+    alive = starts
+    for stage, kept, steps, stop in zip(stages, (len(starts), *KEPT), STEPS, STOP_SHARE, strict=True):
+        ends = []
+        for start in alive[:kept]:
+            progress((lobe - 1) * rounds + done, lobes * rounds, f"lobe {lobe}, {len(stage)} tuples")
+            ends.append(minimise(stage, bounds, start, steps, stop))
+            best[:] = _distinct(ends)
+            done += 1
+        alive = list(best)
+    progress(lobe * rounds, lobes * rounds, f"lobe {lobe}")
 
 
 def _distinct(ends: Sequence[tuple[Mixture, float]]) -> list[Mixture]:

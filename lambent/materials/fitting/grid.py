@@ -38,53 +38,41 @@ class Schedule:
 
 
 def fit_lobes(
-    problem: Problem,
-    boxes: Sequence[Box],
-    diffuse: Floats,
-    progress: Progress,
-    seed: int,
-    schedule: Schedule,
-    gain: float,
-    found: list[Mixture],
-) -> None:
-    """Append to `found` the model with one lobe, two, ... one per box; see `gradient.fit_lobes`."""
+    problem: Problem, boxes: Sequence[Box], diffuse: Floats, progress: Progress, seed: int, schedule: Schedule
+) -> Iterator[Mixture]:
+    """The model with one lobe, with two, ... one per box; see `gradient.fit_lobes`."""
 
-    def refit(model: Mixture, index: int, box: Box) -> Mixture:
+    def refit(model: Mixture, index: int, finished: list[Candidate]) -> Mixture:
         """The model with lobe `index` fitted (again) to the remainder of the others."""
-        others = Mixture(model.diffuse, model.lobes[:index] + model.lobes[index + 1 :])
 
         def report(done: float, total: float, what: str) -> None:
             progress(done, total, f"lobe {index + 1}, {what}")
 
-        finished: list[Candidate] = []
-        try:
-            lobe = search(problem, others, box, report, finished, seed, schedule)
-        except BaseException:  # cancelled: without a finished lobe, that of the last finished level counts
-            if finished and not found:
-                found.append(Mixture(model.diffuse, (_with_exact_scale(problem, others, finished[-1], box),)))
-            raise
-        exact = _with_exact_scale(problem, others, lobe, box)
+        others = Mixture(model.diffuse, model.lobes[:index] + model.lobes[index + 1 :])
+        lobe = search(problem, others, boxes[index], report, finished, seed, schedule)
+        exact = _with_exact_scale(problem, others, lobe, boxes[index])
         return Mixture(model.diffuse, (*model.lobes[:index], exact, *model.lobes[index + 1 :]))
 
     model = Mixture(diffuse)
-    error = np.inf
-    for count, box in enumerate(boxes, start=1):
-        model = refit(model, count - 1, box)
+    for count in range(1, len(boxes) + 1):
+        finished: list[Candidate] = []
+        try:
+            model = refit(model, count - 1, finished)
+        except BaseException:  # cancelled: without a finished lobe, that of the last finished level counts
+            if count == 1 and finished:
+                yield Mixture(diffuse, (_with_exact_scale(problem, model, finished[-1], boxes[0]),))
+            raise
         reached = problem.remaining(model)
         for _ in range(ROUNDS if count > 1 else 0):
             before, kept = reached, model
-            for index, one in enumerate(boxes[:count]):
-                model = refit(model, index, one)
+            for index in range(count):
+                model = refit(model, index, [])
             reached = problem.remaining(model)
             if reached >= before:
                 model, reached = kept, before
             if reached > (1 - STOP_SHARE) * before:
                 break
-        if reached >= error * (1 - gain) ** problem.metric.power:
-            return
-        if len(found) < count:
-            found.append(model)
-        found[count - 1], error = model, reached
+        yield model
 
 
 def search(
@@ -98,13 +86,14 @@ def search(
 ) -> Candidate:
     """The best lobe in `box` for the remainder of `others`; `finished` gets the best one of every finished level."""
     (few,) = problem.thinned([VALUES // len(problem.measured)], seed, [np.float32])
-    lo, hi = box.lo, box.hi
+    channels, lo, hi = few.channels(others), box.lo, box.hi
     for level in range(schedule.levels):
 
         def report(share: float, level: int = level) -> None:
             progress(level + share, schedule.levels, f"level {level + 1} of {schedule.levels}")
 
-        candidates = _evaluate(few, few.channels(others), box, *_axes(lo, hi, box, schedule.n), report)
+        axes = [np.linspace(a, b, schedule.n) if b > a else np.array([a]) for a, b in zip(lo, hi, strict=True)]
+        candidates = _evaluate(few, channels, box, axes, report)
         found = min(candidates, key=lambda pair: pair[1])[0]
         finished.append(found)
         extent = (hi - lo) / (schedule.n - 1)
@@ -114,27 +103,12 @@ def search(
     return finished[-1]
 
 
-def _axes(lo: Floats, hi: Floats, box: Box, n: int) -> tuple[list[tuple[float, float]], Floats, Floats]:
-    """Pairs of (ln mx, ln my), and the values of ln r0 and alpha to combine."""
-    values = [np.linspace(a, b, n) if b > a else np.array([a]) for a, b in zip(lo, hi, strict=True)]
-    if box.tied:
-        pairs = [(float(v), float(v)) for v in values[MU]]
-    else:
-        pairs = [(float(a), float(b)) for a, b in product(values[MU], values[NU])]
-    return pairs, values[R0], values[ALPHA]
-
-
 def _evaluate(
-    problem: Problem,
-    channels: tuple[Channel, ...],
-    box: Box,
-    pairs: list[tuple[float, float]],
-    r0: Floats,
-    alpha: Floats,
-    report: Callable[[float], None],
+    problem: Problem, channels: tuple[Channel, ...], box: Box, axes: list[Floats], report: Callable[[float], None]
 ) -> Iterator[tuple[Candidate, float]]:
-    """Every combination of the pairs of slopes with r0 and alpha, with its coefficient solved, and its remainder."""
-    combined = np.array(list(product(r0, alpha)))
+    """Every combination of the values (ln mx, ln my, ln r0, alpha), with its coefficient solved, and its remainder."""
+    pairs = list(zip(axes[MU], axes[MU], strict=True) if box.tied else product(axes[MU], axes[NU]))
+    combined = np.array(list(product(axes[R0], axes[ALPHA])))
     fresnel = problem.fresnel(np.exp(combined[:, 0])).astype(problem.base.dtype)
     rest = fresnel * np.exp(-combined[:, 1:].astype(problem.base.dtype) * problem.log_cosines)
     highest = rest.max(axis=0)
@@ -146,10 +120,7 @@ def _evaluate(
         basis = density[reached] * rest[:, reached]
         ks, totals = [], []
         for channel, loss, limits in zip(channels, unexplained, box.k_limits, strict=True):
-            part = Channel(
-                channel.measured[reached], channel.background[reached], channel.w[reached], channel.c[reached]
-            )
-            k, total = solve_scale(problem.metric, part, basis, limits)
+            k, total = solve_scale(problem.metric, channel.at(reached), basis, limits)
             ks.append(k)
             totals.append(total + loss[~reached].sum())
         mean = np.mean(totals, axis=0)

@@ -64,10 +64,8 @@ def incidences(samples: MeasuredSamples) -> list[Incidence]:
         for phi_deg in np.unique(phi_key[(theta_key == theta_deg) & (phi_key >= 0)]):
             here = (theta_key == theta_deg) & (phi_key == phi_deg)
             if here.sum() >= LEAST_TUPLES:
-                wi = direction(np.radians(theta_deg), np.radians(phi_deg))
-                gathered.append(
-                    Incidence(float(theta_deg), float(phi_deg), wi, wo[here], samples.f[here], samples.weight[here])
-                )
+                wi, f, weight = direction(*np.radians((theta_deg, phi_deg))), samples.f[here], samples.weight[here]
+                gathered.append(Incidence(float(theta_deg), float(phi_deg), wi, wo[here], f, weight))
     return gathered
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.fitting.parameters import Box
-from lambent.materials.fitting.problem import ALPHA, MU, NU, Candidate, Mixture, Problem
+from lambent.materials.fitting.problem import ALPHA, MU, NU, Mixture, Problem
 from lambent.materials.fitting.scale import TINY
 
 DAMPING = (1e-3, 1e7)  # at the start, and at most; shares of the normal matrix's diagonal
@@ -98,40 +98,34 @@ def _normal_equations(
     """J^T W J (U, U) and J^T W r (U,), with r the transformed residual and J the model's derivative."""
     matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
     for block in problem.blocks:
-        _add_block(block, bounds, mixture, unknowns, matrix, gradient)
+        metric, c = block.metric, block.c
+        terms = np.stack([c * block.diffuse, *(c * block.basis(lobe.shape) for lobe in mixture.lobes)])
+        slopes = [
+            block.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
+        ]
+        for channel, target in enumerate(block.target):
+            k = np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=c.dtype)
+            parts = k[:, None] * terms
+            model = parts.sum(axis=0)
+            residual = target - metric.transform(model)
+            w = block.w
+            if metric.power == 1:
+                size = np.abs(target)
+                w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
+            if not metric.linear:
+                parts *= metric.slope(model)
+            here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
+            rows = np.empty((len(here), len(c)), dtype=c.dtype)
+            for row, i in zip(rows, here, strict=True):
+                u = unknowns[i]
+                if u.axis == COEFFICIENT:
+                    row[:] = parts[u.lobe + 1]
+                else:
+                    np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
+            weighted = rows * w
+            matrix[np.ix_(here, here)] += weighted @ rows.T
+            gradient[here] += weighted @ residual
     return matrix, gradient
-
-
-def _add_block(
-    block: Problem, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown], matrix: Floats, gradient: Floats
-) -> None:
-    metric, c = block.metric, block.c
-    terms = np.stack([c * block.diffuse, *(c * block.basis(lobe.shape) for lobe in mixture.lobes)])
-    slopes = [
-        block.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
-    ]
-    for channel, target in enumerate(block.target):
-        k = np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=c.dtype)
-        parts = k[:, None] * terms
-        model = parts.sum(axis=0)
-        residual = target - metric.transform(model)
-        w = block.w
-        if metric.power == 1:
-            size = np.abs(target)
-            w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
-        if not metric.linear:
-            parts *= metric.slope(model)
-        here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
-        rows = np.empty((len(here), len(c)), dtype=c.dtype)
-        for row, i in zip(rows, here, strict=True):
-            u = unknowns[i]
-            if u.axis == COEFFICIENT:
-                row[:] = parts[u.lobe + 1]
-            else:
-                np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
-        weighted = rows * w
-        matrix[np.ix_(here, here)] += weighted @ rows.T
-        gradient[here] += weighted @ residual
 
 
 def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:
@@ -169,10 +163,7 @@ def _moved(bounds: Bounds, start: Mixture, unknowns: Sequence[Unknown], x: Float
             continue
         k = np.exp(value)
         (diffuse if u.lobe == DIFFUSE else lobes[u.lobe].k)[u.channel] = k if k > NOTHING else 0.0
-    return Mixture(diffuse, tuple(_tied(box, lobe) for box, lobe in zip(bounds.boxes, lobes, strict=False)))
-
-
-def _tied(box: Box, lobe: Candidate) -> Candidate:
-    if box.tied:
-        lobe.coordinates[NU] = lobe.coordinates[MU]
-    return lobe
+    for box, lobe in zip(bounds.boxes, lobes, strict=False):
+        if box.tied:
+            lobe.coordinates[NU] = lobe.coordinates[MU]
+    return Mixture(diffuse, tuple(lobes))

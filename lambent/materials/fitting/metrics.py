@@ -39,9 +39,7 @@ class Metric:
     name, unit, source : str
         Name, unit of E, and publication.
     cosine : "wi" or "wo"
-        Whose cosine multiplies f before the transform.
-    weigh_cos_i : bool
-        Whether |cos theta_i| multiplies the weight as well.
+        Whose cosine multiplies f before the transform; with "wo", |cos theta_i| multiplies the weight.
     transform, slope : callable
         T and its derivative, of f cos >= 0 in 1/sr.
     """
@@ -51,7 +49,6 @@ class Metric:
     source: str
     power: Literal[1, 2]
     cosine: Literal["wi", "wo"]
-    weigh_cos_i: bool
     transform: Callable[[Any], Any]
     slope: Callable[[Any], Any]
 
@@ -64,9 +61,7 @@ class Metric:
         """(w, c) of every tuple, each (N,)."""
         cos_i = np.abs(samples.wi[:, 2])
         w = samples.weight / samples.weight.sum()
-        if self.weigh_cos_i:
-            w = w * cos_i
-        return w, cos_i if self.cosine == "wi" else np.abs(samples.wo[:, 2])
+        return (w, cos_i) if self.cosine == "wi" else (w * cos_i, np.abs(samples.wo[:, 2]))
 
     def error(self, samples: MeasuredSamples, f_model: Floats) -> float:
         """E in `unit` of a model's f (N, C) in 1/sr at the tuples of `samples`."""
@@ -79,15 +74,14 @@ class Metric:
         return float(total ** (1 / self.power))
 
 
-L1 = Metric("l1", "1/sr", "thesis, eq. 3.7", 1, "wo", True, _same, _one)
-L2_NGAN = Metric("l2_ngan", "1/sr", "Ngan, Durand & Matusik 2005, section 3", 2, "wi", False, _same, _one)
+L1 = Metric("l1", "1/sr", "thesis, eq. 3.7", 1, "wo", _same, _one)
+L2_NGAN = Metric("l2_ngan", "1/sr", "Ngan, Durand & Matusik 2005, section 3", 2, "wi", _same, _one)
 CUBEROOT = Metric(
     "cuberoot",
     "(1/sr)^(1/3)",
     "Fores, Ferwerda & Gu 2012: cosine-weighted L2 of the cube root",
     2,
     "wi",
-    False,
     lambda x: np.cbrt(x + CUBEROOT_EPS),
     lambda x: np.cbrt(x + CUBEROOT_EPS) / (3 * (x + CUBEROOT_EPS)),
 )
@@ -97,7 +91,6 @@ LOG = Metric(
     "Low, Kronander, Ynnerman & Unger 2012: L2 of ln(1 + f cos)",
     2,
     "wi",
-    False,
     np.log1p,
     lambda x: 1 / (1 + x),
 )
@@ -118,12 +111,13 @@ def errors_of(samples: MeasuredSamples, f_model: Floats) -> dict[str, float]:
 def light_ratios(samples: MeasuredSamples, f_model: Floats) -> dict[Side, float]:
     """Light scattered to each side by a model with f (N, C), summed over the tuples, over the light measured there."""
     light = samples.weight * np.abs(samples.wo[:, 2])
-    sums = {
-        side: [float((light[here] @ f[here]).sum()) for f in (f_model, samples.f)]
-        for side in samples.sides
-        for here in (samples.on(side),)
-    }
-    return {side: modelled / measured for side, (modelled, measured) in sums.items() if measured > 0}
+    ratios: dict[Side, float] = {}
+    for side in samples.sides:
+        here = samples.on(side)
+        modelled, measured = (float((light[here] @ f[here]).sum()) for f in (f_model, samples.f))
+        if measured > 0:
+            ratios[side] = modelled / measured
+    return ratios
 
 
 def errors_and_shares(samples: MeasuredSamples, f_model: Floats) -> tuple[dict[str, float], dict[str, float]]:

@@ -24,7 +24,16 @@ from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.fitting.metrics import Metric
 from lambent.materials.fitting.slices import Slice
 from lambent.materials.measured.protocol import MeasuredSamples
-from lambent.materials.plots import DISK_PIXELS, SOURCE, colours_of, draw_rim, draw_source, new_figure, white_of
+from lambent.materials.plots import (
+    DISK_PIXELS,
+    SOURCE,
+    colours_of,
+    disk_places,
+    draw_rim,
+    draw_source,
+    new_figure,
+    white_of,
+)
 
 MEASURED, MODEL = "#1a7f37", "#c62828"
 COLUMNS = 4
@@ -62,14 +71,10 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
     every disk (theta_o from the centre to the rim); the bars are the brushing direction, along which the fitted lobe is
     narrower.
     """
-    thetas = sorted({entry.theta_deg for entry in gathered})
-    phis = sorted({entry.phi_deg for entry in gathered})
-    sides = (False, True) if transmits else (False,)
-    upright = len(phis) == 1
-    rows = len(sides) if upright else len(thetas) * len(sides)
-    columns = len(thetas) if upright else len(phis)
-    drawn = {(e.theta_deg, e.phi_deg, far): _disks(e, material, far) for e in gathered for far in sides}
-    white = white_of(disk for pair in drawn.values() for disk in pair)
+    placed, (rows, columns) = disk_places(gathered, transmits)
+    upright = len({entry.phi_deg for entry in gathered}) == 1
+    drawn = [_disks(entry, material, far) for entry, far, _ in placed]
+    white = white_of(disk for pair in drawn for disk in pair)
     size = min(1.5, 10 / columns) if upright else min(1.05, 5.2 / columns)
     if upright:
         figure = new_figure(columns * size + 1.2, 2 * rows * size + 1.3)
@@ -83,14 +88,12 @@ def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: b
         for ax in axes.flat:
             ax.set_axis_off()
         labelled = set()
-        for (theta_deg, phi_deg, far), pair in drawn.items():
+        for (entry, far, place), pair in zip(placed, drawn, strict=True):
+            theta_deg, phi_deg, ax = entry.theta_deg, entry.phi_deg, axes[place]
             across, down = (theta_deg, phi_deg) if upright else (phi_deg, theta_deg)
-            row = int(far) if upright else thetas.index(theta_deg) * len(sides) + int(far)
-            column = (thetas if upright else phis).index(across)
-            ax = axes[row, column]
             _show_disk(ax, pair[which] / white, theta_deg, phi_deg, _brushing(material))
             across_name, down_name = ("theta", "phi") if upright else ("phi", "theta")
-            if column == 0:
+            if place[1] == 0:
                 side = ("transmitted" if far else "reflected") if transmits else ""
                 text = side if upright else f"$\\{down_name}_i$ {down:g}°" + (f"\n{side}" if side else "")
                 ax.text(-1.3, 0, text, ha="right", va="center", fontsize=8, rotation=90 if upright else 0)

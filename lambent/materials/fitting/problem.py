@@ -17,7 +17,7 @@ from lambent.core.arrays import Floats
 from lambent.materials.bsdf import coupling
 from lambent.materials.document import Distribution, Side
 from lambent.materials.fitting.metrics import BLOCK, Metric
-from lambent.materials.fitting.parameters import from_search
+from lambent.materials.fitting.parameters import Box, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.fresnel import schlick_weight
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -84,13 +84,9 @@ class Problem:
         f = r0[..., None] + (1 - r0[..., None]) * self.schlick
         return f if self.side == "reflection" else 1 - f
 
-    def slope2(self, mx: float, my: float) -> Floats:
-        """(N,) q, the squared slope in units of the roughness."""
-        return self.slope_x2 / (mx * mx) + self.slope_y2 / (my * my)
-
     def density(self, mx: float, my: float) -> Floats:
         """(N,) the factor of a lobe that mx and my determine."""
-        q = self.slope2(mx, my)
+        q = self.slope_x2 / (mx * mx) + self.slope_y2 / (my * my)  # squared slope in units of the roughness
         logarithm = -2 * np.log1p(q) if self.distribution == "ggx" else -q
         return np.asarray(np.exp(self.base - np.log(mx * my) + logarithm))
 
@@ -173,6 +169,15 @@ class Problem:
         return parts
 
 
+@dataclass(frozen=True)
+class Found:
+    """The finished models of one side with one lobe, two, ..., and the boxes of their lobes."""
+
+    problem: Problem
+    boxes: tuple[Box, ...]
+    models: list[Mixture]
+
+
 def problem_of(
     samples: MeasuredSamples, side: Side, metric: Metric, distribution: Distribution, coupled: bool
 ) -> Problem:
@@ -194,7 +199,7 @@ def problem_of(
         -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d),
         np.log(np.maximum(cos_i * cos_o, 1e-12)),
         schlick_weight(cos_d),
-        diffuse_basis(cos_i, cos_o, coupled and side == "reflection"),
+        np.full_like(cos_o, 1 / np.pi) * (coupling(cos_i, cos_o) if coupled and side == "reflection" else 1.0),
         np.ascontiguousarray(samples.f[here].T.astype(np.float64)),
         w[here],
         c[here],
@@ -206,9 +211,3 @@ def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -
     here = samples.on(problem.side)
     w, c = metric.terms(samples)
     return replace(problem, metric=metric, w=w[here], c=c[here])
-
-
-def diffuse_basis(cos_i: Floats, cos_o: Floats, coupled: bool) -> Floats:
-    """f in 1/sr of the diffuse term with coefficient 1."""
-    flat = np.full_like(cos_o, 1 / np.pi)
-    return np.asarray(flat * coupling(cos_i, cos_o)) if coupled else flat

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.materials.fitting.metrics import Metric
 
 TINY = 1e-30
@@ -26,6 +26,9 @@ class Channel:
     background: Floats
     w: Floats
     c: Floats
+
+    def at(self, chosen: Flags) -> Channel:
+        return Channel(self.measured[chosen], self.background[chosen], self.w[chosen], self.c[chosen])
 
 
 def weighted_median(values: Floats, weights: Floats) -> Floats:

@@ -96,14 +96,10 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
     rest = diffuse[:, None] * problem.diffuse
     for number, other in enumerate(material.lobes):
         if number != index and other.side == lobe.side:
-            rest = rest + np.array(other.k)[:channels, None] * _basis(problem, other)
+            shape = np.array([other.mx, other.my, float(np.mean(other.r0)), other.alpha])
+            basis = replace(problem, distribution=other.distribution).basis(shape)
+            rest = rest + np.array(other.k)[:channels, None] * basis
     return problem, rest
-
-
-def _basis(problem: Problem, lobe: Lobe) -> Floats:
-    """(N,) f of the lobe with coefficient 1 and the mean of r0 over the channels."""
-    shape = np.array([lobe.mx, lobe.my, float(np.mean(lobe.r0)), lobe.alpha])
-    return replace(problem, distribution=lobe.distribution).basis(shape)
 
 
 def _slice(problem: Problem, rest: Floats, lobe: Lobe, plane: tuple[str, str], steps: int, progress: Progress) -> Slice:

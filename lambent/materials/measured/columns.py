@@ -20,17 +20,16 @@ from lambent.core.directions import Floats, direction
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 from lambent.materials.measured import gonio_text
-from lambent.materials.measured.gonio_rows import LONGEST_NAME, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.table import isotropic_brdf, require_values, usable_values
 from lambent.materials.measured.text_numbers import (
-    HINT_DECIMAL_COMMA,
-    has_decimal_commas,
     head_text,
     numbers,
     read_text,
+    refuse_decimal_commas,
     shown,
     without_comments,
 )
@@ -96,7 +95,7 @@ def read(path: Path) -> MeasuredTable:
     """
     names, body = _split(read_text(path))
     if names is None:
-        _refuse_decimal_commas(body, path)
+        refuse_decimal_commas(body, path)
         first = shown(body.strip().split(b"\n")[0])
         got = f"{len(_SEPARATORS.split(first.strip()))} columns without names"
         raise UserError("nothing says which quantity the columns hold", file=path, got=got, hint=HINT_QUANTITY)
@@ -153,21 +152,15 @@ def layout_of(names: list[str], path: Path) -> Layout:
     if len(words) > 1 and all(nm):
         wavelengths = tuple(float(found[1]) for found in nm if found)
         return Layout(angles, columns, quantity_of(_WAVELENGTH.sub("", words[0])), "spectra", wavelengths, radians)
-    for kind in ("rgb", "xyz"):
-        stems = {_stem(word, channel) for word, channel in zip(words, kind, strict=False)}
-        if len(words) == 3 and len(stems) == 1 and None not in stems:
-            return Layout(angles, columns, quantity_of(stems.pop() or ""), kind, (), radians)
     if len(words) == 1:
         return Layout(angles, columns, quantity_of(words[0]), "grey", (), radians)
+    for kind in ("rgb", "xyz"):
+        named = [re.fullmatch(rf"(?:(.*)_)?{channel}", word) for word, channel in zip(words, kind, strict=False)]
+        stems = {found[1] or "" for found in named if found}
+        if len(words) == 3 and all(named) and len(stems) == 1:
+            return Layout(angles, columns, quantity_of(stems.pop()), kind, (), radians)
     expected = "one column, three (r g b or x y z), or one per wavelength (such as 550nm)"
     raise UserError("value columns are of no known kind", file=path, got=" ".join(words) or "none", expected=expected)
-
-
-def _stem(word: str, channel: str) -> str | None:
-    """The word without its channel: brdf for brdf_r, "" for r, None for another channel."""
-    if word == channel:
-        return ""
-    return word[:-2] if word.endswith(f"_{channel}") else None
 
 
 def _angle(name: str) -> str | None:
@@ -186,7 +179,7 @@ def _angle(name: str) -> str | None:
 
 def rows_of(body: bytes, columns: int, path: Path) -> Floats:
     """(N, columns) numbers, separated by blanks, commas or semicolons."""
-    _refuse_decimal_commas(body, path)
+    refuse_decimal_commas(body, path)
     flat = numbers(re.sub(rb"[,;]", b" ", body), path)
     lines = sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
     if lines == 0:
@@ -195,11 +188,6 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
         got = f"{len(flat)} numbers in {lines} rows"
         raise UserError("a row has another number of columns than names", file=path, got=got, expected=columns)
     return flat.reshape(-1, columns)
-
-
-def _refuse_decimal_commas(body: bytes, path: Path) -> None:
-    if has_decimal_commas(body):
-        raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
 
 
 def assemble(
@@ -228,8 +216,7 @@ def assemble(
             f = np.repeat(f, 3, axis=1)
         info = isotropic_brdf(path, reader, {"samples": len(rows)}, notes + said)
         return ScatteredTable(wi, wo, f, info)
-    stored = layout.quantity or "f"
-    return table_of(Rows(angles, f, path, reader, name, stored, notes=notes + said))
+    return table_of(angles, f, path, reader, name, stored=layout.quantity or "f", notes=notes + said)
 
 
 def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.directions import Floats, direction
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured
@@ -59,15 +59,10 @@ def read(path: Path) -> ScatteredTable:
     theta = rows[:, [0, 2]]
     if not (np.isfinite(rows[:, :4]).all() and (theta >= 0).all() and (theta <= np.pi / 2 + 1e-3).all()):
         raise UserError("an angle is outside its range", file=path, expected="theta in [0, pi/2], radians")
-    return _table(rows, wavelengths, path)
-
-
-def _table(rows: Floats, wavelengths_nm: Floats, path: Path) -> ScatteredTable:
-    """The table of rows (N, 4 + K): theta_i, phi_i, theta_o, phi_o in radians, then f at K wavelengths."""
     spectra = rows[:, 4:]
     usable = usable_values(spectra)
     require_values(spectra, usable, path)
-    rgb, notes = rgb_of_measured(spectra, usable, wavelengths_nm)
-    sizes = {"samples": len(rows), "wavelengths": len(wavelengths_nm)}
+    rgb, notes = rgb_of_measured(spectra, usable, wavelengths)
+    sizes = {"samples": len(rows), "wavelengths": count}
     wi, wo = direction(rows[:, 0], rows[:, 1]), direction(rows[:, 2], rows[:, 3])
     return ScatteredTable(wi, wo, rgb, isotropic_brdf(path, NAME, sizes, notes))

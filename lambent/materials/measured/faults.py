@@ -1,9 +1,6 @@
-"""Faults of a measured table: each as a number, and as a sentence where it matters."""
+"""Faults of a measured table: each as a number, and as a list with a sentence where it matters, else none."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,96 +21,81 @@ _RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last
 _NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
+_REASONS = {"shadowed": "not measured, or below the horizon", "not_finite": "not finite", "negative": "negative"}
 
 
-@dataclass(frozen=True)
-class Retro:
-    """f in the light's direction over f 18 to 24 degrees beside it, and at which theta_i."""
-
-    ratio: float
-    theta_i_deg: float
-
-
-@dataclass(frozen=True)
-class Peak:
-    """A lobe narrower than the steps it was measured in.
-
-    Attributes
-    ----------
-    value, beside : float
-        f in 1/sr of the brightest tuple, and the mean f of its neighbours.
-    step_deg : float
-        Mean distance to the neighbours.
-    """
-
-    theta_i_deg: float
-    phi_i_deg: float
-    value: float
-    beside: float
-    step_deg: float
+def left_out(samples: MeasuredSamples) -> tuple[dict[str, float], list[str]]:
+    """Percentage of the tuples that are left out, by the reasons of `LeftOut`."""
+    counts, total = samples.left_out, len(samples) + samples.left_out.total
+    percent = {name: 100 * getattr(counts, name) / total for name in _REASONS}
+    said = [f"{_percent(percent[name])} of the tuples are {what}, and left out" for name, what in _REASONS.items()]
+    return percent, [line for line, share in zip(said, percent.values(), strict=True) if share > 0]
 
 
-def non_reciprocity(table: MeasuredTable) -> float:
+def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
     """Mean of |f(wi, wo) - f(wo, wi)| over the mean of f, for even pairs and pairs near the mirror direction."""
     u = np.concatenate([r2(_PAIRS), r2(_PAIRS, (0.25, 0.75))], axis=1)
     wi, wo = (_within_reach(u[:, k : k + 2]) for k in (0, 2))
     near = direction(*_mirrored(wi, u[:, 2:]))
     pairs = (np.concatenate([wi, wi]), np.concatenate([wo, near]))
-    return _difference(table.eval(*pairs), table.eval(*pairs[::-1]))
+    difference = _difference(table.eval(*pairs), table.eval(*pairs[::-1]))
+    said = f"swapping light and viewer changes f by {_percent(100 * difference)} on average"
+    return difference, [
+        f"{said}: a reciprocal model cannot fit closer than that"
+    ] if difference > NON_RECIPROCAL else []
 
 
-def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> float:
+def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str]]:
     """Deviation of a table from the symmetry it claims: mean |f - f of the mirrored pair| over the mean of f.
 
     An isotropic material is symmetric about any plane of incidence, a quadrant one about x = 0 and y = 0; a table over
     half a turn can be tested only with light along the normal.
     """
-    if symmetry == "none":
-        return 0.0
     wo = _within_reach(r2(_PAIRS))
     theta_i = np.radians(np.linspace(0, _REACH_DEG, _PAIRS))
-    if symmetry == "half":
-        wi = np.broadcast_to(np.array([0.0, 0.0, 1.0]), wo.shape)
-        return _difference(table.eval(wi, wo), table.eval(wi, wo * HALF_TURN))
-    pairs = [(direction(theta_i, 0.0), np.array([1.0, -1.0, 1.0]))]
-    if symmetry == "quadrant":
-        pairs.append((direction(theta_i, np.pi / 2), np.array([-1.0, 1.0, 1.0])))
-    return max(_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs)
+    across_y = (direction(theta_i, 0.0), np.array([1.0, -1.0, 1.0]))
+    across_x = (direction(theta_i, np.pi / 2), np.array([-1.0, 1.0, 1.0]))
+    turned = (direction(np.zeros(_PAIRS), 0.0), HALF_TURN)
+    pairs = {"isotropic": [across_y], "quadrant": [across_y, across_x], "half": [turned], "none": []}[symmetry]
+    off = max((_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs), default=0.0)
+    said = f"is taken as {symmetry}, but mirrored directions differ by {_percent(100 * off)} of the mean"
+    return off, [said] if off > ASYMMETRIC else []
 
 
-def retro(table: MeasuredTable, samples: MeasuredSamples) -> Retro | None:
-    """The peak towards the light, if any: f falls from ring to ring about the light.
+def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[str]]:
+    """f in the light's direction over f 18 to 24 degrees beside it; 1 unless f falls from ring to ring about the light.
 
     A table with a grid of incident directions is tested at those, so that interpolation neither makes nor hides a peak.
     A ring counts by its median over azimuth, so that neither a lobe elsewhere nor one wrong reading counts. The peak
     must stand at most incident directions, and measured tuples near the light must show it too: the lamp often hides
     them, and `eval` then guesses.
     """
-    if not _brighter_near_light(samples):
-        return None
     found = []
-    for theta_deg, phi_deg in _asked(table):
+    for theta_deg, phi_deg in _asked(table) if _brighter_near_light(samples) else []:
         rings = _rings(table, direction(np.radians(theta_deg), np.radians(phi_deg)))
         falling = bool((np.diff(rings[:-1]) <= 0).all()) and rings[1] > rings[-2]
         beside = max(float(rings[-2:].mean()), 1e-9)
         found.append((float(rings[0]) / beside if falling else 1.0, theta_deg))
-    if not found:
-        return None
+    if not found or np.median([ratio for ratio, _ in found]) < RETRO_RATIO:
+        return 1.0, []
     ratio, theta_i = max(found)
-    often = float(np.median([ratio for ratio, _ in found]))
-    return Retro(ratio, theta_i) if often >= RETRO_RATIO else None
+    return ratio, [
+        f"is retro-reflective: at theta_i = {theta_i:.3g} degrees f towards the light is {ratio:.3g} times what it is "
+        '20 degrees beside it; look it up with reconstruction="quadrilinear", as aligning on the half vector moves '
+        "that peak"
+    ]
 
 
-def under_sampled(samples: MeasuredSamples) -> list[Peak]:
-    """The incident directions whose brightest tuple is isolated: its four neighbours reach less than half of it."""
+def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:
+    """Number of incident directions whose brightest tuple is isolated: its four neighbours reach less than half."""
     from scipy.spatial import cKDTree
 
     key = np.round(samples.wi, 5)
     if len(np.unique(key[:, 2])) > _MOST_INCIDENT:
-        return []
+        return 0, []
     incident, which = np.unique(key, axis=0, return_inverse=True)
     if len(incident) > _MOST_INCIDENT:
-        return []
+        return 0, []
     peaks = []
     for _, rows in groups(which, np.arange(len(which))):
         points, first = np.unique(np.round(samples.wo[rows], 6), axis=0, return_index=True)
@@ -124,62 +106,22 @@ def under_sampled(samples: MeasuredSamples) -> list[Peak]:
         distance, near = cKDTree(points).query(points[top], k=5)
         beside = float(f[near[1:]].mean())
         if beside < UNDER_SAMPLED * f[top]:
-            theta, phi = angles(samples.wi[rows[0]])
-            step = float(np.degrees(distance[1:].mean()))
-            peaks.append(Peak(float(np.degrees(theta)), float(np.degrees(phi)), float(f[top]), beside, step))
-    return peaks
-
-
-def in_words(
-    *,
-    counts: dict[str, float],
-    albedo: tuple[Floats, Floats],
-    non_reciprocal: float,
-    claimed: tuple[Symmetry, float],
-    towards_light: Retro | None,
-    peaks: Sequence[Peak],
-) -> list[str]:
-    """A sentence with its number for every fault that matters.
-
-    Parameters
-    ----------
-    counts : dict
-        Why tuples were left out -> their share in percent.
-    albedo : ((A,), (A, C))
-        theta_i in degrees and the light returned.
-    claimed : (symmetry, asymmetry)
-    """
-    said = [f"{_percent(share)} of the tuples are {what}, and left out" for what, share in counts.items() if share > 0]
-    said += _too_bright(*albedo)
-    if non_reciprocal > NON_RECIPROCAL:
-        said.append(
-            f"swapping light and viewer changes f by {_percent(100 * non_reciprocal)} on average: "
-            "a reciprocal model cannot fit closer than that"
-        )
-    symmetry, off = claimed
-    if off > ASYMMETRIC:
-        said.append(f"is taken as {symmetry}, but mirrored directions differ by {_percent(100 * off)} of the mean")
-    if towards_light is not None:
-        said.append(
-            f"is retro-reflective: at theta_i = {towards_light.theta_i_deg:.3g} degrees f towards the light is "
-            f"{towards_light.ratio:.3g} times what it is 20 degrees beside it; look it up with "
-            'reconstruction="quadrilinear", as aligning on the half vector moves that peak'
-        )
-    if peaks:
-        worst = min(peaks, key=lambda peak: peak.beside / peak.value)
-        where = f"theta_i = {worst.theta_i_deg:.3g}, phi_i = {worst.phi_i_deg:.3g} degrees"
-        said.append(
-            f"the peak is under-sampled at {len(peaks)} incident directions: at {where} f falls from {worst.value:.3g} "
-            f"to {worst.beside:.3g} /sr within one step of {worst.step_deg:.2g} degrees"
-        )
-    return said
+            peaks.append((beside / f[top], rows[0], float(f[top]), beside, float(np.degrees(distance[1:].mean()))))
+    if not peaks:
+        return 0, []
+    _, row, highest, beside, step_deg = min(peaks, key=lambda peak: peak[0])
+    theta, phi = np.degrees(angles(samples.wi[row]))
+    return len(peaks), [
+        f"the peak is under-sampled at {len(peaks)} incident directions: at theta_i = {theta:.3g}, phi_i = {phi:.3g} "
+        f"degrees f falls from {highest:.3g} to {beside:.3g} /sr within one step of {step_deg:.2g} degrees"
+    ]
 
 
 def _percent(value: float) -> str:
     return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
 
 
-def _too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
+def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
     """A line where more light returns than arrives."""
     if not (albedo > 1).any():
         return []

@@ -23,7 +23,7 @@ from lambent.core.arrays import Floats, Indices
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 from lambent.materials.measured.gonio import GonioTable
-from lambent.materials.measured.gonio_rows import Rows, check_angles, table_of
+from lambent.materials.measured.gonio_rows import check_angles, table_of
 from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "FRED BSDF text"
@@ -58,7 +58,7 @@ def read(path: Path) -> GonioTable:
     with np.errstate(over="ignore", invalid="ignore"):
         f = (10 ** rows[:, 2:] if units["bsdf"] == "log" else rows[:, 2:]) * scale
     f = np.where(np.isfinite(f), f, np.nan)
-    return table_of(Rows(angles, f, path, NAME, Path(path).stem))
+    return table_of(angles, f, path, NAME, Path(path).stem)
 
 
 def _options(words: bytes, path: Path) -> tuple[dict[str, str], float]:

@@ -17,10 +17,9 @@ import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.directions import FLIP_Z, angles, direction, half_vector, raised, reflect
-from lambent.materials.measured.protocol import MeasuredSamples, Quantity, TableInfo, collect
+from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, Quantity, TableInfo, collect
 from lambent.materials.measured.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.table import (
-    IntegratedTable,
     bracket,
     mirrored_to_range,
     on_flat_pairs,
@@ -40,7 +39,7 @@ _STEEPEST = 4.0  # times f of a neighbour: limit where wo is at the horizon and 
 
 
 @dataclass(frozen=True)
-class GonioTable(IntegratedTable):
+class GonioTable(MeasuredTable):
     """A gonio-photometer's table.
 
     Attributes

@@ -6,7 +6,6 @@ Incident directions form a grid. The outgoing directions of each may form anothe
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -31,30 +30,6 @@ LONGEST_NAME = 64  # of a column
 DECIMALS = 5  # of the angles in degrees: closer directions are the same
 _LEAST_FILLED = 0.3  # share of its nodes that a grid of outgoing directions must have, or it is a scattered set
 _PLANE_DEG = 0.1  # a scan this close to the plane of incidence is in it
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Measurements with the metadata of their file.
-
-    Attributes
-    ----------
-    angles_deg : (N, 4)
-        theta_i, phi_i, theta_o, phi_o in absolute directions; theta_o > 90 is on the far side.
-    f : (N, C)
-        1/sr, NaN where it was not measured.
-    symmetry : str, optional
-        As the file names it.
-    """
-
-    angles_deg: Floats
-    f: Floats
-    path: Path
-    format: str
-    name: str
-    stored: Quantity = "f"
-    symmetry: str | None = None
-    notes: tuple[str, ...] = ()
 
 
 def check_angles(angles_deg: Floats, path: Path) -> None:
@@ -86,8 +61,27 @@ def to_f(values: Floats, quantity: Quantity, theta_o_deg: Floats) -> Floats:
         return np.divide(values, cos_o, out=np.full_like(values, np.nan), where=cos_o > 1e-6)
 
 
-def table_of(rows: Rows) -> GonioTable:
+def table_of(
+    angles_deg: Floats,
+    f: Floats,
+    path: Path,
+    format: str,
+    name: str,
+    *,
+    stored: Quantity = "f",
+    named: str | None = None,
+    notes: tuple[str, ...] = (),
+) -> GonioTable:
     """The table of single measurements.
+
+    Parameters
+    ----------
+    angles_deg : (N, 4)
+        theta_i, phi_i, theta_o, phi_o in absolute directions; theta_o > 90 is on the far side.
+    f : (N, C)
+        1/sr, NaN where it was not measured.
+    named : str, optional
+        The symmetry as the file names it.
 
     Raises
     ------
@@ -95,10 +89,12 @@ def table_of(rows: Rows) -> GonioTable:
         The symmetry is unknown or contradicted, the incident directions do not form a grid, or one of them has no
         measured value.
     """
-    angles = np.round(rows.angles_deg, DECIMALS)
+    angles = np.round(angles_deg, DECIMALS)
     theta_i, phi_i = np.unique(angles[:, 0]), np.unique(angles[:, 1])
-    symmetry, notes = _symmetry(rows, phi_i)
-    f, images = rows.f, np.zeros(len(angles), dtype=bool)
+    symmetry = spanned_symmetry(phi_i) if named is None else _checked_symmetry(named, phi_i, path)
+    if named is None:
+        notes += (f"symmetry not stated, taken as {symmetry} from phi_i",)
+    images = np.zeros(len(angles), dtype=bool)
     if symmetry == "isotropic":
         angles[:, 3] -= angles[:, 1]
         angles[:, 1], phi_i = 0, np.zeros(1)
@@ -106,23 +102,15 @@ def table_of(rows: Rows) -> GonioTable:
     far = angles[:, 2] > 90
     angles[far, 2] = np.round(180 - angles[far, 2], DECIMALS)
     angles[:, 3] = np.round(angles[:, 3] % 360, DECIMALS) % 360
-    angles[angles[:, 2] == 0, 3] = np.where(_pole_repeats(angles), angles[angles[:, 2] == 0, 3], 0)
-    (angles, far, images), f, repeated = _averaged((angles, far, images), f)
+    at_pole = angles[:, 2] == 0
+    if len(np.unique(angles[at_pole, 3])) == 1:  # else the file gives theta_o = 0 as ordinary nodes of the grid
+        angles[at_pole, 3] = 0
+    angles, f, far, images, repeated = _averaged(angles, f, far, images)
     if repeated:
         notes += (f"{repeated} measurements repeat a direction; their mean was taken",)
-    sides = tuple(_side(angles[side], f[side], images[side], (theta_i, phi_i), rows.path) for side in (~far, far))
-    return GonioTable(
-        name=rows.name,
-        file=Path(rows.path).name,
-        theta_i_deg=theta_i,
-        phi_i_deg=phi_i,
-        reflected=sides[0],
-        transmitted=sides[1],
-        symmetry=symmetry,
-        stored=rows.stored,
-        notes=rows.notes + notes,
-        format=rows.format,
-    )
+    near, beyond = (_side(angles[side], f[side], images[side], (theta_i, phi_i), path) for side in (~far, far))
+    file = Path(path).name
+    return GonioTable(name, theta_i, phi_i, near, beyond, symmetry, stored, file=file, notes=notes, format=format)
 
 
 def spanned_symmetry(phi_i_deg: Floats) -> Symmetry:
@@ -131,18 +119,14 @@ def spanned_symmetry(phi_i_deg: Floats) -> Symmetry:
     return next((name for name, whole in PHI_I_RANGE_DEG.items() if span <= whole), "none")
 
 
-def _symmetry(rows: Rows, phi_i_deg: Floats) -> tuple[Symmetry, tuple[str, ...]]:
-    """The symmetry the file names, else the one that the phi_i span, with a note."""
-    if rows.symmetry is None:
-        spanned = spanned_symmetry(phi_i_deg)
-        return spanned, (f"symmetry not stated, taken as {spanned} from phi_i",)
-    named, path = rows.symmetry, rows.path
+def _checked_symmetry(named: str, phi_i_deg: Floats, path: Path) -> Symmetry:
+    """The symmetry the file names, or a `UserError` where the phi_i span more."""
     symmetry = cast(Symmetry, known("symmetry", named, PHI_I_RANGE_DEG, file=path, field="symmetry"))
     if phi_i_deg[-1] - phi_i_deg[0] > PHI_I_RANGE_DEG[symmetry]:
         got = f"phi_i from {phi_i_deg[0]:g} to {phi_i_deg[-1]:g}"
         expected = f"a span of at most {PHI_I_RANGE_DEG[symmetry]:g} degrees"
         raise UserError("phi_i spans more than the symmetry", file=path, field=symmetry, got=got, expected=expected)
-    return symmetry, ()
+    return symmetry
 
 
 def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
@@ -157,14 +141,8 @@ def _mirrored(angles_deg: Floats, f: Floats) -> tuple[Floats, Floats, Flags]:
     return np.concatenate([angles_deg, angles_deg[inner] * (1, 1, 1, -1)]), np.concatenate([f, f[inner]]), images
 
 
-def _pole_repeats(angles_deg: Floats) -> bool:
-    """Whether the file gives theta_o = 0 at several phi_o, which are then ordinary nodes of the grid."""
-    return len(np.unique(angles_deg[angles_deg[:, 2] == 0, 3])) > 1
-
-
-def _averaged(rows: tuple[Floats, Flags, Flags], f: Floats) -> tuple[tuple[Floats, Flags, Flags], Floats, int]:
-    """Angles, side and image of the rows sorted by direction, their f with repeats averaged, and how many repeat."""
-    angles, far, images = rows
+def _averaged(angles: Floats, f: Floats, far: Flags, images: Flags) -> tuple[Floats, Floats, Flags, Flags, int]:
+    """The rows sorted by direction, with f of repeats averaged, and how many repeat."""
     order = np.lexsort((angles[:, 3], angles[:, 2], angles[:, 1], angles[:, 0], far))
     angles, f, far, images = angles[order], f[order], far[order], images[order]
     same = (angles[1:] == angles[:-1]).all(axis=1) & (far[1:] == far[:-1])
@@ -174,7 +152,7 @@ def _averaged(rows: tuple[Floats, Flags, Flags], f: Floats) -> tuple[tuple[Float
         total = np.add.reduceat(np.where(usable, f, 0), first, axis=0)
         count = np.add.reduceat(usable, first, axis=0, dtype=np.int64)
         f = np.divide(total, count, out=np.full_like(total, np.nan), where=count > 0)
-    return (angles[first], far[first], images[first]), f, int(same.sum())
+    return angles[first], f, far[first], images[first], int(same.sum())
 
 
 def _side(angles_deg: Floats, f: Floats, images: Flags, incident_deg: tuple[Floats, Floats], path: Path) -> Sheets:

@@ -21,7 +21,7 @@ from lambent.core.directions import Floats, angles
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
 from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
-from lambent.materials.measured.gonio_rows import QUANTITIES, Rows, check_angles, quantity_of, table_of, to_f
+from lambent.materials.measured.gonio_rows import QUANTITIES, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.protocol import Quantity
 from lambent.materials.measured.sheets import Sheet
 from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text, shown
@@ -63,20 +63,15 @@ def read(path: Path) -> GonioTable:
     names = _names(content[:_HEADER_BYTES])
     if names is None or tuple(names[:4]) != ANGLES:
         raise UserError("first line that is no comment must name the columns", file=path, expected=" ".join(ANGLES))
-    quantity = _quantity(names[4:], path)
+    if names[4:] not in _VALUE_COLUMNS:
+        known, got = [" ".join(columns) for columns in _VALUE_COLUMNS], " ".join(names[4:]) or "none"
+        raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
+    quantity = QUANTITIES[_VALUE_COLUMNS.index(names[4:]) % len(QUANTITIES)]
     rows = _rows(content, len(names), path)
     values = np.where(rows[:, 4:] == _NOT_MEASURED, np.nan, rows[:, 4:])
     f, keys = to_f(values, quantity, rows[:, 2]), _keys(content[:_HEADER_BYTES])
-    name, symmetry = keys.get("name", Path(path).stem), keys.get("symmetry")
-    return table_of(Rows(rows[:, :4], f, path, NAME, name, quantity, symmetry))
-
-
-def _quantity(columns: list[str], path: Path) -> Quantity:
-    if columns not in _VALUE_COLUMNS:
-        known = [" ".join(names) for names in _VALUE_COLUMNS]
-        got = " ".join(columns) or "none"
-        raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
-    return QUANTITIES[_VALUE_COLUMNS.index(columns) % len(QUANTITIES)]
+    name = keys.get("name", Path(path).stem)
+    return table_of(rows[:, :4], f, path, NAME, name, stored=quantity, named=keys.get("symmetry"))
 
 
 def _rows(content: bytes, columns: int, path: Path) -> Floats:

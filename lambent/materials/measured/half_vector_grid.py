@@ -165,14 +165,14 @@ class HalfVectorGrid:
             cell = ((page + node) * shape.theta_h + row) * shape.phi_h + column
             of_h = of_h + weight * ops.gather(self.density, cell)
         value = DIFFUSE * ops.abs(wi[2]) / np.pi + (1 - DIFFUSE) * of_h / (4 * ops.maximum(cos_d, 1e-6))
-        across = self._share_across(viewers, ops)
+        across = self.share_across(wo, ops, viewers)
         value = value * ops.select(wi[2] * wo[2] < 0, across, 1 - across)
         return ops.select(self._seen(wi, wo, ops), value, 0.0)
 
     def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
         """wi; u_* uniform in [0, 1). A sample at or across the horizon comes back with wi.z = 0."""
         shape, viewers = self.shape, self._viewers(wo, ops)
-        across, u_select = chosen_side(u_select, self._share_across(viewers, ops), ops)
+        across, u_select = chosen_side(u_select, self.share_across(wo, ops, viewers), ops)
         diffuse = u_select < DIFFUSE
         u_select = (u_select - DIFFUSE) / (1 - DIFFUSE)
 
@@ -193,9 +193,10 @@ class HalfVectorGrid:
         z = ops.select(z > COS_MIN, z, 0.0)
         return x, y, ops.select((wo[2] > 0) == across, -z, z)
 
-    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
-        """Probability of a transmitted sample."""
-        return self._share_across(self._viewers(wo, ops), ops)
+    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
+        """Probability of a transmitted sample; `viewers` are those around wo, where they are known."""
+        viewers = viewers or self._viewers(wo, ops)
+        return viewers.blend(self.across, viewers.face * self.shape.viewers, ops)
 
     def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
         """Share of the light that is reflected or transmitted, mean over the channels, between the viewer nodes."""
@@ -254,9 +255,6 @@ class HalfVectorGrid:
     def _seen(self, wi: Vector, wo: Vector, ops: ArrayOps) -> Any:
         off_horizon = (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN)
         return off_horizon & ((wi[2] * wo[2] > 0) | (self.kinds == 2))
-
-    def _share_across(self, viewers: _Viewers, ops: ArrayOps) -> Any:
-        return viewers.blend(self.across, viewers.face * self.shape.viewers, ops)
 
 
 def turns(y: Any, x: Any, ops: ArrayOps) -> Any:

@@ -13,7 +13,6 @@ from lambent.materials.measured.gonio import GonioTable, Symmetry
 from lambent.materials.measured.protocol import MeasuredTable
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
-_REASONS = {"not measured": "not measured, or below the horizon"}
 
 
 def inspect_table(table: MeasuredTable) -> dict[str, Any]:
@@ -33,12 +32,13 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     info, samples = table.info, table.samples()
     wi = direction(np.radians(_THETA_I_DEG), 0.0)
     r, t = table.reflectivity(wi), table.transmissivity(wi)
-    left_out, count = samples.left_out, len(samples) + samples.left_out.total
-    counts = {"not measured": left_out.shadowed, "not finite": left_out.not_finite, "negative": left_out.negative}
-    percent = {what: 100 * number / count for what, number in counts.items()}
     symmetry = symmetry_of(table)
-    non_reciprocal, off = faults.non_reciprocity(table), faults.asymmetry(table, symmetry)
-    towards_light, peaks = faults.retro(table, samples), faults.under_sampled(samples)
+    percent, unusable = faults.left_out(samples)
+    non_reciprocal, not_mutual = faults.non_reciprocity(table)
+    off, asymmetric = faults.asymmetry(table, symmetry)
+    retro_ratio, towards_light = faults.retro(table, samples)
+    isolated, under_sampled = faults.under_sampled(samples)
+    too_bright = faults.too_bright(np.array(_THETA_I_DEG), r + t)
     return {
         "file": info.file,
         "format": info.format,
@@ -53,24 +53,19 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "reflectivity": r.round(5).tolist(),
             "transmissivity": t.round(5).tolist(),
         },
-        "tuples": {"used": len(samples), **asdict(left_out)},
+        "tuples": {"used": len(samples), **asdict(samples.left_out)},
         "faults": {
-            **{f"{what.replace(' ', '_')}_percent": share for what, share in percent.items()},
+            "not_measured_percent": percent["shadowed"],
+            "not_finite_percent": percent["not_finite"],
+            "negative_percent": percent["negative"],
             "albedo_max": float((r + t).max()),
             "energy_above_one": bool((r + t).max() > 1),
             "non_reciprocal_percent": 100 * non_reciprocal,
             "asymmetry_percent": 100 * off,
-            "retro_ratio": towards_light.ratio if towards_light else 1.0,
-            "under_sampled": len(peaks),
+            "retro_ratio": retro_ratio,
+            "under_sampled": isolated,
         },
-        "findings": faults.in_words(
-            counts={_REASONS.get(what, what): share for what, share in percent.items()},
-            albedo=(np.array(_THETA_I_DEG), r + t),
-            non_reciprocal=non_reciprocal,
-            claimed=(symmetry, off),
-            towards_light=towards_light,
-            peaks=peaks,
-        ),
+        "findings": [*unusable, *too_bright, *not_mutual, *asymmetric, *towards_light, *under_sampled],
     }
 
 

@@ -205,7 +205,8 @@ class PatchMatrix:
         difference, size = 0.0, 0.0
         for a, n_i in enumerate(self.incident.n_phis):
             for b, n_o in enumerate(self.outgoing.n_phis):
-                block = self._block(a, b)
+                i, o = self.incident.starts[a], self.outgoing.starts[b]
+                block = self.f[o : o + n_o, i : i + n_i]
                 for turn in _TURNS_DEG:
                     steps = np.array([n_o, n_i]) * turn / 360
                     whole = steps.round().astype(int)
@@ -216,10 +217,6 @@ class PatchMatrix:
         if size > 0:
             return difference / size
         return np.inf if not self.dark else 0.0
-
-    def _block(self, ring_i: int, ring_o: int) -> Floats:
-        i, o = self.incident.starts[ring_i], self.outgoing.starts[ring_o]
-        return self.f[o : o + self.outgoing.n_phis[ring_o], i : i + self.incident.n_phis[ring_i]]
 
     @property
     def direct_share(self) -> float:

@@ -7,8 +7,8 @@ are the entities it could define; the number of elements, their depth and the le
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
@@ -19,41 +19,11 @@ _ROOT_TAG = re.compile(rb"<([\w.-]{1,64}:)?WindowElement[\s>/]")
 _LONG_TAG = re.compile(rb"<[A-Za-z_:][^<>]{8192}")
 _MOST_ELEMENTS, _DEEPEST, _LONGEST_FIELD = 50_000, 64, 10_000
 
-_LAYER = f"{ROOT}/Optical/Layer"
-_BASIS = f"{_LAYER}/DataDefinition/AngleBasis"
-_RING = f"{_BASIS}/AngleBasisBlock"
-_DATA = f"{_LAYER}/WavelengthData"
-_BLOCK = f"{_DATA}/WavelengthDataBlock"
+Texts = dict[str, str]
+"""Text by the name of its element."""
 
 
-@dataclass
-class Basis:
-    """An angle basis as the file defines it, as text.
-
-    Attributes
-    ----------
-    rings : list of dict
-        `nPhis`, `LowerTheta` and `UpperTheta`, where given.
-    """
-
-    name: str = ""
-    rings: list[dict[str, str]] = field(default_factory=list)
-
-
-@dataclass
-class Block:
-    """One ScatteringData and its metadata; "" where the file gives none."""
-
-    wavelength: str = ""
-    direction: str = ""
-    columns: str = ""
-    rows: str = ""
-    angles: str = ""
-    quantity: str = ""
-    text: bytes = b""
-
-
-@dataclass
+@dataclass(frozen=True)
 class Document:
     """Content of the first layer with data.
 
@@ -61,41 +31,18 @@ class Document:
     ----------
     structure : str
         IncidentDataStructure: Columns, Rows, TensorTree3 or TensorTree4.
-    name, maker : str
-        Of the material.
     layers : int
         Number of layers in the file.
+    bases : list of (str, list of dict)
+        Name of an angle basis, and `nPhis`, `LowerTheta` and `UpperTheta` of its rings, where given.
+    blocks : list of dict
+        Text of the elements of a WavelengthDataBlock, and its `Wavelength`, where given.
     """
 
-    structure: str = ""
-    name: str = ""
-    maker: str = ""
-    layers: int = 0
-    bases: list[Basis] = field(default_factory=list)
-    blocks: list[Block] = field(default_factory=list)
-
-
-_OF_DOCUMENT = {
-    f"{_LAYER}/DataDefinition/IncidentDataStructure": "structure",
-    f"{_LAYER}/Material/Name": "name",
-    f"{_LAYER}/Material/Manufacturer": "maker",
-}
-_OF_BLOCK = {
-    f"{_BLOCK}/WavelengthDataDirection": "direction",
-    f"{_BLOCK}/ColumnAngleBasis": "columns",
-    f"{_BLOCK}/RowAngleBasis": "rows",
-    f"{_BLOCK}/AngleBasis": "angles",
-    f"{_BLOCK}/ScatteringDataType": "quantity",
-}
-_OF_RING = {
-    f"{_RING}/nPhis": "nPhis",
-    f"{_RING}/ThetaBounds/LowerTheta": "LowerTheta",
-    f"{_RING}/ThetaBounds/UpperTheta": "UpperTheta",
-}
-_SCATTERING = f"{_BLOCK}/ScatteringData"
-_BASIS_NAME = f"{_BASIS}/AngleBasisName"
-_FIELDS = {*_OF_DOCUMENT, *_OF_BLOCK, *_OF_RING, _SCATTERING, _BASIS_NAME, f"{_DATA}/Wavelength"}
-_KNOWN = {"/".join(path.split("/")[:n]) for path in _FIELDS for n in range(1, path.count("/") + 2)}
+    structure: str
+    layers: int
+    bases: list[tuple[str, list[Texts]]]
+    blocks: list[Texts]
 
 
 def claims_to_be(head: bytes) -> bool:
@@ -116,96 +63,68 @@ def parse(content: bytes, path: Path) -> Document:
         raise UserError("holds NUL bytes", file=path, expected="XML in UTF-8")
     if _LONG_TAG.search(content):
         raise UserError("has a tag of over 8192 bytes", file=path)
-    handler = _Handler(path)
+    tree = ET.TreeBuilder()
+    elements = depth = 0
+
+    def start(tag: str, _: dict[str, str]) -> None:
+        nonlocal elements, depth
+        elements, depth = elements + 1, depth + 1
+        if elements > _MOST_ELEMENTS or depth > _DEEPEST:
+            raise UserError("has more elements, or deeper ones, than any BSDF file", file=path)
+        name = tag.rpartition(":")[2]
+        if depth == 1 and name != ROOT:
+            raise UserError("another kind of XML", file=path, got=tag, expected=ROOT)
+        tree.start(name, {})
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        tree.end(tag.rpartition(":")[2])
+
+    def refuse_doctype(*_: object) -> None:
+        raise UserError("declares a document type, whose entities are not followed", file=path)
+
     parser = expat.ParserCreate()
     parser.buffer_text, parser.buffer_size = True, 1 << 16
-    parser.StartElementHandler = handler.start
-    parser.EndElementHandler = handler.end
-    parser.CharacterDataHandler = handler.text
-    parser.StartDoctypeDeclHandler = handler.refuse_doctype
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = tree.data, refuse_doctype
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         raise UserError(f"not well-formed XML ({error})", file=path) from error
     except (LookupError, ValueError) as error:  # an encoding unknown to Python, or of several bytes
         raise UserError(f"encoding cannot be read ({error})", file=path, expected="XML in UTF-8") from error
-    return handler.document
+    return _document(tree.close(), path)
 
 
-class _Handler:
-    """Collects the fields of the first layer with data; other elements are skipped."""
+def _document(root: ET.Element, path: Path) -> Document:
+    """The first layer with data, or the last one."""
+    layers = root.findall("Optical/Layer")
+    with_data = [layer for layer in layers if layer.find("WavelengthData/WavelengthDataBlock") is not None]
+    layer = (with_data[:1] or layers[-1:] or [root])[0]
+    _texts(layer.find("Material"), path)  # names that are not used, and may not be too long either
+    structure, bases, blocks = "", [], []
+    for definition in layer.findall("DataDefinition"):
+        structure = _texts(definition, path).get("IncidentDataStructure", structure)
+        for basis in definition.findall("AngleBasis"):
+            rings = [
+                _texts(ring, path) | _texts(ring.find("ThetaBounds"), path) for ring in basis.findall("AngleBasisBlock")
+            ]
+            bases.append((_texts(basis, path).get("AngleBasisName", ""), rings))
+    for data in layer.findall("WavelengthData"):
+        wavelength = _texts(data, path).get("Wavelength", "")
+        blocks += [{**_texts(block, path), "Wavelength": wavelength} for block in data.findall("WavelengthDataBlock")]
+    return Document(structure, len(layers), bases, blocks)
 
-    def __init__(self, path: Path) -> None:
-        self.document = Document()
-        self._file = path
-        self._open: list[str] = []  # paths of the open elements; "" where no known element can be below
-        self._elements = 0
-        self._skip = False  # this layer comes after the one with data
-        self._text = bytearray()
-        self._wavelength, self._first = "", 0  # of the open WavelengthData: its field, and its first block
-        self._begin: dict[str, Callable[[], object]] = {
-            _LAYER: self._begin_layer,
-            _BASIS: lambda: self.document.bases.append(Basis()),
-            _RING: lambda: self.document.bases[-1].rings.append({}),
-            _DATA: self._begin_data,
-            _BLOCK: lambda: self.document.blocks.append(Block()),
-        }
 
-    def refuse_doctype(self, *_: object) -> None:
-        raise UserError("declares a document type, whose entities are not followed", file=self._file)
-
-    def start(self, tag: str, _: dict[str, str]) -> None:
-        self._elements += 1
-        if self._elements > _MOST_ELEMENTS or len(self._open) == _DEEPEST:
-            raise UserError("has more elements, or deeper ones, than any BSDF file", file=self._file)
-        name = tag.rpartition(":")[2]
-        if not self._open and name != ROOT:
-            raise UserError("another kind of XML", file=self._file, got=tag, expected=ROOT)
-        where = f"{self._open[-1]}/{name}" if self._open else name
-        self._open.append(where if where in _KNOWN and (where == _LAYER or not self._skip) else "")
-        self._text = bytearray()
-        self._begin.get(self._open[-1], lambda: None)()
-
-    def text(self, words: str) -> None:
-        where = self._open[-1]
-        if where not in _FIELDS:
-            return
-        if where == _SCATTERING:
-            # Text that is not ASCII is no number; its replacement makes the reader of numbers refuse it.
-            self._text += words.encode("ascii", "replace")
-            return
-        self._text += words.encode()
-        if len(self._text) > _LONGEST_FIELD:
-            raise UserError("is too long", file=self._file, field=where.rpartition("/")[2])
-
-    def end(self, _: str) -> None:
-        where, text = self._open.pop(), self._text
-        self._text = bytearray()
-        if where == _SCATTERING:
-            self.document.blocks[-1].text = bytes(text)
-        elif where in _FIELDS:
-            self._keep(where, " ".join(text.decode().split()))
-        elif where == _DATA:
-            for block in self.document.blocks[self._first :]:
-                block.wavelength = self._wavelength
-
-    def _begin_layer(self) -> None:
-        self.document.layers += 1
-        self._skip = bool(self.document.blocks)
-        if not self._skip:
-            self.document.structure, self.document.bases = "", []
-
-    def _begin_data(self) -> None:
-        self._wavelength, self._first = "", len(self.document.blocks)
-
-    def _keep(self, where: str, text: str) -> None:
-        if where in _OF_DOCUMENT:
-            setattr(self.document, _OF_DOCUMENT[where], text)
-        elif where in _OF_BLOCK:
-            setattr(self.document.blocks[-1], _OF_BLOCK[where], text)
-        elif where in _OF_RING:
-            self.document.bases[-1].rings[-1][_OF_RING[where]] = text
-        elif where == _BASIS_NAME:
-            self.document.bases[-1].name = text
-        else:
-            self._wavelength = text
+def _texts(element: ET.Element | None, path: Path) -> Texts:
+    """Texts of the children, the last of several, with single blanks; ScatteringData's as it is."""
+    found = {}
+    for child in element if element is not None else ():
+        text = child.text or ""
+        if child.tag != "ScatteringData":
+            if len(text) > _LONGEST_FIELD:
+                raise UserError("is too long", file=path, field=child.tag)
+            text = " ".join(text.split())
+        found[child.tag] = text
+    return found

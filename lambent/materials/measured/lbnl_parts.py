@@ -13,7 +13,7 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.materials.measured.equal_energy import rgb_of_xyz, within_rec709
 from lambent.materials.measured.klems import BUILT_IN, AngleBasis, PatchMatrix
-from lambent.materials.measured.lbnl_document import Basis, Block, Document
+from lambent.materials.measured.lbnl_document import Document, Texts
 from lambent.materials.measured.tensor_tree import Malformed, Rank, TensorTree, count_words, numbers_of, parse_tree
 from lambent.materials.measured.tree_part import TreePart
 
@@ -55,8 +55,14 @@ def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[s
         got, expected = document.structure, ", ".join(_STRUCTURES)
         raise UserError("unknown", file=file, field="IncidentDataStructure", got=got, expected=expected)
     chosen, notes = _choose(document, file)
-    maker = _Matrices(document, structure, file) if structure in ("Columns", "Rows") else _Trees(structure, file)
-    parts = {where: maker.part(blocks) for where, blocks in chosen.items()}
+    made: list[str] = []
+    parts: dict[Where, Part]
+    if structure in ("Columns", "Rows"):
+        bases = _bases_of(document, file, made)
+        parts = {where: _matrix_of(blocks, structure == "Rows", bases, file, made) for where, blocks in chosen.items()}
+    else:
+        rank: Rank = 3 if structure == "TensorTree3" else 4
+        parts = {where: TreePart(tuple(_tree(one, rank, file) for one in blocks)) for where, blocks in chosen.items()}
     lit = {where: part for where, part in parts.items() if not part.dark}
     if not lit:
         raise UserError("holds no value above zero", file=file)
@@ -64,7 +70,7 @@ def parts_of(document: Document, file: Path) -> tuple[dict[Where, Part], tuple[s
         notes.append("transmission is zero throughout: opaque")
     if document.layers > 1:
         notes.append(f"the first layer with data, of {document.layers}")
-    return lit, (*notes, *maker.notes)
+    return lit, (*notes, *made)
 
 
 def sizes_of(parts: Iterable[Part]) -> dict[str, int]:
@@ -76,38 +82,37 @@ def sizes_of(parts: Iterable[Part]) -> dict[str, int]:
     return total
 
 
-def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Block | None]], list[str]]:
-    """Blocks [luminance, X or u', Z or v'] per way and side, and notes; of equal blocks the last counts."""
-    names = {block.wavelength.lower(): block.wavelength for block in document.blocks}
+def _choose(document: Document, file: Path) -> tuple[dict[Where, list[Texts]], list[str]]:
+    """Blocks by way and side, [luminance] or [luminance, X or u', Z or v'], and notes; the last of equals counts."""
+    names = {block["Wavelength"].lower(): block["Wavelength"] for block in document.blocks}
     main = next((n for n in (*_LUMINANCE, "solar") if n in names), None)
     if main is None:
         got = ", ".join(names.values()) or None
         raise UserError("has no block that can be used", file=file, field="Wavelength", got=got, expected="Visible")
-    chosen: dict[Where, list[Block | None]] = {}
+    found: dict[Where, dict[int, Texts]] = {}
     repeated = 0
     for block in document.blocks:
-        where = _DIRECTIONS.get(" ".join(block.direction.lower().split()))
-        name = block.wavelength.lower()
+        where = _DIRECTIONS.get(block.get("WavelengthDataDirection", "").lower())
+        name = block["Wavelength"].lower()
         slot = 0 if name == main else 1 + _CHROMA[name] if name in _CHROMA and main in _LUMINANCE else None
         if where is None or slot is None:
             continue
-        if block.quantity.lower() not in _QUANTITIES:
+        quantity = block.get("ScatteringDataType", "")
+        if quantity.lower() not in _QUANTITIES:
             expected = "BTDF or BRDF, in 1/sr"
-            raise UserError("unknown", file=file, field="ScatteringDataType", got=block.quantity, expected=expected)
-        slots = chosen.setdefault(where, [None, None, None])
-        repeated += slots[slot] is not None
+            raise UserError("unknown", file=file, field="ScatteringDataType", got=quantity, expected=expected)
+        slots = found.setdefault(where, {})
+        repeated += slot in slots
         slots[slot] = block
-    grey = {w: [b[0], None, None] if None in b else b for w, b in chosen.items() if b[0] is not None}
-    if not grey:
+    chosen = {w: [b[k] for k in range(3 if len(b) == 3 else 1)] for w, b in found.items() if 0 in b}
+    if not chosen:
         expected = "Transmission or Reflection, Front or Back"
         raise UserError("no block names a side", file=file, field="WavelengthDataDirection", expected=expected)
-    return grey, _wavelength_notes(names, main, grey, repeated)
+    return chosen, _wavelength_notes(names, main, chosen, repeated)
 
 
-def _wavelength_notes(
-    names: dict[str, str], main: str, chosen: dict[Where, list[Block | None]], repeated: int
-) -> list[str]:
-    used = {b.wavelength.lower() for blocks in chosen.values() for b in blocks if b is not None}
+def _wavelength_notes(names: Texts, main: str, chosen: dict[Where, list[Texts]], repeated: int) -> list[str]:
+    used = {block["Wavelength"].lower() for blocks in chosen.values() for block in blocks}
     ignored = [shown or "without a name" for name, shown in names.items() if name not in used]
     notes = [f"f is that of {names[main]}"]
     if len(used) > 1:
@@ -121,105 +126,101 @@ def _wavelength_notes(
     return notes
 
 
-class _Matrices:
-    """Makes parts from blocks stored by columns or rows."""
-
-    def __init__(self, document: Document, structure: str, file: Path) -> None:
-        self.notes: list[str] = []
-        self._by_rows, self._file = structure == "Rows", file
-        self._bases = {basis.name.lower(): basis for basis in BUILT_IN}
-        for defined in document.bases:
-            self._define(defined)
-
-    def _define(self, defined: Basis) -> None:
-        if not defined.name or not defined.rings:
-            return
-        basis = _basis_of(defined, self._file)
-        usual = self._bases.get(basis.name.lower())
-        if usual is not None and _same(usual, basis):
-            return
+def _bases_of(document: Document, file: Path, notes: list[str]) -> dict[str, AngleBasis]:
+    """The built-in bases and those that the file defines, by lower-case name."""
+    bases = {basis.name.lower(): basis for basis in BUILT_IN}
+    for name, rings in document.bases:
+        if not name or not rings:
+            continue
+        basis, usual = _basis_of(name, rings, file), bases.get(name.lower())
         if usual is not None:
-            self.notes.append(
-                f"{basis.name} is not the usual one; taken as the file defines it, which Radiance does not"
-            )
-        self._bases[basis.name.lower()] = basis
-
-    def part(self, blocks: list[Block | None]) -> Part:
-        channels = [self._matrix(block) for block in blocks if block is not None]
-        incident, outgoing, _ = channels[0]
-        if any((i, o) != (incident, outgoing) for i, o, _ in channels):
-            raise UserError("colours have other bases than Visible", file=self._file)
-        values = np.stack([values for _, _, values in channels], axis=-1)
-        if len(channels) == 3:
-            read = np.asarray((values >= 0).all(axis=-1, keepdims=True))
-            rgb = rgb_of_xyz(values[..., [1, 0, 2]])
-            outside = int((rgb.min(axis=-1) < -_SATURATED * values[..., 0])[read[..., 0]].sum())
-            if outside:
-                self.notes.append(f"{outside} values are more saturated than Rec.709 and were desaturated")
-            values = np.where(read, within_rec709(rgb), -1.0)
-        return PatchMatrix(incident, outgoing, values)
-
-    def _matrix(self, block: Block) -> tuple[AngleBasis, AngleBasis, Floats]:
-        """Incident basis, outgoing basis, and values (outgoing, incident)."""
-        incident = self._basis(block.columns, "ColumnAngleBasis")
-        outgoing = self._basis(block.rows, "RowAngleBasis")
-        shape = (outgoing.count, incident.count)
-        words = count_words(block.text)
-        if words != shape[0] * shape[1]:
-            expected = f"{shape[0]} x {shape[1]} values"
-            raise UserError("count does not fit", file=self._file, field=block.direction, got=words, expected=expected)
-        try:
-            values = _finite(numbers_of(block.text), block, self._file)
-        except Malformed as error:
-            raise UserError(f"holds {error}", file=self._file, field=block.direction) from error
-        return incident, outgoing, values.reshape(shape[::-1]).T if self._by_rows else values.reshape(shape)
-
-    def _basis(self, name: str, field: str) -> AngleBasis:
-        if name.lower() not in self._bases:
-            known("angle basis", name or "none", [b.name for b in self._bases.values()], file=self._file, field=field)
-        return self._bases[name.lower()]
+            if _same(usual, basis):
+                continue
+            notes.append(f"{name} is not the usual one; taken as the file defines it, which Radiance does not")
+        bases[name.lower()] = basis
+    return bases
 
 
-class _Trees:
-    """Makes parts from tensor trees."""
-
-    def __init__(self, structure: str, file: Path) -> None:
-        self.notes: list[str] = []
-        self._rank: Rank = 3 if structure.endswith("3") else 4
-        self._file = file
-
-    def part(self, blocks: list[Block | None]) -> Part:
-        return TreePart(tuple(self._tree(block) for block in blocks if block is not None))
-
-    def _tree(self, block: Block) -> TensorTree:
-        if block.angles.lower() != _SHIRLEY_CHIU.lower():
-            got = block.angles or "none"
-            raise UserError("unknown angle basis", file=self._file, field="AngleBasis", got=got, expected=_SHIRLEY_CHIU)
-        try:
-            tree = parse_tree(block.text, self._rank)
-        except Malformed as error:
-            raise UserError(f"tensor tree is broken ({error})", file=self._file, field=block.direction) from error
-        _finite(tree.values, block, self._file)
-        return tree
+def _matrix_of(
+    blocks: list[Texts], by_rows: bool, bases: dict[str, AngleBasis], file: Path, notes: list[str]
+) -> PatchMatrix:
+    """The part of blocks stored by columns or rows."""
+    channels = [_matrix(block, by_rows, bases, file) for block in blocks]
+    incident, outgoing, _ = channels[0]
+    if any((i, o) != (incident, outgoing) for i, o, _ in channels):
+        raise UserError("colours have other bases than Visible", file=file)
+    values = np.stack([values for _, _, values in channels], axis=-1)
+    if len(channels) == 3:
+        read = np.asarray((values >= 0).all(axis=-1, keepdims=True))
+        rgb = rgb_of_xyz(values[..., [1, 0, 2]])
+        outside = int((rgb.min(axis=-1) < -_SATURATED * values[..., 0])[read[..., 0]].sum())
+        if outside:
+            notes.append(f"{outside} values are more saturated than Rec.709 and were desaturated")
+        values = np.where(read, within_rec709(rgb), -1.0)
+    return PatchMatrix(incident, outgoing, values)
 
 
-def _finite(values: Floats, block: Block, file: Path) -> Floats:
+def _matrix(
+    block: Texts, by_rows: bool, bases: dict[str, AngleBasis], file: Path
+) -> tuple[AngleBasis, AngleBasis, Floats]:
+    """Incident basis, outgoing basis, and values (outgoing, incident)."""
+    named = []
+    for field in ("ColumnAngleBasis", "RowAngleBasis"):
+        name = block.get(field, "")
+        if name.lower() not in bases:
+            known("angle basis", name or "none", [b.name for b in bases.values()], file=file, field=field)
+        named.append(bases[name.lower()])
+    incident, outgoing = named
+    shape, text = (outgoing.count, incident.count), _data(block)
+    words = count_words(text)
+    if words != shape[0] * shape[1]:
+        field, expected = block["WavelengthDataDirection"], f"{shape[0]} x {shape[1]} values"
+        raise UserError("count does not fit", file=file, field=field, got=words, expected=expected)
+    try:
+        values = _finite(numbers_of(text), block, file)
+    except Malformed as error:
+        raise UserError(f"holds {error}", file=file, field=block["WavelengthDataDirection"]) from error
+    return incident, outgoing, values.reshape(shape[::-1]).T if by_rows else values.reshape(shape)
+
+
+def _tree(block: Texts, rank: Rank, file: Path) -> TensorTree:
+    named = block.get("AngleBasis", "")
+    if named.lower() != _SHIRLEY_CHIU.lower():
+        got = named or "none"
+        raise UserError("unknown angle basis", file=file, field="AngleBasis", got=got, expected=_SHIRLEY_CHIU)
+    try:
+        tree = parse_tree(_data(block), rank)
+    except Malformed as error:
+        field = block["WavelengthDataDirection"]
+        raise UserError(f"tensor tree is broken ({error})", file=file, field=field) from error
+    _finite(tree.values, block, file)
+    return tree
+
+
+def _data(block: Texts) -> bytes:
+    """ScatteringData; a letter that is not ASCII becomes one that is no number, which is refused later."""
+    return block.get("ScatteringData", "").encode("ascii", "replace")
+
+
+def _finite(values: Floats, block: Texts, file: Path) -> Floats:
     count = int((~np.isfinite(values)).sum())
     if count:
-        raise UserError("holds values that are not finite", file=file, field=block.direction, got=count)
+        raise UserError(
+            "holds values that are not finite", file=file, field=block["WavelengthDataDirection"], got=count
+        )
     return values
 
 
-def _basis_of(defined: Basis, file: Path) -> AngleBasis:
+def _basis_of(name: str, rings: list[Texts], file: Path) -> AngleBasis:
     """The basis that the file defines, or a `UserError`."""
 
     def refuse(why: str) -> UserError:
-        return UserError(f"impossible angle basis: {why}", file=file, field=defined.name)
+        return UserError(f"impossible angle basis: {why}", file=file, field=name)
 
-    if len(defined.rings) > _MOST_RINGS:
-        raise refuse(f"{len(defined.rings)} rings, at most {_MOST_RINGS}")
+    if len(rings) > _MOST_RINGS:
+        raise refuse(f"{len(rings)} rings, at most {_MOST_RINGS}")
     edges, counts = [0.0], []
-    for ring in defined.rings:
+    for ring in rings:
         try:
             upper, lower = float(ring.get("UpperTheta", "")), float(ring.get("LowerTheta", edges[-1]))
             count = int(ring.get("nPhis", ""))
@@ -231,7 +232,7 @@ def _basis_of(defined: Basis, file: Path) -> AngleBasis:
             raise refuse(f"a ring of {count} patches from {edges[-1]:g} to {upper:g} degrees")
         edges.append(upper)
         counts.append(count)
-    return AngleBasis(defined.name, tuple(edges), tuple(counts))
+    return AngleBasis(name, tuple(edges), tuple(counts))
 
 
 def _same(a: AngleBasis, b: AngleBasis) -> bool:

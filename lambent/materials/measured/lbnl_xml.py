@@ -20,8 +20,8 @@ from lambent.core.directions import HALF_TURN, Floats, raised
 from lambent.core.files import read_bytes
 from lambent.materials.measured import lbnl_document, lbnl_parts
 from lambent.materials.measured.lbnl_parts import Part, Side, Way, Where
-from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import IntegratedTable, on_flat_pairs
+from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
+from lambent.materials.measured.table import on_flat_pairs
 
 NAME = "LBNL BSDF XML"
 LIMIT_BYTES = 1 << 30
@@ -63,7 +63,7 @@ class Use:
     backwards: bool
 
 
-class LbnlTable(IntegratedTable):
+class LbnlTable(MeasuredTable):
     """Both sides of a sheet, each with reflection and transmission, as far as the file has them.
 
     `uses` maps (way, side of the light) to the part to use.
@@ -152,18 +152,16 @@ class LbnlTable(IntegratedTable):
     def _notes(self, anisotropy: float) -> list[str]:
         notes = ["+z is the side the file calls Back and Radiance calls front"]
         for where, name in _NAMES.items():
-            if where not in self.uses:
-                if where[0] == "reflection":
-                    notes.append(f"{name} is not in the file, or zero: black")
-            elif self.uses[where].backwards:
+            if where not in self.uses and where[0] == "reflection":
+                notes.append(f"{name} is not in the file, or zero: black")
+            if where in self.uses and self.uses[where].backwards:
                 notes.append(f"{name} is not in the file, or zero: reversed from the other side, as in Radiance")
         if self._turned:
             notes.append("the file holds light from -z alone: for a fit the sheet is turned over")
         if 0 < anisotropy <= ISOTROPIC_WITHIN:
             notes.append(f"turning the sheet changes f by {100 * anisotropy:.2g} %: taken as isotropic")
-        for where, part in self.parts.items():
-            if part.negative:
-                notes.append(f"{_NAMES[where]}: {part.negative} negative values count as 0")
+        negative = {where: part.negative for where, part in self.parts.items() if part.negative}
+        notes += [f"{_NAMES[where]}: {count} negative values count as 0" for where, count in negative.items()]
         direct = {where: part.direct_share for where, part in self.parts.items() if part.direct_share > _DIRECT_SHARE}
         if direct:
             shares = ", ".join(f"{100 * share:.0f} % of the {_NAMES[where]}" for where, share in direct.items())

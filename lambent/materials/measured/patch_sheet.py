@@ -53,12 +53,10 @@ class PatchSheet:
         Of the largest basis; the others are padded.
     rings : int
         Of the largest basis, plus one for directions beyond the last ring.
-    viewer_edges : (faces, kinds, rings) flat float32
-        sin^2 of the upper theta of the rings of the viewer's basis.
-    viewer_counts, viewer_starts : (faces, kinds, rings) flat float32
+    edges : (faces, kinds, 2, rings) flat float32
+        sin^2 of the upper theta of the rings of the viewer's basis, then of the light's.
+    counts, starts : like edges
         Patches of a ring, 0 beyond the last, and number of its first.
-    light_edges, light_counts, light_starts
-        The same of the light's basis.
     signs : (faces, kinds, 2) flat float32
         -1 where headings are opposite to the direction: to the viewer, to the light.
     values : (faces, kinds, patches of the viewer, patches of the light, 3) flat float32
@@ -74,20 +72,16 @@ class PatchSheet:
     """
 
     ARRAYS: ClassVar[tuple[str, ...]] = (
-        "viewer_edges", "viewer_counts", "viewer_starts", "light_edges", "light_counts", "light_starts",
-        "signs", "values", "cdf", "density", "bounds", "albedo",
+        "edges", "counts", "starts", "signs", "values", "cdf", "density", "bounds", "albedo",
     )  # fmt: skip
 
     faces: int
     kinds: int
     patches: int
     rings: int
-    viewer_edges: Any
-    viewer_counts: Any
-    viewer_starts: Any
-    light_edges: Any
-    light_counts: Any
-    light_starts: Any
+    edges: Any
+    counts: Any
+    starts: Any
     signs: Any
     values: Any
     cdf: Any
@@ -171,8 +165,7 @@ class PatchSheet:
 
     def _viewer_row(self, wo: Vector, page: Any, ops: ArrayOps) -> tuple[Any, Any]:
         """Number of the viewer's patch among all pages', and whether there is one."""
-        basis = self.viewer_edges, self.viewer_counts, self.viewer_starts
-        patch, inside = self._patch(wo, ops.gather(self.signs, 2 * page), page, basis, ops)
+        patch, inside = self._patch(wo, 2 * page, ops)
         return page * self.patches + patch, inside
 
     def _pair(self, wi: Vector, wo: Vector, ops: ArrayOps) -> tuple[Any, Any]:
@@ -180,21 +173,19 @@ class PatchSheet:
         across = wi[2] * wo[2] < 0
         page = self._page(wo, across, ops)
         row, inside = self._viewer_row(wo, page, ops)
-        basis = self.light_edges, self.light_counts, self.light_starts
-        light, lit = self._patch(wi, ops.gather(self.signs, 2 * page + 1), page, basis, ops)
+        light, lit = self._patch(wi, 2 * page + 1, ops)
         seen = inside & lit & (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN)
         return row * self.patches + light, seen & ((wi[2] * wo[2] > 0) | (self.kinds == 2))
 
-    def _patch(self, w: Vector, sign: Any, page: Any, basis: tuple[Any, Any, Any], ops: ArrayOps) -> tuple[Any, Any]:
-        """Patch of a direction, as from `AngleBasis.index`, and whether it is within the basis."""
-        edges, counts, starts = basis
-        first = page * self.rings
+    def _patch(self, w: Vector, basis: Any, ops: ArrayOps) -> tuple[Any, Any]:
+        """Patch of a direction in a basis (2 page + role), as from `AngleBasis.index`, and whether it is within it."""
+        first, sign = basis * self.rings, ops.gather(self.signs, basis)
         x, y = sign * w[0], sign * w[1]
-        ring = first + first_above(x * x + y * y, edges, first, self.rings, ops)
-        count = ops.gather(counts, ring)
+        ring = first + first_above(x * x + y * y, self.edges, first, self.rings, ops)
+        count = ops.gather(self.counts, ring)
         place = ops.floor(turns(y, x, ops) * count + 0.5)
         place = ops.select(place > count - 0.5, 0.0, place)
-        return ops.whole(ops.gather(starts, ring) + place), count > 0.5
+        return ops.whole(ops.gather(self.starts, ring) + place), count > 0.5
 
 
 Lookup = HalfVectorGrid | PatchSheet
@@ -274,20 +265,13 @@ def _arrays(
     peak = np.zeros(patches)
     peak[: viewer.count] = (mean * highest_cos).max(axis=-1)
     found = {"values": values, "cdf": cdf, "density": density, "albedo": total, "peak": peak}
-    found |= {"signs": np.array([viewer_sign, light_sign]), "bounds": _bounds(light, light_sign, patches)}
-    for role, basis in (("viewer", viewer), ("light", light)):
-        edges, counts, starts = _rings(basis, rings)
-        found |= {f"{role}_edges": edges, f"{role}_counts": counts, f"{role}_starts": starts}
-    return found
-
-
-def _rings(basis: AngleBasis, rings: int) -> tuple[Floats, Floats, Floats]:
-    n = len(basis.n_phis)
-    edges, counts, starts = np.full(rings, _BEYOND), np.zeros(rings), np.zeros(rings)
-    upper = np.array(basis.edges_deg[1:])
-    edges[:n] = np.where(upper < _WHOLE_DEG, np.sin(np.radians(upper)) ** 2, _BEYOND)
-    counts[:n], starts[:n] = basis.n_phis, basis.starts
-    return edges, counts, starts
+    edges, counts, starts = np.full((2, rings), _BEYOND), np.zeros((2, rings)), np.zeros((2, rings))
+    for role, basis in enumerate((viewer, light)):
+        n, upper = len(basis.n_phis), np.array(basis.edges_deg[1:])
+        edges[role, :n] = np.where(upper < _WHOLE_DEG, np.sin(np.radians(upper)) ** 2, _BEYOND)
+        counts[role, :n], starts[role, :n] = basis.n_phis, basis.starts
+    found |= {"edges": edges, "counts": counts, "starts": starts, "signs": np.array([viewer_sign, light_sign])}
+    return found | {"bounds": _bounds(light, light_sign, patches)}
 
 
 def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:

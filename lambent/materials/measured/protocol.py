@@ -1,4 +1,4 @@
-"""The protocol of measured tables, whatever their file format.
+"""Measured tables, whatever their file format: metadata, look-up, albedos and raw tuples.
 
 Conventions: directions are unit vectors (..., 3) in the local frame with n = +z, pointing away from the surface; `wi`
 to the light, `wo` to the viewer. f is in 1/sr per channel and holds no cosine; the transfer probability is
@@ -8,19 +8,29 @@ RGB with Rec.709 primaries.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, field
-from typing import Literal, Protocol
+from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
-from lambent.materials.document import SIDES, Side
+from lambent.core.sequences import radical_inverse
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import SIDES, Lobe, Material, Side
 
 GRAZING_DEG = 84.0  # beyond it, errors of gonio-photometers and grids prevail
 LARGEST_F = 1e9  # 1/sr; no surface is that bright, and its square still fits float32
 _COS_GRAZING = float(np.cos(np.radians(GRAZING_DEG)))
 Quantity = Literal["f", "f_cos", "p"]
+# The quadrature's mixture has lobes of all widths that measured lobes can have.
+_WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
+_PROPOSAL = Material(
+    kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
+)
+_QUADRATURE_POINTS = 4096
 
 
 @dataclass(frozen=True)
@@ -118,31 +128,54 @@ class MeasuredSamples:
         return [side for side in SIDES if self.on(side).any()]
 
 
-class MeasuredTable(Protocol):
-    """One measured material."""
+class MeasuredTable(ABC):
+    """One measured material; its albedos follow from the format's `eval`."""
 
-    @property
-    def info(self) -> TableInfo: ...
+    info: TableInfo
 
+    @abstractmethod
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr without the cosine, of wi, wo (..., 3); >= 0; holes are filled from their neighbours."""
-        ...
+
+    @abstractmethod
+    def samples(self, max_count: int | None = None) -> MeasuredSamples:
+        """The raw tuples, or an even, deterministic choice of at most `max_count` of them."""
 
     def reflectivity(self, wi: Floats) -> Floats:
-        """r (..., C) in [0, 1]: the integral of p over the near side (2.7)."""
-        ...
+        """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % for a smooth table."""
+        return self._integral(wi, 1.0)
 
     def transmissivity(self, wi: Floats) -> Floats:
-        """t (..., C) in [0, 1]: the integral of p over the far side (2.8)."""
-        ...
+        """t (..., C): the integral of f |cos theta_o| over the far side (2.8); 0 for an opaque table."""
+        if not self.info.transmits:
+            return np.zeros((*wi.shape[:-1], self.info.channels))
+        return self._integral(wi, -1.0)
 
     def albedo(self, wi: Floats) -> Floats:
         """r + t (..., C)."""
-        ...
+        return np.asarray(self.reflectivity(wi) + self.transmissivity(wi))
 
-    def samples(self, max_count: int | None = None) -> MeasuredSamples:
-        """The raw tuples, or an even, deterministic choice of at most `max_count` of them."""
-        ...
+    def _integral(self, wi: Floats, side: float) -> Floats:
+        flat = np.asarray(wi, dtype=float).reshape(-1, 3)
+        value = [self._integral_of_one(w, side) for w in flat]
+        return np.array(value).reshape(*wi.shape[:-1], self.info.channels)
+
+    def _integral_of_one(self, wi: Floats, side: float) -> Floats:
+        proposal, u = MaterialBSDF(_PROPOSAL), _quadrature()
+        all_wi = np.broadcast_to(wi, u.shape)
+        wo = proposal.sample(all_wi, u)
+        pdf = proposal.pdf(wo, all_wi)
+        inside = (pdf > 0) & (wo[:, 2] * wi[2] > 0)
+        weight = np.abs(wo[inside, 2]) / pdf[inside]
+        f = self.eval(all_wi[inside], wo[inside] * (1, 1, side))
+        return np.asarray((f * weight[:, None]).sum(axis=0) / len(u))
+
+
+@cache
+def _quadrature() -> Floats:
+    """Low-discrepancy points of the unit cube: the first coordinate chooses the component, so it is stratified."""
+    k = np.arange(_QUADRATURE_POINTS)
+    return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
 
 
 def collect(

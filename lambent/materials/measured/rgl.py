@@ -20,12 +20,10 @@ from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
 from lambent.materials.measured.table import ReflectionTable, fill_holes, mirrored_to_range, require_values, sensible
-from lambent.materials.measured.tensor_file import MAGIC, read_tensors
+from lambent.materials.measured.tensor_file import MAGIC, Tensors, read_tensors
 
 NAME = "RGL tensor file"
 _DIMENSIONS = {"phi_i": 1, "theta_i": 1, "ndf": 2, "sigma": 2, "vndf": 4}
-
-Tensors = dict[str, NDArray[np.generic]]
 
 
 def recognise(head: bytes, size: int) -> bool:
@@ -119,11 +117,13 @@ class RglTable(ReflectionTable):
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
         """f (N, 3) in 1/sr; negative values become 0."""
         cos_o = wo[:, 2:]
-        wi, wo = self._reduced(wi, wo)
+        if self._reduction > 1:  # mirrored into the file's part of the circle
+            wi, wo = mirrored_to_range(wi, wo, -1.0, quadrant=self._reduction == 4)
         theta_i, phi_i = elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])
         m = half_vector(wi, wo)
         phi_m = np.arctan2(m[:, 1], m[:, 0]) - (phi_i if self._isotropic else 0)
-        u_m = np.stack([_u_of_theta(elevation(m)), _u_of_phi(phi_m) % 1.0], axis=-1)
+        u_m = _u_of(elevation(m), phi_m)
+        u_m[:, 1] %= 1.0
         corners = Corners((self._phi, self._theta), (phi_i, theta_i))
         u, _ = self._warp.invert(corners, u_m)
         value = bilinear(self._values, corners, u) * self._factor(u_m, theta_i, phi_i)
@@ -134,14 +134,9 @@ class RglTable(ReflectionTable):
         if not self._with_jacobian:
             return np.ones((len(u_m), 1))
         whole = Corners((np.zeros(1), np.zeros(1)), (theta_i, phi_i))
-        u_i = np.stack([_u_of_theta(theta_i), _u_of_phi(0 * phi_i if self._isotropic else phi_i)], axis=-1)
-        sigma = bilinear(self._sigma, whole, u_i)
+        sigma = bilinear(self._sigma, whole, _u_of(theta_i, 0 * phi_i if self._isotropic else phi_i))
         factor: Floats = np.divide(bilinear(self._ndf, whole, u_m), 4 * sigma, out=np.zeros(len(u_m)), where=sigma > 0)
         return factor[:, None]
-
-    def _reduced(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
-        """The pair, mirrored into the file's part of the circle."""
-        return mirrored_to_range(wi, wo, -1.0, quadrant=self._reduction == 4) if self._reduction > 1 else (wi, wo)
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
         """One tuple per node of the warped square; nodes whose wo is below the surface count as shadowed.
@@ -181,9 +176,6 @@ def _share(index: NDArray[np.integer], count: int) -> Floats:
     return np.where((index == 0) | (index == count - 1), 0.5, 1.0) / (count - 1)
 
 
-def _u_of_theta(theta: Floats) -> Floats:
-    return np.asarray(np.sqrt(theta * (2 / np.pi)))
-
-
-def _u_of_phi(phi: Floats) -> Floats:
-    return np.asarray((phi + np.pi) / (2 * np.pi))
+def _u_of(theta: Floats, phi: Floats) -> Floats:
+    """Points (N, 2) of the square."""
+    return np.stack([np.sqrt(theta * (2 / np.pi)), (phi + np.pi) / (2 * np.pi)], axis=-1)

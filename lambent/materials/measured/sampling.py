@@ -33,7 +33,7 @@ from lambent.materials.measured.two_sided import TwoSided
 
 ABSORBED, REFLECTED, TRANSMITTED = 0, 1, 2
 CANDIDATES_LIMIT = 200_000  # per sample, before rejection gives up
-_STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # the root of x^4 = x + 1
+_STEP = 1.2207440846057596 ** -np.arange(1.0, 4.0)  # of Roberts' additive sequence (2018): the root of x^4 = x + 1
 
 
 @dataclass(frozen=True)
@@ -183,36 +183,24 @@ class Rejection(_Photons):
                 raise UserError("lobe too narrow for rejection sampling", file=self.sheet.info.file, hint=hint)
             many = max(1, min(64, 4096 // len(waiting)))  # the last photons try several candidates at once
             asked = rng.permutation(np.repeat(waiting, many))
-            wo, x = self._candidates(_even(proposals, len(asked), offset), wi[asked], fate[asked])
+            number = np.arange(proposals + 1, proposals + len(asked) + 1)[:, None]
+            u = (offset + number * _STEP) % 1.0
+            wo = direction(np.arccos(1 - u[:, 0]), 2 * np.pi * u[:, 1])
+            wo[:, 2] *= np.where((wi[asked, 2] > 0) == (fate[asked] == REFLECTED), 1.0, -1.0)
             f = self.sheet.eval(wi[asked], wo)
             p = f.mean(axis=1) * np.abs(wo[:, 2])
-            accepted = np.flatnonzero(x * bound[asked] < p)
+            accepted = np.flatnonzero(u[:, 2] * bound[asked] < p)
             photons, first = np.unique(asked[accepted], return_index=True)  # the first accepted one
             chosen = accepted[first]
             found[photons] = wo[chosen]
             weight[photons] = f[chosen] / f[chosen].mean(axis=1, keepdims=True)
             exceeded += int((p[chosen] > bound[photons]).sum())
-            left = np.setdiff1d(waiting, photons, assume_unique=True)
             proposals += len(asked)
             rounds += many
-            waiting = left
+            waiting = np.setdiff1d(waiting, photons, assume_unique=True)
         progress(count, count, "rejection sampling")
         excess = np.maximum(np.sum(self.albedo(wi), axis=0), 1.0)[:, None]
         return Scattered(found, fate, weight * excess, proposals, exceeded)
-
-    @staticmethod
-    def _candidates(u: Floats, wi: Floats, fate: NDArray[np.int8]) -> tuple[Floats, Floats]:
-        """Uniform directions on the side of each photon's fate from u (N, 3), and the number that decides."""
-        wo = direction(np.arccos(1 - u[:, 0]), 2 * np.pi * u[:, 1])
-        wo[:, 2] *= np.where((wi[:, 2] > 0) == (fate == REFLECTED), 1.0, -1.0)
-        return wo, u[:, 2]
-
-
-def _even(first: int, count: int, offset: Floats) -> Floats:
-    """(count, 3) points from number `first` of the additive sequence of Roberts 2018 in three dimensions."""
-    k = np.arange(first + 1, first + count + 1)[:, None]
-    points: Floats = (offset + k * _STEP) % 1.0
-    return points
 
 
 class Tabulated(_Photons):

@@ -84,18 +84,14 @@ class Sheet:
         low, high = f[t, p] * (1 - v) + f[t, p1] * v, f[t1, p] * (1 - v) + f[t1, p1] * v
         return np.asarray(low * (1 - u) + high * u)
 
-    def solid_angles(self) -> Floats:
-        """(T P,) sin(theta) dtheta dphi of the nodes' cells, in sr; the cells tile the grid's extent."""
+    def weights(self) -> Floats:
+        """(T P,) solid angles in sr of the nodes' cells, which tile the grid; images give theirs to their nodes."""
         theta, turn = np.radians(self.theta_deg), np.radians(np.append(self.phi_deg, self.phi_deg[0] + 360))
         half = np.diff(theta) / 2 if len(theta) > 1 else np.array([np.pi])
         edges = np.concatenate([theta[:1] - half[:1], theta[:-1] + half[: len(theta) - 1], theta[-1:] + half[-1:]])
         rings = -np.diff(np.cos(edges.clip(0, np.pi / 2 if self.frame is None else np.pi)))
         widths = np.diff(turn)
-        return np.outer(rings, (widths + np.roll(widths, 1)) / 2).ravel()
-
-    def weights(self) -> Floats:
-        """(T P,) solid angles; those of images go to the nodes they repeat."""
-        weight = self.solid_angles().reshape(self.f.shape[:2])
+        weight = np.outer(rings, (widths + np.roll(widths, 1)) / 2)
         if self.images is None or not self.images.any():
             return weight.ravel()
         moved = np.where(self.images, weight, 0)
@@ -156,20 +152,17 @@ class ScatteredSheet:
         """
         return self._lookup(w)
 
-    def solid_angles(self) -> Floats:
-        """(N,) the part of the hemisphere nearest to each direction, in sr."""
+    def weights(self) -> Floats:
+        """(N,) the part of the hemisphere nearest to each direction, in sr; one with a mirror image stands for both."""
         from scipy.spatial import cKDTree
 
         count = int(np.clip(16 * len(self.directions), *_WEIGHT_POINTS))
         u = r2(count)
         nearest = cKDTree(self.directions).query(direction(np.arccos(u[:, 0]), 2 * np.pi * u[:, 1]))[1]
         share = np.bincount(nearest, minlength=len(self.directions)) * (2 * np.pi / count)
-        return np.asarray(share.clip(np.pi / count, max(_HEAVIEST * float(np.median(share)), 1e-6)))
-
-    def weights(self) -> Floats:
-        """(N,) solid angles; a direction with a mirror image stands for both."""
+        share = share.clip(np.pi / count, max(_HEAVIEST * float(np.median(share)), 1e-6))
         aside = np.abs(self.directions @ self.specular[1]) > _IN_PLANE
-        return self.solid_angles() * np.where(aside & self.images.any(), 2.0, 1.0)
+        return share * np.where(aside & self.images.any(), 2.0, 1.0)
 
 
 def _plane_scan(w: Floats, f: Floats, frame: Floats) -> LookUp:

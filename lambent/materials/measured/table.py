@@ -1,10 +1,9 @@
-"""Shared by the tables of all formats: albedos by quadrature, interpolation, filled holes, refusal of empty files."""
+"""Shared by the tables of all formats: interpolation, filled holes, refusal of empty files."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,68 +11,10 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
-from lambent.core.sequences import radical_inverse
-from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Lobe, Material
-from lambent.materials.measured.protocol import LARGEST_F, MeasuredSamples, TableInfo
-
-# The quadrature's mixture has lobes of all widths that measured lobes can have.
-_WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
-_PROPOSAL = Material(
-    kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
-)
-_QUADRATURE_POINTS = 4096
+from lambent.materials.measured.protocol import LARGEST_F, MeasuredTable, TableInfo
 
 
-class IntegratedTable(ABC):
-    """Base of the tables: reflectivity and transmissivity follow from the format's `eval`."""
-
-    info: TableInfo
-
-    @abstractmethod
-    def eval(self, wi: Floats, wo: Floats) -> Floats: ...
-
-    @abstractmethod
-    def samples(self, max_count: int | None = None) -> MeasuredSamples: ...
-
-    def reflectivity(self, wi: Floats) -> Floats:
-        """r (..., C): the integral of f |cos theta_o| over the side of wi (2.7), to about .5 % for a smooth table."""
-        return self._integral(wi, 1.0)
-
-    def transmissivity(self, wi: Floats) -> Floats:
-        """t (..., C): the integral of f |cos theta_o| over the far side (2.8); 0 for an opaque table."""
-        if not self.info.transmits:
-            return np.zeros((*wi.shape[:-1], self.info.channels))
-        return self._integral(wi, -1.0)
-
-    def albedo(self, wi: Floats) -> Floats:
-        """r + t (..., C)."""
-        return np.asarray(self.reflectivity(wi) + self.transmissivity(wi))
-
-    def _integral(self, wi: Floats, side: float) -> Floats:
-        flat = np.asarray(wi, dtype=float).reshape(-1, 3)
-        value = [self._integral_of_one(w, side) for w in flat]
-        return np.array(value).reshape(*wi.shape[:-1], self.info.channels)
-
-    def _integral_of_one(self, wi: Floats, side: float) -> Floats:
-        proposal, u = MaterialBSDF(_PROPOSAL), _quadrature()
-        all_wi = np.broadcast_to(wi, u.shape)
-        wo = proposal.sample(all_wi, u)
-        pdf = proposal.pdf(wo, all_wi)
-        inside = (pdf > 0) & (wo[:, 2] * wi[2] > 0)
-        weight = np.abs(wo[inside, 2]) / pdf[inside]
-        f = self.eval(all_wi[inside], wo[inside] * (1, 1, side))
-        return np.asarray((f * weight[:, None]).sum(axis=0) / len(u))
-
-
-@cache
-def _quadrature() -> Floats:
-    """Low-discrepancy points of the unit cube: the first coordinate chooses the component, so it is stratified."""
-    k = np.arange(_QUADRATURE_POINTS)
-    return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
-
-
-class ReflectionTable(IntegratedTable):
+class ReflectionTable(MeasuredTable):
     """Base of three-channel tables of reflection alone; f is 0 where wi or wo is below the surface."""
 
     QUERIES_AT_ONCE: ClassVar[int] = 1 << 17

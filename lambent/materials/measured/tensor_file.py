@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes
 
+Tensors = dict[str, NDArray[np.generic]]
+
 MAGIC = b"tensor_file\0"
 LIMIT_BYTES = 4 << 30
 _TYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8"}
 _DIMENSIONS_MAX = 16
 
 
-def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
+def read_tensors(path: Path) -> Tensors:
     """Every tensor of the file by name, as views of its bytes.
 
     Raises
@@ -37,7 +39,7 @@ def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
         raise UserError("header of the tensor file is cut off or broken", file=path) from error
 
 
-def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
+def _parse(content: bytes, path: Path) -> Tensors:
     version = struct.unpack_from("<2B", content, len(MAGIC))
     if version != (1, 0):
         raise UserError("unknown version of the tensor file", file=path, got=version, expected="(1, 0)")
@@ -63,7 +65,7 @@ def _parse(content: bytes, path: Path) -> dict[str, NDArray[np.generic]]:
     return tensors
 
 
-def tensor_bytes(tensors: dict[str, NDArray[np.generic]]) -> bytes:
+def tensor_bytes(tensors: Tensors) -> bytes:
     """A file of these tensors for `read_tensors`, in their order; each begins at a multiple of 8 bytes."""
     kinds = {np.dtype(name): kind for kind, name in _TYPES.items()}
     names = {name: name.encode("utf-8") for name in tensors}

@@ -78,7 +78,7 @@ def incident_coordinates(rank: Rank, entering: Floats) -> Floats:
     return np.asarray(0.5 - _TINY - 0.5 * np.hypot(entering[:, 0], entering[:, 1]))[:, None]
 
 
-def _grid_points(size: int, dimensions: int) -> Indices:
+def grid_points(size: int, dimensions: int) -> Indices:
     """(size^dimensions, dimensions) integer points of a cube, with the last coordinate fastest."""
     return np.indices((size,) * dimensions).reshape(dimensions, -1).T
 
@@ -141,6 +141,9 @@ class TensorTree:
     values: Floats
     root: int
 
+    def _free(self, fixed: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(d for d in range(self.rank) if d not in fixed)
+
     def look_up(self, place: Floats) -> tuple[Floats, Floats]:
         """Value (N,) and side (N,) of the leaf at places (N, rank) in the unit cube."""
         at = place.clip(0, _BELOW_ONE)
@@ -172,14 +175,14 @@ class TensorTree:
             Numbers of the fixed coordinates.
         place : (Q, len(fixed)) in [0, 1]
         """
-        free = tuple(d for d in range(self.rank) if d not in fixed)
-        halves = _grid_points(2, len(free))
+        free = self._free(fixed)
+        halves = grid_points(2, len(free))
         query, at = np.arange(len(place)), place.clip(0, _BELOW_ONE)
         code, corner, side = np.full(len(place), self.root), np.zeros((len(place), len(free))), 1.0
         found = []
         while len(query):
             leaf = code < 0
-            found.append(self._grids(fixed, free, query[leaf], at[leaf], -1 - code[leaf], corner[leaf], side))
+            found.append(self._grids(fixed, query[leaf], at[leaf], -1 - code[leaf], corner[leaf], side))
             query, at, code, corner, side = query[~leaf], 2 * at[~leaf], code[~leaf], corner[~leaf], side / 2
             upper = at >= 1
             at = at - upper
@@ -190,16 +193,10 @@ class TensorTree:
         return Cells.joined([cells for level in found for cells in level])
 
     def _grids(
-        self,
-        fixed: tuple[int, ...],
-        free: tuple[int, ...],
-        query: Indices,
-        at: Floats,
-        grid: Indices,
-        corner: Floats,
-        side: float,
+        self, fixed: tuple[int, ...], query: Indices, at: Floats, grid: Indices, corner: Floats, side: float
     ) -> list[Cells]:
         """The leaves of grids (Q,), which fill cells with these corners and this side."""
+        free = self._free(fixed)
         cells = [Cells(query[:0], corner[:0], np.zeros(0), np.zeros(0))]
         for log in np.unique(self.logs[grid]).tolist():
             here = self.logs[grid] == log
@@ -207,7 +204,7 @@ class TensorTree:
             index = self.starts[grid[here]].astype(np.int64)
             for column, d in enumerate(fixed):
                 index = index + ((at[here, column] * width).astype(np.int64) << log * (self.rank - 1 - d))
-            steps = _grid_points(width, len(free))
+            steps = grid_points(width, len(free))
             offset = (steps << log * (self.rank - 1 - np.array(free))).sum(axis=1)
             value = self.values[index[:, None] + offset].ravel()
             corners = (corner[here, None, :] + steps * (side / width)).reshape(-1, len(free))

@@ -89,6 +89,11 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
     raise UserError("holds numbers that cannot be read", file=path, field=field)
 
 
+def refuse_decimal_commas(text: bytes, path: Path) -> None:
+    if has_decimal_commas(text):
+        raise UserError("numbers have decimal commas", file=path, hint=HINT_DECIMAL_COMMA)
+
+
 def has_decimal_commas(text: bytes) -> bool:
     """Whether numbers such as 0,25 stand between blanks or semicolons."""
     return _DECIMAL_COMMA.search(text) is not None

@@ -19,6 +19,7 @@ from lambent.materials.measured.tensor_tree import (
     TensorTree,
     coordinates,
     disk_of,
+    grid_points,
     incident_coordinates,
     square_of,
 )
@@ -96,10 +97,11 @@ class TreePart:
         """Every leaf that light of an even choice of incident directions can leave by; large leaves are cut."""
         entering = self._even_incident()
         fixed = tuple(range(self.rank - 2))
-        cells = [
-            _thinned(_cut(self._cells(fixed, place[None])), _MOST_TUPLES // len(entering))
-            for place in incident_coordinates(self.rank, entering)
-        ]
+        most, cells = _MOST_TUPLES // len(entering), []
+        for place in incident_coordinates(self.rank, entering):
+            pieces = _cut(self._cells(fixed, place[None]))
+            count = len(pieces.side)
+            cells.append(pieces if count <= most else pieces.chosen(even_choice(count, most)))
         light = np.repeat(entering, [len(c.side) for c in cells], axis=0)
         middle = np.concatenate([c.middle for c in cells])
         area = np.concatenate([c.side for c in cells]) ** 2
@@ -206,21 +208,15 @@ def _cut(cells: Cells) -> Cells:
     pieces = []
     for n in np.unique(parts):
         whole = cells.chosen(parts == n)
-        steps = np.stack(np.meshgrid(np.arange(n), np.arange(n), indexing="ij"), axis=-1).reshape(-1, 2)
-        corner = (whole.corner[:, None] + steps * (whole.side[:, None, None] / n)).reshape(-1, 2)
+        corner = (whole.corner[:, None] + grid_points(n, 2) * (whole.side[:, None, None] / n)).reshape(-1, 2)
         query, side, value = (np.repeat(x, n * n) for x in (whole.query, whole.side / n, whole.value))
         pieces.append(Cells(query, corner, side, value))
     return Cells.joined(pieces)
 
 
-def _thinned(cells: Cells, most: int) -> Cells:
-    return cells if len(cells.side) <= most else cells.chosen(even_choice(len(cells.side), most))
-
-
 def _square_grid(n: int) -> Floats:
     """(n^2, 2) points of the disk in the middle of n x n cells of the square."""
-    line = (np.arange(n) + 0.5) / n
-    return disk_of(np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2))
+    return disk_of((grid_points(n, 2) + 0.5) / n)
 
 
 def _on_sphere(disk: Floats) -> Floats:

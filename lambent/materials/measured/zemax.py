@@ -29,7 +29,12 @@ from lambent.materials.measured.spectral import rgb_of_xyz
 from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "Zemax BSDF text"
-LISTS = ("SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial")
+LISTS = {
+    "SampleRotation": (-360, 360),
+    "AngleOfIncidence": (0, 90),
+    "ScatterAzimuth": (0, 360),
+    "ScatterRadial": (0, 180),
+}
 _WORDS = {
     "Symmetry": ("PlaneSymmetrical", "Asymmetrical", "Asymmetrical4D"),
     "SpectralContent": ("Monochrome", "XYZ"),
@@ -74,7 +79,7 @@ def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]
     """The words and the lists of angles above the data."""
     words: dict[str, str] = {}
     lists: dict[str, Floats] = {}
-    for name in LISTS:
+    for name, (low, high) in LISTS.items():
         found = re.search(rb"\b" + name.encode() + rb"\s([^A-Za-z]*)", head)
         if found is None:
             raise UserError("is missing", file=path, field=name)
@@ -82,6 +87,10 @@ def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]
         if len(angles) == 0 or count != len(angles):
             raise UserError("count does not fit its angles", file=path, field=name, got=f"{count:g} and {len(angles)}")
         lists[name] = np.array(angles)
+        open_end = name == "AngleOfIncidence" and angles[-1] >= high
+        if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high) or open_end:
+            expected = f"increasing degrees from {low} to {high}"
+            raise UserError("is not a list of angles", file=path, field=name, got=angles, expected=expected)
     for name, known in _WORDS.items():
         named = re.search(rb"\b" + name.encode() + rb"\s+(\w+)", head)
         got = shown(named[1]) if named else None
@@ -90,18 +99,7 @@ def _header(head: bytes, path: Path) -> tuple[dict[str, str], dict[str, Floats]]
             hint = did_you_mean(got, known) if got else None
             raise UserError("is unknown", file=path, field=name, got=got, expected=f"one of: {known}", hint=hint)
         words[name] = word
-    _check_lists(lists, path)
     return words, lists
-
-
-def _check_lists(lists: dict[str, Floats], path: Path) -> None:
-    ranges = {"SampleRotation": (-360, 360), "AngleOfIncidence": (0, 90), "ScatterAzimuth": (0, 360)}
-    for name, (low, high) in (ranges | {"ScatterRadial": (0, 180)}).items():
-        angles = lists[name]
-        open_end = name == "AngleOfIncidence" and angles[-1] >= high
-        if not ((np.diff(angles) > 0).all() and low <= angles[0] and angles[-1] <= high) or open_end:
-            expected = f"increasing degrees from {low} to {high}"
-            raise UserError("is not a list of angles", file=path, field=name, got=angles.tolist(), expected=expected)
 
 
 def _section(part: bytes, shape: tuple[int, ...], path: Path) -> tuple[Floats, Floats]:
@@ -152,20 +150,14 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
 
     rotations = list(zip(order, phi_i, strict=True))
     sheets = tuple(tuple(sheet(i, k, theta, phi) for k, phi in rotations) for i, theta in enumerate(theta_i))
-    notes += _outside(sheets)
+    nodes = np.concatenate([sheet.directions[sheet.measured] for row in sheets for sheet in row])
+    if below := int((nodes[:, 2] <= 0).sum()):
+        notes += (f"{below} of {len(nodes)} directions are below the horizon and left out",)
     far = words["ScatterType"] == "BTDF"
-    table = GonioTable(
-        name=Path(path).stem,
-        file=Path(path).name,
-        theta_i_deg=theta_i,
-        phi_i_deg=phi_i,
-        reflected=() if far else sheets,
-        transmitted=sheets if far else (),
-        symmetry=symmetry,
-        notes=notes,
-        format=NAME,
-    )
-    return _with_tis(table, tis[order[0]], far, notes)
+    sides: tuple[Sheets, Sheets] = ((), sheets) if far else (sheets, ())
+    file = Path(path)
+    table = GonioTable(file.stem, theta_i, phi_i, *sides, symmetry=symmetry, file=file.name, notes=notes, format=NAME)
+    return _with_tis(table, tis[order[0]])
 
 
 def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
@@ -185,19 +177,13 @@ def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats, Flags]:
     return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2), images
 
 
-def _outside(sheets: Sheets) -> tuple[str, ...]:
-    nodes = np.concatenate([sheet.directions[sheet.measured] for row in sheets for sheet in row])
-    below, count = int((nodes[:, 2] <= 0).sum()), len(nodes)
-    return (f"{below} of {count} directions are below the horizon and left out",) if below else ()
-
-
-def _with_tis(table: GonioTable, tis: Floats, far: bool, notes: tuple[str, ...]) -> GonioTable:
+def _with_tis(table: GonioTable, tis: Floats) -> GonioTable:
     """The table with a note that compares the file's total integrated scatter with the table's integral."""
     with np.errstate(over="ignore", invalid="ignore"):
         stated = tis[:_MOST_CHECKED].mean(axis=-1)
     wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))
-    ours = (table.transmissivity(wi) if far else table.reflectivity(wi)).mean(axis=-1)
+    ours = (table.transmissivity(wi) if table.transmitted else table.reflectivity(wi)).mean(axis=-1)
     pairs = ", ".join(
         f"{s:.4f} ({o:.4f}) at {theta:g}" for s, o, theta in zip(stated, ours, table.theta_i_deg, strict=False)
     )
-    return replace(table, notes=(*notes, f"TIS stated (and by integration of the table): {pairs} degrees"))
+    return replace(table, notes=(*table.notes, f"TIS stated (and by integration of the table): {pairs} degrees"))

@@ -67,11 +67,7 @@ class Published:
     roughness: float
     eta: float | None = None
 
-    MODELS: ClassVar = {
-        "NganWard": ("roughness",),
-        "NganCookTorrance": ("roughness", "eta"),
-        "LowCookTorrance": ("roughness", "eta"),
-    }
+    MODELS: ClassVar = {"NganWard": (), "NganCookTorrance": ("eta",), "LowCookTorrance": ("eta",)}  # more fields
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3) in 1/sr without the cosine, comparable with MERL's values; 0 below the surface."""
@@ -139,7 +135,7 @@ def _published(line: str, path: Path, number: int) -> Published:
     while (part := _FIELD.match(inner, end)) is not None and end < len(inner):
         fields[part[1]] = part[2]
         end = part.end()
-    wanted = {"albedo", *Published.MODELS[model]}
+    wanted = {"albedo", "roughness", *Published.MODELS[model]}
     if end != len(inner) or fields.keys() != wanted:
         raise UserError(f"wrong fields of {model}", file=path, field=where, got=inner[:60], expected=sorted(wanted))
     ks = re.fullmatch(_RGB, fields.pop("albedo"))
@@ -147,13 +143,7 @@ def _published(line: str, path: Path, number: int) -> Published:
     if ks is None or numbers.keys() != fields.keys():
         raise UserError("albedo is [r, g, b], the others are numbers", file=path, field=where, got=inner[:60])
     one = Published(name, model, triple(kd), triple(ks.groups()), **numbers)
-    _require_possible(one, path, where)
-    return one
-
-
-def _require_possible(one: Published, path: Path, where: str) -> None:
-    schlick = one.model == "NganCookTorrance"
-    eta = 1.0 if one.eta is None else one.eta
+    schlick, eta = model == "NganCookTorrance", 1.0 if one.eta is None else one.eta
     checks = {
         "Lambertian albedo": (min(one.kd) >= 0 and max(one.kd) < 1e3, one.kd, "at least 0"),
         "albedo": (min(one.ks) >= 0 and max(one.ks) < 1e6, one.ks, "at least 0"),
@@ -163,3 +153,4 @@ def _require_possible(one: Published, path: Path, where: str) -> None:
     for field, (holds, got, expected) in checks.items():
         if not holds:
             raise UserError(f"impossible {field}", file=path, field=f"{where}, {one.name}", got=got, expected=expected)
+    return one

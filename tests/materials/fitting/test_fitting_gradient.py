@@ -92,8 +92,7 @@ def _noise_floor(problem):
 def test_more_lobes_never_explain_less():
     problem = problem_of(grey(PAINT, FEW), "reflection", METRICS["cuberoot"], "ggx", False)
     bounds = Bounds([box_of("reflection", i, True, 1, {}, {}) for i in range(3)], True)
-    found: list[Mixture] = []
-    gradient.fit_lobes(problem, bounds, np.array([0.2]), silent, 0, 0.0, found)
+    found = list(gradient.fit_lobes(problem, bounds, np.array([0.2]), silent, 0))
     errors = [problem.remaining(model) for model in found]
     assert len(errors) > 1
     assert errors == sorted(errors, reverse=True)
