@@ -17,20 +17,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-from numpy.typing import NDArray
-
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Scene
 from lambent.store.contract import is_two_sided
-from lambent.store.store import Store, Writer
+from lambent.store.store import Array, Store, Writer
 
 if TYPE_CHECKING:
     from lambent.bake.tracing.traced_scene import TracedScene
 
-Array = NDArray[Any]
 GEOMETRY = ("positions", "normals", "tangents", "uv", "uv2", "faces")
 
 

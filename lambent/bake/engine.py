@@ -119,9 +119,6 @@ def probe_engine() -> EngineProbe:
         return EngineProbe(cached, (), cached=True)
     failures: list[str] = []
     for name in names:
-        if name.startswith("cuda") and _cuda_driver() is None:
-            failures.append(f"{name}: no CUDA driver")
-            continue
         found = _try(name, library if name.startswith("llvm") else None)
         if isinstance(found, Engine):
             _write_cache(key, found)
@@ -178,6 +175,8 @@ def _cuda_driver() -> int | None:
 
 def _try(name: str, library: Path | None) -> Engine | str:
     """Render a few pixels with variant `name` in a subprocess: the engine, or a line with the reason."""
+    if name.startswith("cuda") and _cuda_driver() is None:
+        return "no CUDA driver"
     environment = os.environ | _kernel_cache_without_home()
     if library is not None:
         environment[LIBRARY_VARIABLE] = str(library)

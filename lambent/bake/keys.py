@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
@@ -19,16 +18,12 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
     """SHA-256 of inputs: numbers, texts, arrays, nested. Raise `revision` where code changes what is made from them."""
     result = hashlib.sha256(f"{what} {revision}".encode())
     for one in inputs:
-        _update(result, one)
+        if isinstance(one, np.ndarray):
+            result.update(f"{one.dtype} {one.shape}".encode())
+            result.update(np.ascontiguousarray(one).tobytes())
+        else:
+            result.update(json.dumps(one, sort_keys=True, default=str).encode())
     return result.hexdigest()
-
-
-def _update(result: Any, one: object) -> None:
-    if isinstance(one, np.ndarray):
-        result.update(f"{one.dtype} {one.shape}".encode())
-        result.update(np.ascontiguousarray(one).tobytes())
-    else:
-        result.update(json.dumps(one, sort_keys=True, default=str).encode())
 
 
 def geometry_inputs(scene: Scene) -> list[object]:

@@ -47,12 +47,12 @@ def run_tiles(
     cost : callable
         Expected work of a region in any unit, so that progress moves evenly.
     """
-    name = writer.artefact.name
-    costs: dict[Chunk, float] = {chunk: cost(writer.region(chunk)) for chunk in writer.artefact.chunk_grid}
+    name, region = writer.artefact.name, writer.artefact.region
+    costs: dict[Chunk, float] = {chunk: cost(region(chunk)) for chunk in writer.artefact.chunk_grid}
     total = sum(costs.values())
     done = total - sum(costs[chunk] for chunk in writer.missing)
     progress(done, total, what)
     for chunk in writer.missing:
-        writer.write(chunk, np.asarray(tile(writer.region(chunk), seed_of(seed, name, chunk))))
+        writer.write(chunk, np.asarray(tile(region(chunk), seed_of(seed, name, chunk))))
         done += costs[chunk]
         progress(done, total, what)

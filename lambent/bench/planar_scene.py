@@ -47,13 +47,9 @@ def meshes() -> dict[str, Mesh]:
     }
 
 
-def floor_material(lobe: Lobe) -> Material:
-    return Material(name=FLOOR, lobes=(lobe,))
-
-
 def floor_state(lobe: Lobe, width: int, height: int) -> FrameState:
     """The frame that shows the specular light of a floor of one lobe."""
-    materials = {FLOOR: floor_material(lobe)}
+    materials = {FLOOR: Material(name=FLOOR, lobes=(lobe,))}
     return FrameState(CAMERA, width, height, show="specular", antialias=False, materials=materials)
 
 
@@ -67,7 +63,7 @@ def planar_scene(lobe: Lobe) -> BakedScene:
     outline = ((-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH))
     part = ReflectorPart(object=FLOOR, faces=(0, 1), area_m2=4 * REACH * REACH)
     reflector = ReflectorRecord(plane=(0, 1, 0, 0), outline=outline, parts=(part,))
-    materials = {PAINT: scene.record.materials[PAINT], FLOOR: floor_material(lobe)}
+    materials = {PAINT: scene.record.materials[PAINT], FLOOR: Material(name=FLOOR, lobes=(lobe,))}
     record = scene.record.model_copy(update={"objects": objects, "materials": materials, "reflectors": (reflector,)})
     uv2 = np.concatenate(list(light_map_places(shapes).values()))
     return replace(scene, record=record, uv2=uv2, irradiance=light_map())

@@ -118,11 +118,8 @@ def _rows(case: Case, ns: Sequence[int]) -> list[dict[str, Any]]:
 
 def eroded(shown: Flags) -> Flags:
     """Pixels whose four neighbours are shown too."""
-    inner = shown.copy()
-    for axis in (0, 1):
-        for step in (1, -1):
-            inner &= np.roll(shown, step, axis)
-    return inner
+    beside = (np.roll(shown, step, axis) for axis in (0, 1) for step in (1, -1))
+    return np.asarray(np.logical_and.reduce([shown, *beside]))
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -32,11 +32,6 @@ def sphere_and_torus(detail: int = 96) -> dict[str, Mesh]:
     return {"sphere": sphere(0.62, around=detail, rows=detail // 2), "torus": placed(ring, rotation=tilt)}
 
 
-def to_lat_long(cube: Floats, height: int = 512) -> Floats:
-    """Lat-long image (height, 2 height, 3) of an environment (6, N, N, 3)."""
-    return sample(cube, lat_long_directions(height, 2 * height))
-
-
 def path_traced(
     meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: Camera, size: int, spp: int
 ) -> Floats:
@@ -45,7 +40,7 @@ def path_traced(
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "environment.exr"
-        write_image(file, to_lat_long(environment))
+        write_image(file, sample(environment, lat_long_directions(512, 1024)))
         objects = tuple(SceneObject(name, mesh, material.name) for name, mesh in meshes.items())
         scene = Scene("bench", objects, {material.name: material}, ImageEnvironment(file))
         return render_reference(scene, camera, size, size, spp)[0]

@@ -45,8 +45,7 @@ def raised(w: Floats) -> Floats:
 def normalize(v: Floats) -> Floats:
     """`v` (..., 3) at unit length; the zero vector stays zero."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    unit: Floats = np.divide(v, length, out=np.zeros_like(v), where=length > 0)
-    return unit
+    return np.asarray(np.divide(v, length, out=np.zeros_like(v), where=length > 0))
 
 
 def half_vector(wi: Floats, wo: Floats) -> Floats:
@@ -56,8 +55,7 @@ def half_vector(wi: Floats, wo: Floats) -> Floats:
 
 def reflect(w: Floats, about: Floats) -> Floats:
     """`w` mirrored about the unit axis `about`: 2 (w.a) a - w."""
-    mirrored: Floats = 2 * np.sum(w * about, axis=-1, keepdims=True) * about - w
-    return mirrored
+    return np.asarray(2 * np.sum(w * about, axis=-1, keepdims=True) * about - w)
 
 
 def basis(n: Floats) -> tuple[Floats, Floats]:
@@ -74,5 +72,4 @@ def rotation_about(axis: Floats, angle_rad: float) -> Floats:
     """(3, 3) right-handed rotation about a unit axis (3,) (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turned: Floats = np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * cross @ cross
-    return turned
+    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * cross @ cross)

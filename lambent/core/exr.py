@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Image
 from lambent.core.errors import UserError
 
-Image = NDArray[np.float32]
 MAGIC = b"v/1\x01"
 _STDERR = 2
 _silencing = threading.Lock()
@@ -61,10 +60,8 @@ def encode(image: Image, path: Path) -> None:
     try:
         OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
     except RuntimeError as error:  # the library's only kind: its text ends with what the system says
-        full = os.strerror(errno.ENOSPC) in str(error)
-        raise OSError(
-            errno.ENOSPC if full else errno.EIO, str(error).rsplit('". ', 1)[-1].rstrip("."), str(path)
-        ) from error
+        code = errno.ENOSPC if os.strerror(errno.ENOSPC) in str(error) else errno.EIO
+        raise OSError(code, str(error).rsplit('". ', 1)[-1].rstrip("."), str(path)) from error
 
 
 @contextmanager

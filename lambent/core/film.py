@@ -7,6 +7,7 @@ import re
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -119,12 +120,10 @@ def sequence_writer(path: Path) -> Iterator[Callable[[NDArray[Any]], None]]:
 
     check_writable(path, SEQUENCES)
     sequence_file(path, 1)
-    number = 0
+    numbers = count(1)
 
     def write(picture: NDArray[Any]) -> None:
-        nonlocal number
-        number += 1
-        file = sequence_file(path, number)
+        file = sequence_file(path, next(numbers))
         try:
             (write_image if radiance_wanted(path) else write_shown)(file, picture)
         except OSError as error:

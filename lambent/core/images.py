@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core import exr, rgbe
+from lambent.core.arrays import Image
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path, check_place, read_bytes
 
-Image = NDArray[np.float32]
 MAX_PIXELS = 1 << 26  # 8192 x 8192: 800 MB as float32 RGB
 LIMIT_BYTES = 2 << 30
 HDR_SUFFIXES = (".exr", ".hdr")

@@ -7,12 +7,11 @@ the look-up knows of nothing on the ray.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
 
-Floats = NDArray[np.floating]
 PLANE_ACTIVE_M = 1e-6  # planes that x is nearer to, or behind, are left out
 NEARNESS_MIN = 1e-6  # 1/m: farther planes are at infinity
 # The march through a distance map: steps, their growth, the first step as a share of the distance seen along w, and

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Image
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 
-Image = NDArray[np.float32]
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 _RESOLUTION = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel

@@ -29,8 +29,7 @@ def r2(n: int, offset: tuple[float, float] = (0.5, 0.5)) -> Floats:
     """(n, 2) points of the additive sequence of the plastic number (Roberts 2018), in [0, 1)^2."""
     plastic = 1.32471795724474602596
     k = np.arange(1, n + 1)[:, None]
-    points: Floats = (np.asarray(offset) + k * np.array([1 / plastic, 1 / plastic**2])) % 1.0
-    return points
+    return np.asarray((np.asarray(offset) + k * np.array([1 / plastic, 1 / plastic**2])) % 1.0)
 
 
 def cosine_hemisphere(u: Floats) -> Floats:

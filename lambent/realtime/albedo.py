@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.directions import normalize
 from lambent.materials.document import Lobe
 from lambent.materials.lobes import fresnel
 from lambent.realtime.patterns import lobe_points, rings_table
@@ -79,8 +80,7 @@ def gains(lobe: Lobe, slopes: Floats, cos_o: Floats, phi_rad: float = 0.0) -> tu
 
     `cos_o` (views,) are those of viewers at the azimuth `phi_rad`; what a viewer sees below the horizon has gain 0.
     """
-    h = np.column_stack([slopes, np.ones(len(slopes))])
-    h /= np.linalg.norm(h, axis=-1, keepdims=True)
+    h = normalize(np.column_stack([slopes, np.ones(len(slopes))]))
     cos_o = cos_o[:, None]
     cos_d = np.sqrt(1 - cos_o**2) * (h[:, 0] * np.cos(phi_rad) + h[:, 1] * np.sin(phi_rad)) + cos_o * h[:, 2]
     cos_i = 2 * cos_d * h[:, 2] - cos_o

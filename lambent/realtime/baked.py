@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import triple
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
@@ -117,10 +118,9 @@ def read_baked(store: Store) -> BakedScene:
 
 def _probe(store: Store, name: str, radiance: Floats) -> Probe:
     meta = store.artefact(contract.probe_name(name, "radiance")).meta
-    x, y, z = meta["centre"]
     distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))
     return Probe(
-        (float(x), float(y), float(z)),
+        triple(meta["centre"]),
         radiance,
         store.read(distance) if distance in store else None,
         store.read(planes).reshape(-1, 4) if planes in store else np.zeros((0, 4), np.float32),

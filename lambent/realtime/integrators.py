@@ -17,11 +17,6 @@ from lambent.materials.document import Lobe
 from lambent.realtime import patterns
 from lambent.realtime.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
 
-
-def _no_table(lobe: Lobe, n: int) -> Floats:
-    return np.zeros((n, 4), np.float32)
-
-
 # Levels by smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Published estimates keep theirs.
 Cube = Literal["smooth", "box", "prefiltered"]
 
@@ -31,7 +26,7 @@ class Integrator:
     """`table(lobe, n)` gives (rows, 4) float32; `rows` fixes their number where it is not the sample count n."""
 
     shader: str
-    table: Callable[[Lobe, int], Floats] = _no_table
+    table: Callable[[Lobe, int], Floats] = lambda lobe, n: np.zeros((n, 4), np.float32)
     constants: Mapping[str, float] = field(default_factory=dict)
     rows: int | None = None
     cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered

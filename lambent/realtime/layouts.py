@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import wgpu
+from numpy.typing import NDArray
 
 from lambent.scenes.textures import CHANNELS
 
@@ -44,6 +45,10 @@ class Layouts:
         """Layout of bindings of these `KINDS`."""
         entries = [{"binding": i, "visibility": visibility, **KINDS[kind]} for i, kind in enumerate(kinds)]
         return self.device.create_bind_group_layout(entries=entries)
+
+    def buffer(self, usage: str, data: NDArray[Any]) -> Any:
+        """Buffer of an array that stays as it is; `usage` is UNIFORM, STORAGE, VERTEX or INDEX."""
+        return self.device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage[usage])
 
     def uniform(self, size: int) -> Any:
         """Uniform buffer of a record that is written anew for each frame."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 
 from lambent.materials import shader_layout
@@ -38,16 +37,9 @@ class MaterialBuffers:
 
     def _new(self, material: Material, how: Integrator, n: int) -> Any:
         lobes = material.lobes if how.specular else ()
-        uniform, storage = wgpu.BufferUsage.UNIFORM, wgpu.BufferUsage.STORAGE
-        buffers = (
-            self._layouts.device.create_buffer_with_data(data=data.tobytes(), usage=usage)
-            for data, usage in (
-                (material_data(material, self.textures), uniform),
-                (lobe_data(lobes), storage),
-                (sample_data(lobes, how, n), storage),
-            )
-        )
-        return self._layouts.group(self._layouts.material, *buffers, *self._bound)
+        numbers = self._layouts.buffer("UNIFORM", material_data(material, self.textures))
+        tables = (self._layouts.buffer("STORAGE", data) for data in (lobe_data(lobes), sample_data(lobes, how, n)))
+        return self._layouts.group(self._layouts.material, numbers, *tables, *self._bound)
 
 
 def material_data(material: Material, textures: BoundTextures) -> Record:

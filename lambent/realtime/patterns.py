@@ -78,7 +78,7 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
             mass = count * weight[-1]
             r = ring_stretch(n) * float(radius(min((before + mass / 2) / n, 0.9999), ggx))
         phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
-        slopes.append(r * np.stack([np.cos(phi), np.sin(phi)], axis=-1))
+        slopes.append(polar(r, phi))
         before += mass
     points = np.concatenate(slopes)
     return Pattern(points, ring_bias(n) * weight / relative_density(points, ggx), weight)
@@ -182,8 +182,7 @@ def rings_table(lobe: Lobe, n: int) -> Floats:
 def lobe_points(n: int, ggx: bool = False) -> Floats:
     """(n, 2) slopes in units of (mx, my) that follow the lobe: Hammersley's points."""
     u1, u2 = hammersley(n).T
-    r = radius(u1, ggx)
-    return np.stack([r * np.cos(2 * np.pi * u2), r * np.sin(2 * np.pi * u2)], axis=-1)
+    return polar(radius(u1, ggx), 2 * np.pi * u2)
 
 
 def fis_table(lobe: Lobe, n: int) -> Floats:
@@ -195,7 +194,8 @@ def fis_table(lobe: Lobe, n: int) -> Floats:
 
 def lobe_table(lobe: Lobe, n: int) -> Floats:
     """The thesis's pattern: a centre and a ring (or a line) equally spaced in angle within the lobe's border."""
-    return lobe_table_at(lobe, np.concatenate([np.zeros((1, 2)), (1 - RING_XI1) * _circle(n - 1)]))
+    ring = polar(1 - RING_XI1, 2 * np.pi * np.arange(n - 1) / max(1, n - 1))
+    return lobe_table_at(lobe, np.concatenate([np.zeros((1, 2)), ring]))
 
 
 def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
@@ -213,9 +213,9 @@ def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
     return table(slopes, np.ones(n), lobe, relative_density(slopes, lobe.distribution == "ggx"))
 
 
-def _circle(count: int) -> Floats:
-    phi = 2 * np.pi * np.arange(count) / max(1, count)
-    return np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+def polar(r: Any, phi_rad: Floats) -> Floats:
+    """(n, 2) points at radii r, a number or (n,), and angles (n,)."""
+    return np.stack([r * np.cos(phi_rad), r * np.sin(phi_rad)], axis=-1)
 
 
 def border(lobe: Lobe) -> Floats:

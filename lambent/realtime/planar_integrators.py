@@ -33,11 +33,10 @@ def multi_ring_table(lobe: Lobe, n: int) -> Floats:
     """
     rings = next((r for r in range(MOST_RINGS, 1, -1) if n > 1 and (n - 1) % r == 0 and (n - 1) // r >= 3), 1)
     count = (n - 1) // rings
-    shares = [np.zeros((1, 2))]
+    shares: list[Floats] = [np.zeros((1, 2))]
     for ring in range(rings if count else 0):
         phi = 2 * np.pi * (np.arange(count) + ring / rings) / count
-        share = (ring + 1) / (rings + 1)
-        shares.append(share * np.stack([np.cos(phi), np.sin(phi)], axis=-1))
+        shares.append(patterns.polar((ring + 1) / (rings + 1), phi))
     return patterns.lobe_table_at(lobe, np.concatenate(shares))
 
 
@@ -58,8 +57,7 @@ def interleaved_table(lobe: Lobe, n: int, bias: float = INTERLEAVED_BIAS) -> Flo
     k, blocks = np.arange(n), [fixed_table(lobe, n)]
     for o in range(TILE):
         r = patterns.radius((k + (o + 0.5) / TILE) / n, ggx)
-        phi = 2 * np.pi * (0.618034 * k + TURN * o % 1)
-        slopes = np.stack([r * np.cos(phi), r * np.sin(phi)], axis=-1)
+        slopes = patterns.polar(r, 2 * np.pi * (0.618034 * k + TURN * o % 1))
         blocks.append(patterns.table(slopes, bias / patterns.relative_density(slopes, ggx), lobe))
     return np.concatenate(blocks)
 

@@ -6,7 +6,6 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import wgpu
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
@@ -22,33 +21,12 @@ from lambent.realtime.uploads import cube_texture
 DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 
 
-class ProbeMaps:
-    """Cube maps of a probe's radiance, (6, N, N, 3), each made when an integrator first asks for it."""
-
-    def __init__(self, layouts: Layouts, radiance: Floats, sampler: Any) -> None:
-        self._layouts, self._radiance, self._sampler = layouts, radiance, sampler
-        self._texture = cache(self._new_texture)
-
-    def view(self, cube: Cube) -> Any:
-        return self._texture(cube).create_view(dimension="cube")
-
-    def half_log2_texels(self, cube: Cube) -> float:
-        """Half the log2 of texels, as large as a look-up blurs, per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17)."""
-        return float(np.log2(self._radiance.shape[1] / 2) - (np.log2(SMOOTH_AREA) / 2 if cube == "smooth" else 0))
-
-    def _new_texture(self, cube: Cube) -> Any:
-        if cube == "prefiltered":
-            return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
-        chain = smooth_chain if cube == "smooth" else mip_chain
-        return cube_texture(self._layouts.device, chain(finite(self._radiance)[0]))
-
-
 class LampTable:
     """The table of a probe's lamps (aim.py), and their prominence, 0 to 1."""
 
-    def __init__(self, device: Any, radiance: Floats) -> None:
+    def __init__(self, layouts: Layouts, radiance: Floats) -> None:
         table = aim_table(finite(radiance)[0])
-        self.buffer = device.create_buffer_with_data(data=table, usage=wgpu.BufferUsage.STORAGE)
+        self.buffer = layouts.buffer("STORAGE", table)
         self.prominence = float(table[0, 1])
 
     def is_aimed_at(self, material: Material, textured: bool) -> bool:
@@ -57,16 +35,34 @@ class LampTable:
 
 
 class ProbeLight:
-    """What objects bind of the probe that they share; without a probe they are dark."""
+    """What objects bind of the probe that they share; without a probe they are dark.
+
+    Cube maps and the resources of a look-up are made when a draw first asks for them.
+    """
 
     def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
-        self._device, self.probe, self._look_ups = layouts.device, probe or DARK, look_ups
-        self.maps = ProbeMaps(layouts, self.probe.radiance, sampler)
-        self.resources = cache(lambda look_up: look_up.resources(self._device, self.probe))  # of a LookUp
+        self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
+        self._texture = cache(self._new_texture)
+        self.resources = cache(lambda look_up: look_up.resources(layouts.device, self.probe))  # of a LookUp
+
+    def view(self, cube: Cube) -> Any:
+        """View of a cube map of the probe's radiance."""
+        return self._texture(cube).create_view(dimension="cube")
+
+    def half_log2_texels(self, cube: Cube) -> float:
+        """Half the log2 of texels, as large as a look-up blurs, per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17)."""
+        blur = np.log2(SMOOTH_AREA) / 2 if cube == "smooth" else 0
+        return float(np.log2(self.probe.radiance.shape[1] / 2) - blur)
+
+    def _new_texture(self, cube: Cube) -> Any:
+        if cube == "prefiltered":
+            return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
+        chain = smooth_chain if cube == "smooth" else mip_chain
+        return cube_texture(self._layouts.device, chain(finite(self.probe.radiance)[0]))
 
     @cached_property
     def lamps(self) -> LampTable:
-        return LampTable(self._device, self.probe.radiance)
+        return LampTable(self._layouts, self.probe.radiance)
 
     @cached_property
     def cheapest(self) -> LookUp:

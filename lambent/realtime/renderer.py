@@ -16,6 +16,7 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
 from lambent.core.images import to_bytes
@@ -30,10 +31,9 @@ from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
 from lambent.realtime.passes.planar import PlanarPass
-from lambent.realtime.passes.smooth import SmoothPass
-from lambent.realtime.passes.tonemap import TonemapPass
 from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.resources import SceneResources
@@ -42,7 +42,6 @@ from lambent.realtime.structs import FRAME_DTYPE, Record
 from lambent.realtime.targets import PassTimer, Targets, pixels
 from lambent.store.store import Store
 
-Floats = NDArray[np.float32]
 SUPERSAMPLES = 16  # frames of a still: below, thin lines come out dotted
 
 
@@ -234,7 +233,8 @@ def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:
 
 
 def _mean(images: Iterable[Floats]) -> Floats:
-    count, total = 0, np.zeros((), np.float32)
+    total: Floats = np.zeros((), np.float32)
+    count = 0
     for image in images:
         count, total = count + 1, total + image
     return np.asarray(total / np.float32(count))

@@ -6,7 +6,6 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import wgpu
 
 from lambent.core.arrays import Floats
 from lambent.realtime.baked import BakedScene, Probe
@@ -42,15 +41,15 @@ class ObjectResources:
 
     def _new_group(self, cube: Cube, look_up: LookUp, aimed: bool = False) -> Any:
         """Group 2 with that cube map and what the look-up reads, `aimed` with the table of the probe's lamps."""
-        probe, maps = self.light.probe, self.light.maps
+        probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
-        data["centre"][0] = (*probe.centre, maps.half_log2_texels(cube))
+        data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
         data["emission"][0, :3] = self.record.emission
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = probe.irradiance
-        uniform = self._layouts.device.create_buffer_with_data(data=data.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
+        uniform = self._layouts.buffer("UNIFORM", data)
         table = self.light.lamps.buffer if aimed else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS)
-        return self._layouts.group(layout, uniform, maps.view(cube), table, *self.light.resources(look_up))
+        return self._layouts.group(layout, uniform, self.light.view(cube), table, *self.light.resources(look_up))
 
 
 class SceneResources:
@@ -64,12 +63,8 @@ class SceneResources:
         )  # fmt: skip
         uv = np.zeros_like(scene.uv2) if scene.uv is None else scene.uv
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
-        self.vertices = device.create_buffer_with_data(
-            data=np.ascontiguousarray(np.nan_to_num(vertices), np.float32), usage=wgpu.BufferUsage.VERTEX
-        )
-        self.indices = device.create_buffer_with_data(
-            data=np.ascontiguousarray(scene.faces, np.uint32), usage=wgpu.BufferUsage.INDEX
-        )
+        self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
+        self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
         self.light_group = layouts.group(layouts.light, self.light_view)
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]

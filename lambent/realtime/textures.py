@@ -41,10 +41,6 @@ def chain(texels: Floats) -> list[Floats]:
     return levels
 
 
-def roughness_levels(texels: Floats) -> list[Floats]:
-    return [np.sqrt(level) for level in chain(np.square(texels, dtype=np.float32))]
-
-
 def normal_levels(normals: Floats) -> list[Floats]:
     """(H, W, 4): slopes along t and b, and twice their variances."""
     s = slopes(normals)
@@ -80,8 +76,7 @@ def encoded(texels: Floats) -> tuple[list[NDArray[np.uint8]], tuple[float, ...]]
     for level in chain(texels):
         bits = level.astype(np.float16).view(np.uint16)
         rgba = np.full((*level.shape[:2], 4), 255, np.uint8)
-        for c in range(3):
-            rgba[..., c] = table[bits[..., c], c]
+        rgba[..., :3] = table[bits, np.arange(3)]
         levels.append(rgba)
     return levels, tuple(float(x) for x in scale)
 
@@ -150,15 +145,15 @@ class TextureCache:
             levels, scale = encoded(texels)
             return BoundTexture(self._uploaded(levels, "rgba8unorm-srgb"), scale)
         if kind == "normal":
-            made, format = normal_levels(texels), "rgba16float"
+            made = normal_levels(texels)
         elif kind == "direction":
-            made, format = chain(doubled_angle(texels)), "rg16float"
+            made = chain(doubled_angle(texels))
         elif kind == "opacity":
             covered = chain((np.asarray(texels) >= cutoff).astype(np.float32))
             made = [np.concatenate(both, axis=-1) for both in zip(opacity_levels(texels, cutoff), covered, strict=True)]
-            format = "rg16float"
         else:
-            made, format = roughness_levels(texels), "r16float"
+            made = [np.sqrt(level) for level in chain(np.square(texels, dtype=np.float32))]
+        format = {1: "r16float", 2: "rg16float", 4: "rgba16float"}[made[0].shape[-1]]
         return BoundTexture(self._uploaded([half(level) for level in made], format))
 
     def _uploaded(self, levels: list[Any], format: str) -> Any:

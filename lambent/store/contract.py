@@ -49,7 +49,6 @@ SCENE = "scene"
 TIMINGS = "timings"
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
-LEAN = DOMINANT_DIRECTION
 VIEW = "view"
 
 

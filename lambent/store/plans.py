@@ -9,13 +9,14 @@ import zlib
 import numpy as np
 
 from lambent.core.errors import UserError
+from lambent.core.plain import triple
 from lambent.scenes.floor_plan import FloorPlan
 from lambent.store.contract import PlanRecord
 
 
 def plan_record(plan: FloorPlan) -> PlanRecord:
     rows, columns = plan.distance.shape
-    corner, across, along = ((float(x), float(y), float(z)) for x, y, z in (plan.corner, plan.across, plan.along))
+    corner, across, along = map(triple, (plan.corner, plan.across, plan.along))
     packed = base64.b64encode(zlib.compress(plan.distance.tobytes(), 9)).decode("ascii")
     return PlanRecord(
         corner=corner, across=across, along=along, cell_m=plan.cell_m, rows=rows, columns=columns, packed=packed

@@ -283,10 +283,6 @@ class Writer:
         """Chunks that are not written yet."""
         return [chunk for chunk in self.artefact.chunk_grid if self.artefact.version(chunk) is None]
 
-    def region(self, chunk: Chunk) -> Region:
-        """Index of the array that a chunk covers (cut at the array's end)."""
-        return self.artefact.region(chunk)
-
     def write(self, chunk: Chunk, data: Array) -> None:
         """Write a chunk, or replace one: whoever reads, and whatever dies, finds the old one or the new one whole.
 
@@ -298,7 +294,7 @@ class Writer:
 
     def read_chunk(self, chunk: Chunk) -> Array:
         """A chunk written before, to build on."""
-        return self._store.read_region(self.artefact.name, self.region(chunk))
+        return self._store.read_region(self.artefact.name, self.artefact.region(chunk))
 
     def extend(self, count: int) -> None:
         """Lengthen the first axis by `count`, whole chunks each; the array is partial until it is finished again."""

@@ -33,9 +33,7 @@ def read_textures(store: Store, record: SceneRecord) -> dict[str, MaterialTextur
     found = {}
     for material, said in record.textures.items():
         textures = {}
-        for part in CHANNELS:
-            if part not in said.parts:
-                continue
+        for part in (part for part in CHANNELS if part in said.parts):
             name = texture_name(material, part)
             key = store.artefact(name).key
             if key not in read:

@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -126,10 +126,7 @@ def checked_name(text: str, taken: set[str]) -> str:
 
 def free_name(stem: str, taken: set[str]) -> str:
     """`stem` with the first number that is not taken."""
-    number = 1
-    while f"{stem} {number}" in taken:
-        number += 1
-    return f"{stem} {number}"
+    return next(name for number in count(1) if (name := f"{stem} {number}") not in taken)
 
 
 def _check(views: Views, path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 import wgpu
 
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.smooth import SmoothPass
+from lambent.realtime.passes.display import SmoothPass
 from lambent.realtime.pipelines import cover
 from lambent.realtime.slices import Whole
 from lambent.realtime.targets import DISPLAY_FORMAT

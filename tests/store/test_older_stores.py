@@ -55,7 +55,7 @@ def test_a_bake_goes_on_and_writes_what_zarr_would(older: Path) -> None:
     store = Store.create(older, {"scene": "hash"})
     writer = store.begin("light_map/traced", "raw", RAW.shape, CHUNKS, "float32", key="k")
     assert writer.missing == [(0, 1, 1, 0)]
-    writer.write((0, 1, 1, 0), RAW[writer.region((0, 1, 1, 0))])
+    writer.write((0, 1, 1, 0), RAW[writer.artefact.region((0, 1, 1, 0))])
     writer.finish()
     manifest = json.loads((older / "manifest.json").read_text())
     assert manifest["version"] == 1
@@ -63,6 +63,6 @@ def test_a_bake_goes_on_and_writes_what_zarr_would(older: Path) -> None:
     assert traced == gathered
     anew = store.begin("light_map/traced", "raw", RAW.shape, CHUNKS, "float32", key="another")
     for chunk in anew.missing:
-        anew.write(chunk, RAW[anew.region(chunk)])
+        anew.write(chunk, RAW[anew.artefact.region(chunk)])
     assert (older / "light_map/traced/c/0/1/0/0").read_bytes() == before
     np.testing.assert_array_equal(zarr.open_array(older / "light_map/traced", mode="r")[...], RAW)

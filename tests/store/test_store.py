@@ -30,7 +30,7 @@ def begin(folder: Path, key: str = "k") -> tuple[Store, Any]:
 
 def write_all(writer: Any) -> None:
     for chunk in writer.missing:
-        writer.write(chunk, ARRAY[writer.region(chunk)])
+        writer.write(chunk, ARRAY[writer.artefact.region(chunk)])
 
 
 def finished(folder: Path) -> Store:
@@ -268,10 +268,10 @@ def test_any_order_any_interruption_same_array(tmp_path_factory: pytest.TempPath
     order = data.draw(st.permutations(writer.missing))
     stop = data.draw(st.integers(0, len(order)))
     for chunk in order[:stop]:
-        writer.write(chunk, array[writer.region(chunk)])
+        writer.write(chunk, array[writer.artefact.region(chunk)])
     _, writer = go_on()
     assert sorted(writer.missing) == sorted(order[stop:])
     for chunk in writer.missing:
-        writer.write(chunk, array[writer.region(chunk)])
+        writer.write(chunk, array[writer.artefact.region(chunk)])
     writer.finish()
     np.testing.assert_array_equal(Store.open(folder).read("a"), array)

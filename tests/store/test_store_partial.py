@@ -22,7 +22,7 @@ def writer_of(folder: Path) -> Writer:
 
 def write(writer: Writer, *chunks: tuple[int, ...]) -> None:
     for chunk in chunks:
-        writer.write(chunk, VALUES[writer.region(chunk)])
+        writer.write(chunk, VALUES[writer.artefact.region(chunk)])
 
 
 def test_another_store_sees_what_was_added_since_when_it_asks(tmp_path: Path) -> None:

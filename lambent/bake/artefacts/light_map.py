@@ -176,15 +176,15 @@ def _samples(
 
 
 def _photon_maps(context: BakeContext) -> Maps:
-    from lambent.bake.photons.maps import Shots
-
     how: Settings = context.settings(KIND)
     whole = context.traced.whole(diffuse=True, photons=True)
     photon_map = _photon_map(context)
     writer = context.samples(KIND, PHOTONS, photon_map.shape, photon_map.chunk)
     if writer.missing:
-        shots = Shots(how.photons_per_texel, how.noise, how.max_depth, context.seed)
-        photon_map.shoot(writer, context.traced.scene, whole, shots, context.progress)
+        photon_map.shoot(
+            writer, context.traced.scene, whole, context.progress, per_texel=how.photons_per_texel, noise=how.noise,
+            max_bounces=how.max_depth, seed=context.seed,
+        )  # fmt: skip
     writer.finish()
     context.progress(0, 1, "denoising")
     return photon_map.finished(context.store.read(PHOTONS), context.traced.labels)

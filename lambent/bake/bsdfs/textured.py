@@ -56,9 +56,7 @@ class SurfaceTextures:
 
     def is_hole(self, si: Any, active: Any) -> Any:
         """Whether there is no surface."""
-        if "opacity" not in self:
-            return mi.Bool(False)
-        return self.at("opacity", si, active)[0] < self.cutoff
+        return self.at("opacity", si, active)[0] < self.cutoff if "opacity" in self else mi.Bool(False)
 
     def diffuse(self, si: Any, active: Any) -> Any:
         """Factor (mi.Color3f) of kd and kt_d."""

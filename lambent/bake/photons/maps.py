@@ -7,7 +7,6 @@ continues from the finished ones after any interruption. The difference of their
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,16 +27,6 @@ BATCHES, FEWEST = 16, 4  # FEWEST: batches from which the noise is estimated
 SMALL = 0.5  # of the median size of a texel
 
 
-@dataclass(frozen=True)
-class Shots:
-    """How a light map is shot: at most `per_texel` photons, until the relative noise is reached."""
-
-    per_texel: int
-    noise: float
-    max_bounces: int
-    seed: int
-
-
 class PhotonMap:
     """A light map of one side or both; `geometry` as in `atlas.merged`."""
 
@@ -49,29 +38,32 @@ class PhotonMap:
         self.chunk = (1, len(sides), self.texels.height, self.texels.width, 3)
         self.shape = (BATCHES, *self.chunk[1:])
 
-    def shoot(self, writer: Writer, scene: Scene, whole: Any, how: Shots, progress: Progress) -> None:
-        """Fill the missing batches until the noise is reached; the rest stay black."""
-        photons = -(-how.per_texel * len(self.texels.index) // BATCHES)
-        sky = learnt_sky(scene, whole, _over_area(self.texels), how.max_bounces)
+    def shoot(
+        self, writer: Writer, scene: Scene, whole: Any, progress: Progress, *, per_texel: int, noise: float,
+        max_bounces: int, seed: int,
+    ) -> None:  # fmt: skip
+        """Fill the missing batches, at most `per_texel` photons, until `noise` is reached; the rest stay black."""
+        photons = -(-per_texel * len(self.texels.index) // BATCHES)
+        sky = learnt_sky(scene, whole, _over_area(self.texels), max_bounces)
         halves, reached = np.zeros((2, *self.chunk[1:])), False
 
         def add(number: int, batch: Floats) -> None:
             nonlocal reached
             halves[number % 2] += batch
             if number % 2 and number + 1 >= FEWEST:
-                reached = self._noise(halves / ((number + 1) / 2)) <= how.noise
+                reached = self._noise(halves / ((number + 1) / 2)) <= noise
 
-        def batch(region: tuple[slice, ...], seed: int) -> Floats:
+        def batch(region: tuple[slice, ...], of_batch: int) -> Floats:
             if reached:
                 return np.zeros(self.chunk, np.float32)
-            found = shoot(whole, self.chunk[1:4], photons, how.max_bounces, seed, sky).astype(np.float32)
+            found = shoot(whole, self.chunk[1:4], photons, max_bounces, of_batch, sky).astype(np.float32)
             add(region[0].start, found)
             return found[None]
 
         for number in range(BATCHES - len(writer.missing)):
             if not reached:
                 add(number, writer.read_chunk((number, 0, 0, 0, 0))[0])
-        run_tiles(writer, batch, seed=how.seed, progress=progress, what="light map, photons")
+        run_tiles(writer, batch, seed=seed, progress=progress, what="light map, photons")
 
     def _noise(self, flux: Floats) -> float:
         """The larger relative noise, by area, of the sides, from halves (2, sides, H, W, 3) of the photons."""

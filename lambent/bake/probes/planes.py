@@ -41,7 +41,7 @@ def bounding_planes(distance: Floats, normals: Floats) -> NDArray[np.float32]:
         return np.zeros((0, 4), np.float32)
     points = w[hit] * t[hit, None]
     candidates = np.concatenate([_dominant(points, normal[hit], omega[hit]), _box(points)])
-    inverse = [_inverse_distance(plane, w) for plane in candidates]
+    inverse = [np.maximum(-(w @ plane[:3]) / plane[3], 0.0) for plane in candidates]  # 1/t, 0 where none is met
     wanted = np.where(hit, 1 / t, 0.0)
     chosen: list[int] = []
     seen = np.zeros_like(wanted)
@@ -56,11 +56,6 @@ def bounding_planes(distance: Floats, normals: Floats) -> NDArray[np.float32]:
         chosen.append(best)
         seen, error = np.maximum(seen, inverse[best]), errors[best]
     return candidates[chosen].astype(np.float32)
-
-
-def _inverse_distance(plane: Floats, w: Floats) -> Floats:
-    """1/t of the plane along unit directions w from the origin, 0 where it is not met."""
-    return np.asarray(np.maximum(-(w @ plane[:3]) / plane[3], 0.0))
 
 
 def _error(inverse: Floats, wanted: Floats, omega: Floats) -> float:

@@ -112,8 +112,9 @@ def _pass(
     jitter = sampler.next_2d()
     s, t = (column + jitter.x) / n * 2 - 1, (row + jitter.y) / n * 2 - 1
     ray = mi.Ray3f(_origin(centre) + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
-    start = path_tracer.camera_start(_up_to_first(scene.first, ray))
-    value = path_tracer.radiance(scene.whole, sampler, start, scene.depth, scene.cache)
+    reach = _distance(scene.first, ray)[0]  # paths begin just before the surface that the probe itself sees
+    near = mi.Ray3f(ray(dr.maximum(reach * (1 - rays.APPROACH) - rays.APPROACH, 0.0)), ray.d)
+    value = path_tracer.radiance(scene.whole, sampler, path_tracer.camera_start(near), scene.depth, scene.cache)
     value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
     square = value * value
     dr.eval(value, square)
@@ -123,12 +124,6 @@ def _pass(
 def _origin(centre: Floats) -> Any:
     """The centre as data, not as constants: all probes share their kernels then."""
     return mi.Point3f(*(dr.opaque(mi.Float, float(x)) for x in centre))
-
-
-def _up_to_first(scene: Any, ray: Any) -> Any:
-    """Rays that begin just before the surface that the given ones meet first in `scene`."""
-    distance = _distance(scene, ray)[0]
-    return mi.Ray3f(ray(dr.maximum(distance * (1 - rays.APPROACH) - rays.APPROACH, 0.0)), ray.d)
 
 
 def _distance(scene: Any, ray: Any) -> tuple[Any, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from lambent.bake.engine import engine
 from lambent.core.directions import Floats
+from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
@@ -72,9 +73,7 @@ def measure(
         document = specimen.model_copy(update={"name": name or specimen.name})
         return synthesise(document, setup, progress)
     if isinstance(specimen, str):
-        if specimen not in SPECIMENS:
-            raise UserError("unknown specimen", got=specimen, expected=f"one of: {', '.join(SPECIMENS)}")
-        name, specimen = name or specimen, SPECIMENS[specimen]
+        name, specimen = name or specimen, SPECIMENS[known("specimen", specimen, SPECIMENS)]
     engine()  # before Mitsuba is imported
     import mitsuba as mi
 

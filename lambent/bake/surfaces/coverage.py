@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.tiles import slices
 from lambent.core.arrays import Floats, Indices
-from lambent.core.geometry import triangle_areas
+from lambent.core.geometry import cross_2d, triangle_areas
 
 CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested in one go: some 200 MB
 PLACED_AT_ONCE = 1 << 16
@@ -40,7 +40,7 @@ def corners_of(geometry: dict[str, Floats], width: int, height: int) -> Floats:
 def density_of(geometry: dict[str, Floats], corners: Floats) -> Floats:
     """Square metres per texel (T,) of triangles, 0 where one has no area in the map."""
     world = triangle_areas(geometry["positions"][geometry["faces"]].astype(float))
-    in_map = np.abs(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) / 2
+    in_map = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) / 2
     return np.divide(world, in_map, out=np.zeros(len(world)), where=in_map > 0)
 
 
@@ -169,8 +169,3 @@ def _extent(triangles: Floats, x: Floats) -> tuple[Floats, Floats]:
     empty = low > high  # by rounding, at the very tip
     low, high = np.where(empty, 0.0, low).clip(0, 1), np.where(empty, 0.0, high).clip(0, 1)
     return low, high
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """z of the cross product of vectors (n, 2)."""
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.bake.surfaces.coverage import Pieces, corners_of, cross, density_of, in_cell, pieces_of, placed
+from lambent.bake.surfaces.coverage import Pieces, corners_of, density_of, in_cell, pieces_of, placed
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
-from lambent.core.geometry import area_vectors, triangle_areas
+from lambent.core.geometry import area_vectors, cross_2d, triangle_areas
 
 POINTS = 4  # per texel, an even number
 SLIVER = 0.02  # share of a texel that lies on the surface, below which it has points around itself
@@ -131,8 +131,8 @@ def _off_borders(geometry: dict[str, Floats], face: Indices, weights: Floats) ->
 def _barycentric(triangles: Floats, points: Floats) -> Floats:
     """Barycentric weights (n, 3), none below 0, of points (n, 2) in triangles (n, 3, 2)."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    weights = np.stack([cross(c - b, points - b), cross(a - c, points - c), cross(b - a, points - a)], -1)
-    weights = np.maximum(weights * np.sign(cross(b - a, c - a))[:, None], 0)
+    weights = np.stack([cross_2d(c - b, points - b), cross_2d(a - c, points - c), cross_2d(b - a, points - a)], -1)
+    weights = np.maximum(weights * np.sign(cross_2d(b - a, c - a))[:, None], 0)
     total = weights.sum(axis=1, keepdims=True)
     return np.asarray(np.divide(weights, total, out=np.full(weights.shape, 1 / 3), where=total > 0))
 

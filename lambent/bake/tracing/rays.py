@@ -121,9 +121,7 @@ def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
 
 def in_shadow(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
     """Whether anything without a hole blocks a ray."""
-    if not holes:
-        return scene.ray_test(ray, active)
-    return intersect(scene, ray, active, True).is_valid()
+    return intersect(scene, ray, active, True).is_valid() if holes else scene.ray_test(ray, active)
 
 
 def hidden(scene: Any, p: Any, n: Any, target: Any, active: Any, holes: bool) -> Any:

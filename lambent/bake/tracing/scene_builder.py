@@ -144,9 +144,8 @@ def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
     vertices, faces = len(o.mesh.positions), len(o.mesh.faces)
     mesh = mi.Mesh(o.name, vertices, faces, props=props, has_vertex_normals=True, has_vertex_texcoords=True)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(o.mesh.positions.astype(np.float32).ravel())
-    parameters["vertex_normals"] = mi.Float(o.mesh.normals.astype(np.float32).ravel())
-    parameters["vertex_texcoords"] = mi.Float(o.mesh.uv.astype(np.float32).ravel())
+    for name, values in (("positions", o.mesh.positions), ("normals", o.mesh.normals), ("texcoords", o.mesh.uv)):
+        parameters[f"vertex_{name}"] = mi.Float(values.astype(np.float32).ravel())
     parameters["faces"] = mi.UInt32(o.mesh.faces.astype(np.uint32).ravel())
     parameters.update()
     mesh.add_attribute(TANGENT_ATTRIBUTE, 3, o.mesh.tangents.astype(np.float32).ravel())

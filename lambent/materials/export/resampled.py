@@ -14,7 +14,7 @@ from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import CHECK_LOG2, is_isotropic, pairs_of
 from lambent.materials.fitting.metrics import errors_and_shares
-from lambent.materials.measured.gonio import GonioTable, Symmetry
+from lambent.materials.measured.gonio import Symmetry, symmetry_of
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.measured.registry import load
 
@@ -52,10 +52,7 @@ def scatterer_of(subject: Subject) -> Scatterer:
         symmetry: Symmetry = "isotropic" if is_isotropic(subject) else "quadrant"
         return Scatterer(subject.name, MaterialBSDF(subject).eval, symmetry, subject.transmits, 3)
     info = subject.info
-    symmetry = "isotropic" if info.isotropic else "none"
-    if isinstance(subject, GonioTable):
-        symmetry = subject.symmetry
-    return Scatterer(Path(info.file).stem, subject.eval, symmetry, info.transmits, info.channels)
+    return Scatterer(Path(info.file).stem, subject.eval, symmetry_of(subject), info.transmits, info.channels)
 
 
 def tuples_of(subject: Subject) -> MeasuredSamples:

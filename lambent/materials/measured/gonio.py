@@ -160,6 +160,13 @@ class GonioTable(MeasuredTable):
                     yield float(theta_i), float(phi_i), sheet, far
 
 
+def symmetry_of(table: MeasuredTable) -> Symmetry:
+    """The symmetry a table claims."""
+    if isinstance(table, GonioTable):
+        return table.symmetry
+    return "isotropic" if table.info.isotropic else "none"
+
+
 def groups(key: Indices, rows: Indices) -> list[tuple[int, Indices]]:
     """(key, rows) of every key among the chosen rows."""
     rows = rows[np.argsort(key[rows], kind="stable")]

@@ -9,7 +9,7 @@ import numpy as np
 
 from lambent.core.directions import direction
 from lambent.materials.measured import faults
-from lambent.materials.measured.gonio import GonioTable, Symmetry
+from lambent.materials.measured.gonio import symmetry_of
 from lambent.materials.measured.protocol import MeasuredTable
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
@@ -67,10 +67,3 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         },
         "findings": [*unusable, *too_bright, *not_mutual, *asymmetric, *towards_light, *under_sampled],
     }
-
-
-def symmetry_of(table: MeasuredTable) -> Symmetry:
-    """The symmetry a table claims."""
-    if isinstance(table, GonioTable):
-        return table.symmetry
-    return "isotropic" if table.info.isotropic else "none"

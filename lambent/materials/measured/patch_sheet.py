@@ -71,6 +71,7 @@ class PatchSheet:
         Integral of f cos(theta_i) over the side, and its least upper bound in 1/sr; means over the channels.
     """
 
+    anisotropic: ClassVar[bool] = True  # patches turn with the sheet
     ARRAYS: ClassVar[tuple[str, ...]] = (
         "edges", "counts", "starts", "signs", "values", "cdf", "density", "bounds", "albedo",
     )  # fmt: skip
@@ -98,11 +99,6 @@ class PatchSheet:
     def of_sizes(cls, sizes: tuple[int, ...], arrays: dict[str, Any]) -> PatchSheet:
         """The inverse of `sizes` and `ARRAYS`."""
         return cls(*sizes, **arrays)
-
-    @property
-    def anisotropic(self) -> bool:
-        """True: patches turn with the sheet."""
-        return True
 
     def evaluate(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Vector:
         """f in 1/sr per RGB channel, without the cosine."""

@@ -131,12 +131,9 @@ class ScatteredSheet:
         return ~self.images
 
     @cached_property
-    def _usable(self) -> Flags:
-        return sensible(self.values)
-
-    @cached_property
     def _lookup(self) -> LookUp:
-        w, f = self.directions[self._usable], np.maximum(self.values[self._usable], 0)
+        usable = sensible(self.values)
+        w, f = self.directions[usable], np.maximum(self.values[usable], 0)
         if len(w) == 0:
             return lambda asked: np.zeros((len(asked), f.shape[1]))
         if np.abs(w @ self.specular[1]).max() < _IN_PLANE:

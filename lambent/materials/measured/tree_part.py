@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class TreePart:
     """
 
     trees: tuple[TensorTree, ...]
+    direct_share: ClassVar[float] = 0.0  # leaves are as small as the lobes need
 
     @property
     def rank(self) -> Rank:
@@ -66,11 +68,6 @@ class TreePart:
     def anisotropy(self) -> float:
         """0 for rank 3, which is isotropic; infinite for rank 4, whose square cannot be turned."""
         return 0.0 if self.rank == 3 else np.inf
-
-    @property
-    def direct_share(self) -> float:
-        """0: leaves are as small as the lobes need."""
-        return 0.0
 
     @property
     def negative(self) -> int:

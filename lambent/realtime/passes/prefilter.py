@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.cubemap import directions_at
@@ -27,7 +26,7 @@ def prefiltered_cube(layouts: Layouts, source: Any, sampler: Any) -> Any:
     target = target_texture(device, (n, n, 6), FORMAT, levels)
     layout = layouts.of("uniform", "sampler", "storage", "cube")
     pipeline = screen_pipeline(device, "prefilter", [layout], [FORMAT])
-    samples = device.create_buffer_with_data(data=_samples(), usage=wgpu.BufferUsage.STORAGE)
+    samples = layouts.buffer("STORAGE", _samples())
     # Columns of each face for clip coordinates (y up): direction = s x + t y + axis.
     corners = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     axis, right, below = (directions_at(np.arange(6), np.full(6, s), np.full(6, t)) for s, t in corners)
@@ -39,7 +38,7 @@ def prefiltered_cube(layouts: Layouts, source: Any, sampler: Any) -> Any:
             record[name][:3] = column[face]
         record["m"] = (level / (LEVELS - 1)) ** 2
         record["texels"] = np.log2(n / 2)
-        uniform = device.create_buffer_with_data(data=record.tobytes(), usage=wgpu.BufferUsage.UNIFORM)
+        uniform = layouts.buffer("UNIFORM", record)
         group = layouts.group(layout, uniform, sampler, samples, source.create_view(dimension="cube"))
         view = target.create_view(
             dimension="2d", base_mip_level=level, mip_level_count=1, base_array_layer=face, array_layer_count=1

@@ -1,4 +1,4 @@
-"""Radiance to the display image: exposure, view transform, sRGB."""
+"""Radiance to the display image: exposure, view transform, sRGB; then its edges, blended."""
 
 from __future__ import annotations
 
@@ -26,4 +26,21 @@ class TonemapPass:
         target = context.unsmoothed.create_view() if context.unsmoothed else context.shown
         for band in context.slicing.bands("tonemap", context.state.size):
             context.cover("tonemap", [target], self._pipeline, groups, band)
+            yield
+
+
+class SmoothPass:
+    """Fast approximate antialiasing of an encoded image, see shaders/smooth.wgsl."""
+
+    def __init__(self, layouts: Layouts) -> None:
+        self._layouts = layouts
+        self._pipeline = screen_pipeline(layouts.device, "smooth", [layouts.shown], [DISPLAY_FORMAT])
+
+    def encode(self, context: FrameContext) -> Steps:
+        """Draw `unsmoothed` into `shown`."""
+        if context.unsmoothed is None:
+            return
+        group = self._layouts.group(self._layouts.shown, context.unsmoothed.create_view(), context.resources.sampler)
+        for band in context.slicing.bands("smooth", context.state.size):
+            context.cover("smooth", [context.shown], self._pipeline, [group], band)
             yield
