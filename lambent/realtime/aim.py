@@ -56,7 +56,7 @@ def aimed_share(roughness: float, prominent: float) -> float:
     """Share of a lobe's samples that aim, before rounding (wanted_sixteenths of aim.wgsl): 0 to 12/16.
 
     `roughness` is sqrt(mx my). At .1 and a `prominent` of 1 half of the samples aim, 2.5/16 more for each doubling of
-    the roughness; by experiment (docs/performance.md).
+    the roughness; by experiment (docs/decisions.md).
     """
     return float(np.clip(prominent * (8 + 2.5 * np.log2(roughness / 0.1)), 0, 12)) / 16
 

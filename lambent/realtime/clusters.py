@@ -1,6 +1,6 @@
 """Which triangles a camera can see: clusters of neighbours, by the boxes around them.
 
-An adapter in software spends a third of a small frame on vertices (docs/window.md), and a band of a frame would spend
+A software adapter spends a third of a small frame on vertices (docs/decisions.md), and a band of a frame would spend
 as much again for each pass; what is outside of the view, or of the band, is left out here, on the CPU.
 """
 

@@ -5,7 +5,7 @@ every level. Neighbouring faces meet without a seam because the GPU filters cube
 
 A look-up between the texels of such a level shows them: the light of a small lamp has corners, and is bright where it
 falls on the middle of a texel. Smooth levels are blurred once more, over `SMOOTH_AREA` times the area, and looked up
-as much finer: the blur is the same and nearly round. By experiment (docs/performance.md) that is worth 2.5 dB.
+as much finer: the blur is the same and nearly round. By experiment (docs/decisions.md) that is worth 2.5 dB.
 """
 
 from __future__ import annotations

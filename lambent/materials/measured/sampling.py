@@ -1,6 +1,6 @@
 """Scatter from a measured table without a model: reflect, transmit or absorb (thesis M, 3.1), then a new direction.
 
-Two samplers of the new direction; `docs/performance.md` compares them:
+Two samplers of the new direction; `docs/decisions.md` compares them:
 
 - `Rejection`, the thesis's 3.2: uniform low-discrepancy candidates, accepted with p / (largest p of the row). It
   follows the table itself, whatever its shape, and needs 2 pi p_max / r candidates per sample: 3 for white paper, 20
