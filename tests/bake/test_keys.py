@@ -1,0 +1,324 @@
+"""Which arrays get new keys where one input of a bake changes, and which keep them: no array is baked, nor traced.
+
+A key that misses an input reuses stale light silently; one with an input too many bakes again for nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import found
+from lambent.bake.context import BakeContext
+from lambent.bake.methods import chosen
+from lambent.bake.quality import Quality
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.images import write_image
+from lambent.materials.document import Lobe, Material, Provenance
+from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.scene import (
+    ConstantEnvironment,
+    DirectionalLight,
+    ImageEnvironment,
+    MaterialTextures,
+    Mesh,
+    PointLight,
+    ReflectorRule,
+    Scene,
+    SceneObject,
+    SunSky,
+    Texture,
+)
+from lambent.scenes.textures import CHANNELS
+from lambent.store.store import Store
+from tests.bake.small_scenes import GREY, MIRROR, TINY
+
+NOTHING: tuple[str, ...] = ()
+PROBES = ("probe/",)
+LIT = ("light_map/", *PROBES)  # whatever light falls on
+SKY = ("environment/", *LIT)
+SURFACES = ("geometry/", *LIT)
+OF_BALL = ("probe/ball/",)
+
+Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
+VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
+
+MESH: Answers = {
+    "positions": (lambda a: a + np.float32(0.001), SURFACES),
+    "normals": (lambda a: -a, SURFACES),
+    "tangents": (lambda a: -a, SURFACES),
+    "uv": (lambda a: a[:, ::-1], SURFACES),
+    "faces": (lambda a: np.roll(a, 1, axis=1), SURFACES),
+}
+OBJECT: Answers = {
+    "name": ("parquet", SURFACES),
+    "mesh": (patch((-2, 0, 2), (4, 0, 0), (0, 0, -3)), SURFACES),
+    "material": ("worn", LIT),
+    "emission": ((0.0, 0.0, 0.1), LIT),
+    "light_map_scale": (0.5, SURFACES),
+}
+MATERIAL: Answers = {
+    "name": ("renamed", NOTHING),
+    "provenance": (Provenance(source="other.brdf"), NOTHING),
+    "kd": ((0.1, 0.2, 0.31), LIT),
+    "kd_coupled": (True, LIT),
+    "kt_d": ((0.1, 0.1, 0.2), LIT),
+    "lobes": (lambda lobes: lobes * 2, LIT),
+}
+LOBE: Answers = {
+    "side": ("transmission", LIT),
+    "distribution": ("ggx", LIT),
+    "k": ((0.9, 1.0, 1.0), LIT),
+    "mx": (0.02, LIT),
+    "my": (0.02, LIT),
+    "r0": ((0.04, 0.04, 0.05), LIT),
+    "alpha": (0.5, LIT),
+}
+TEXTURES: Answers = {
+    **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), LIT) for part in CHANNELS},
+    "cutoff": (0.25, LIT),
+}
+TEXTURE: Answers = {
+    "texels": (lambda a: a * np.float16(0.75), LIT),
+    "uv_transform": (((2.0, 0.0, 0.0), (0.0, 1.0, 0.0)), LIT),
+}
+SUN_SKY: Answers = {
+    "sun_direction": ((0.6, 0.8, 0.0), SKY),
+    "turbidity": (4.0, SKY),
+    "albedo": (0.2, SKY),
+    "sun_scale": (0.5, SKY),
+    "sky_scale": (0.5, SKY),
+}
+IMAGE: Answers = {
+    "file": (lambda file: file.with_name("dusk.exr"), SKY),
+    "scale": (2.0, SKY),
+    "rotation_deg": (90.0, SKY),
+}
+CONSTANT: Answers = {"radiance": ((1.0, 1.0, 1.1), SKY)}
+POINT: Answers = {
+    "position": ((0.0, 2.0, 0.1), LIT),
+    "intensity": ((5.0, 5.0, 4.0), LIT),
+    "direction": ((0.0, -0.6, 0.8), LIT),
+    "inner_deg": (5.0, LIT),
+    "outer_deg": (40.0, LIT),
+}
+DIRECTIONAL: Answers = {"direction": ((0.0, -0.6, 0.8), LIT), "irradiance": ((1.0, 1.0, 0.5), LIT)}
+SCENE: Answers = {
+    "name": ("renamed", NOTHING),
+    "objects": (lambda objects: objects[::-1], SURFACES),
+    "environment": (None, SKY),
+    "lights": (lambda lights: lights[:1], LIT),
+    "cameras": ((VIEW,), NOTHING),
+    "paths": ((CameraPath("path", (VIEW, replace(VIEW, position=(0.0, 1.0, 2.0)))),), NOTHING),
+    "exposure_ev": (2.0, NOTHING),
+    "sources": ((Path("other.toml"),), NOTHING),
+    "warnings": (("a face is missing",), NOTHING),
+    "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes",)),
+    "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
+    "reflector_rules": ((ReflectorRule("floor", use=False),), NOTHING),
+    "parts": ({"ball": "balls"}, NOTHING),  # given by the names of the objects, which are in the key
+    "origin": ("builtin:room", NOTHING),
+    "measured": (lambda files: {"grey": files["grey"].with_name("dusk.exr")}, LIT),
+    "materials": (lambda materials: {**materials, "grey": Material(kd=0.4)}, LIT),
+    "textures": ({}, None),  # names of arrays change with them: TEXTURES says it part by part
+}
+CASES: list[tuple[type, Answers, Callable[[Scene], Any], Callable[[Scene, Any], Scene]]] = [
+    (Scene, SCENE, lambda scene: scene, lambda scene, new: new),
+    (SceneObject, OBJECT, lambda scene: scene.objects[0], lambda scene, new: with_floor(scene, new)),
+    (
+        Mesh, MESH, lambda scene: scene.objects[0].mesh,
+        lambda scene, new: with_floor(scene, replace(scene.objects[0], mesh=new)),
+    ),
+    (Material, MATERIAL, lambda scene: scene.materials["sheet"], lambda scene, new: with_sheet(scene, new)),
+    (
+        Lobe, LOBE, lambda scene: scene.materials["sheet"].lobes[0],
+        lambda scene, new: with_sheet(scene, changed(scene.materials["sheet"], "lobes", (new,))),
+    ),
+    (
+        MaterialTextures, TEXTURES, lambda scene: scene.textures["worn"],
+        lambda scene, new: replace(scene, textures={"worn": new}),
+    ),
+    (
+        Texture, TEXTURE, lambda scene: scene.textures["worn"].roughness,
+        lambda scene, new: replace(scene, textures={"worn": replace(scene.textures["worn"], roughness=new)}),
+    ),
+    (
+        ImageEnvironment, IMAGE, lambda scene: scene.environment,
+        lambda scene, new: replace(scene, environment=new),
+    ),
+    (
+        PointLight, POINT, lambda scene: scene.lights[0],
+        lambda scene, new: replace(scene, lights=(new, scene.lights[1])),
+    ),
+    (
+        DirectionalLight, DIRECTIONAL, lambda scene: scene.lights[1],
+        lambda scene, new: replace(scene, lights=(scene.lights[0], new)),
+    ),
+]  # fmt: skip
+SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
+    "geometry": {"texels": (64, SURFACES)},
+    "environment": {"texels": (32, ("environment/",))},
+    "light_map": {
+        "samples": ((64, 128), LIT),
+        "noise": (0.1, LIT),
+        "max_depth": (33, LIT),
+        "gather_samples": (16, LIT),
+        "photons_per_texel": (65, NOTHING),  # of the other method
+        "gather_noise": (0.1, LIT),
+        "tile_texels": (128, LIT),
+    },
+    "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
+}
+
+
+def changed(one: Any, field: str, value: Any) -> Any:
+    """A dataclass or document with another value, or with a function of the one that it has."""
+    value = value(getattr(one, field)) if callable(value) else value
+    return replace(one, **{field: value}) if is_dataclass(one) else type(one)(**{**dict(one), field: value})
+
+
+def with_floor(scene: Scene, floor: SceneObject) -> Scene:
+    return replace(scene, objects=(floor, *scene.objects[1:]))
+
+
+def with_sheet(scene: Scene, sheet: Material) -> Scene:
+    return replace(scene, materials={**scene.materials, "sheet": sheet})
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Scene:
+    """Something of everything that a bake can depend on."""
+    for name, radiance in {"noon": 1.0, "dusk": 0.25}.items():
+        write_image(tmp_path / f"{name}.exr", np.full((4, 8, 3), radiance, np.float32))
+    textures = {part: Texture(np.full((2, 2, n), 0.75, np.float16)) for part, n in CHANNELS.items()}
+    objects = (
+        SceneObject("floor", patch((-2, 0, 2), (4, 0, 0), (0, 0, -4)), "grey"),
+        SceneObject("ball", placed(sphere(0.3, 8, 4), (0, 1, 0)), "mirror"),
+        SceneObject("other ball", placed(sphere(0.3, 8, 4), (1, 1, 0)), "mirror"),
+        SceneObject("curtain", patch((-2, 0, -2), (4, 0, 0), (0, 2, 0)), "sheet"),
+        SceneObject("wall", patch((-2, 0, 2), (0, 0, -4), (0, 2, 0)), "worn"),
+    )
+    rough = Lobe(mx=1.0, my=1.0)
+    return Scene(
+        "small",
+        objects,
+        {"grey": GREY, "mirror": MIRROR, "sheet": Material(kd=0.2, kt_d=0.1, lobes=(rough,)), "worn": GREY},
+        environment=ImageEnvironment(tmp_path / "noon.exr"),
+        lights=(
+            PointLight((0.0, 2.0, 0.0), (5.0, 5.0, 5.0), (0.0, -1.0, 0.0), 10.0, 30.0),
+            DirectionalLight((0.0, -1.0, 0.0), (1.0, 1.0, 1.0)),
+        ),
+        textures={"worn": MaterialTextures(**textures)},
+        probe_planes={"ball": np.array([[0.0, 1.0, 0.0, 0.0]])},
+        probe_centres={"ball": (0.0, 1.0, 0.0)},
+        measured={"grey": tmp_path / "noon.exr"},
+    )
+
+
+@pytest.fixture
+def keys(tmp_path: Path) -> Callable[..., dict[str, str]]:
+    """The key of every array of a bake, by name."""
+    store = Store.create(tmp_path / "store", {})
+
+    def found_keys(scene: Scene, quality: Quality = TINY, seed: int = 0, **methods: str | None) -> dict[str, str]:
+        how = chosen({}, **{"light_map": None, "probes": None, **methods})
+        context = BakeContext(scene, store, found(), quality, how, seed)
+        return {name: key for kind in found() for name, key in context.keys(kind).items()}
+
+    return found_keys
+
+
+def stale(before: dict[str, str], after: dict[str, str]) -> set[str]:
+    return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+
+
+def starting(names: dict[str, str], prefixes: tuple[str, ...]) -> set[str]:
+    return {name for name in names if name.startswith(prefixes)}
+
+
+def test_the_scene_has_every_array(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+    names = set(keys(scene))
+    assert {
+        f"probe/{ball}/{part}" for ball in ("ball", "other ball") for part in ("radiance", "distance", "planes")
+    } < (names)
+    assert {"light_map/irradiance", "light_map/irradiance_back", "light_map/noise_back", "light_map/lean"} < names
+    assert {"geometry/tangents", "environment/radiance"} < names
+    assert keys(scene) == keys(replace(scene)), "the same inputs, the same keys"
+
+
+ANSWERS = [(kind, field) for kind, answers, _, _ in CASES for field in answers if answers[field][1] is not None]
+
+
+@pytest.mark.parametrize(("kind", "field"), ANSWERS, ids=[f"{kind.__name__}.{field}" for kind, field in ANSWERS])
+def test_a_change_of_the_scene(scene: Scene, keys: Callable[..., dict[str, str]], kind: type, field: str) -> None:
+    _, answers, inner, outer = next(case for case in CASES if case[0] is kind)
+    value, prefixes = answers[field]
+    before, after = keys(scene), keys(outer(scene, changed(inner(scene), field, value)))
+    assert stale(before, after) == starting(before | after, prefixes)
+
+
+def of_daylight() -> Iterator[tuple[Any, str, Any]]:
+    sky, even = SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0))
+    yield from ((sky, field, value) for field, (value, _) in SUN_SKY.items())
+    yield from ((even, field, value) for field, (value, _) in CONSTANT.items())
+
+
+@pytest.mark.parametrize(("environment", "field", "value"), list(of_daylight()))
+def test_a_change_of_the_environment(
+    scene: Scene, keys: Callable[..., dict[str, str]], environment: Any, field: str, value: Any
+) -> None:
+    before = keys(replace(scene, environment=environment))
+    after = keys(replace(scene, environment=changed(environment, field, value)))
+    assert stale(before, after) == starting(before, SKY)
+
+
+def test_kinds_of_environments_differ(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+    environments = (None, scene.environment, SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0)))
+    some = [keys(replace(scene, environment=environment)) for environment in environments]
+    for i, one in enumerate(some):
+        assert all(stale(one, other) == starting(one, SKY) for other in some[:i])
+
+
+def test_files_count_by_their_content(scene: Scene, keys: Callable[..., dict[str, str]], tmp_path: Path) -> None:
+    before, moved = keys(scene), tmp_path / "moved.exr"
+    moved.write_bytes((tmp_path / "noon.exr").read_bytes())
+    elsewhere = replace(scene, environment=ImageEnvironment(moved), measured={"grey": moved})
+    assert not stale(before, keys(elsewhere))
+    moved.write_bytes((tmp_path / "dusk.exr").read_bytes())
+    assert stale(before, keys(replace(scene, environment=ImageEnvironment(moved)))) == starting(before, SKY)
+    assert stale(before, keys(replace(scene, measured={"grey": moved}))) == starting(before, LIT)
+
+
+@pytest.mark.parametrize(("kind", "field"), [(kind, field) for kind, of in SETTINGS.items() for field in of])
+def test_a_setting(scene: Scene, keys: Callable[..., dict[str, str]], kind: str, field: str) -> None:
+    value, prefixes = SETTINGS[kind][field]
+    before, after = keys(scene), keys(scene, TINY.changed(**{kind: {field: value}}))
+    assert stale(before, after) == starting(before | after, prefixes)
+
+
+def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+    before = keys(scene)
+    assert not stale(before, keys(scene, TINY.changed("another name")))
+    assert stale(before, keys(scene, seed=1)) == starting(before, LIT)
+    assert stale(before, keys(scene, probes="traced")) == starting(before, PROBES)
+    photons = keys(scene, light_map="photons")
+    assert stale(before, photons) == starting(before | photons, LIT)
+    more = keys(scene, TINY.changed(light_map={"photons_per_texel": 65}), light_map="photons")
+    assert stale(photons, more) == starting(photons, LIT)
+
+
+def test_every_input_is_answered_for() -> None:
+    """A new field of the scene, or a new setting, has to be added to the tables above."""
+    more = [(SunSky, SUN_SKY), (ConstantEnvironment, CONSTANT)]
+    for kind, answers in [(kind, answers) for kind, answers, _, _ in CASES] + more:
+        names = {field.name for field in fields(kind)} if is_dataclass(kind) else set(kind.model_fields)
+        assert names - {"format", "version"} == answers.keys(), kind.__name__
+    kinds = found()
+    assert kinds.keys() == SETTINGS.keys()
+    for kind, of in SETTINGS.items():
+        assert {field.name for field in fields(kinds[kind].SETTINGS["preview"])} == of.keys(), kind
