@@ -13,7 +13,9 @@ import pytest
 from lambent import __version__, cli
 from lambent.core.discovery import names_in
 from lambent.core.images import write_image
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Lobe, Material, load_material
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.synthetic import Setup, synthesise
 
 COMMANDS = [name for name in names_in(cli) if name not in ("main", "console")]
 NEEDS_ARGUMENTS = [name for name in COMMANDS if name not in ("doctor", "demo")]
@@ -214,6 +216,19 @@ def test_an_interrupted_fit_ends_its_bench(lambent, monkeypatch):
 
     monkeypatch.setattr("lambent.materials.fitting.gradient.fit_lobes", interrupt)
     assert lambent("bench", "fit", "--quick").code == 130
+
+
+def test_an_interrupted_fit_gives_the_best_so_far_and_130(lambent, monkeypatch, tmp_path):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    setup = Setup((0.0, 30.0, 60.0), step_deg=15, fine_deg=15, noise=0.0, floor=0.0)
+    write_gonio(tmp_path / "m.txt", synthesise(Material(name="m", kd=0.3), setup))
+    monkeypatch.setattr("lambent.materials.fitting.gradient.fit_lobes", interrupt)
+    outcome = lambent("fit", tmp_path / "m.txt", "-o", tmp_path / "m.json", "--json")
+    assert outcome.code == 130 and outcome.json["partial"]
+    assert "cancelled" in outcome.err and outcome.err.endswith("lambent: interrupted; what was finished is kept\n")
+    assert load_material(tmp_path / "m.json").kd[0] == pytest.approx(0.3, rel=0.01)
 
 
 def test_a_place_that_takes_no_file_is_one_line(refused, monkeypatch, pictures, tmp_path):
