@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import FLIP_Z, angles, direction, half_vector, raised, reflect
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, Quantity, TableInfo, collect
 from lambent.materials.measured.sheets import ScatteredSheet, Sheet
@@ -114,12 +114,16 @@ class GonioTable(MeasuredTable):
     def _eval_side(self, sheets: Sequence[Sequence[AnySheet]], wi: Floats, wo: Floats) -> Floats:
         theta, phi = angles(wi)
         i, i1, u = bracket(self.theta_i_deg, np.degrees(theta))
-        j, j1, v = self._phi_bracket(np.degrees(phi))
+        j, j1, v, turned, turned1 = self._phi_bracket(np.degrees(phi))
         h = half_vector(wi, wo)
         f = np.zeros((len(wi), self.info.channels))
-        for a, b, weight in ((i, j, (1 - u) * (1 - v)), (i, j1, (1 - u) * v), (i1, j, u * (1 - v)), (i1, j1, u * v)):
-            neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b]))
-            asked = reflect(neighbour, h) if self.reconstruction == "half_vector" else wo
+        for a, b, turn, weight in (
+            (i, j, turned, (1 - u) * (1 - v)), (i, j1, turned1, (1 - u) * v),
+            (i1, j, turned, u * (1 - v)), (i1, j1, turned1, u * v),
+        ):  # fmt: skip
+            half_turn = np.where(turn[:, None], (-1.0, -1.0, 1.0), 1.0)
+            neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b])) * half_turn
+            asked = (reflect(neighbour, h) if self.reconstruction == "half_vector" else wo) * half_turn
             # Interpolate p, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon. At the
             # horizon itself f = p / cos would diverge and make single pixels too bright.
             weight = weight * np.minimum(np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN), _STEEPEST)
@@ -128,15 +132,22 @@ class GonioTable(MeasuredTable):
                 f[rows] += sheet.at(asked[rows]) * weight[rows, None]
         return f
 
-    def _phi_bracket(self, phi_deg: Floats) -> tuple[Indices, Indices, Floats]:
-        """Indices of the phi_i on either side and the share of the second; a whole or half turn wraps round."""
+    def _phi_bracket(self, phi_deg: Floats) -> tuple[Indices, Indices, Floats, Flags, Flags]:
+        """Indices of the phi_i on either side, the share of the second, and where each stands half a turn further.
+
+        A whole or half turn wraps round.
+        """
         nodes = self.phi_i_deg
         period = {"half": 180.0, "none": 360.0}.get(self.symmetry)
+        unturned = np.zeros(len(phi_deg), bool)
         if period is None or len(nodes) == 1:
-            return bracket(nodes, phi_deg)
+            return *bracket(nodes, phi_deg), unturned, unturned
         closed = nodes if nodes[-1] - nodes[0] >= period - 1e-6 else np.append(nodes, nodes[0] + period)
         j, j1, v = bracket(closed, (phi_deg - nodes[0]) % period + nodes[0])
-        return j, j1 % len(nodes), v
+        if self.symmetry == "none":
+            return j, j1 % len(nodes), v, unturned, unturned
+        turned = np.floor_divide(phi_deg - nodes[0], period) % 2 == 1
+        return j, j1 % len(nodes), v, turned, turned ^ (j1 == len(nodes))
 
     def samples(self, max_count: int | None = None) -> MeasuredSamples:
         """The table's tuples; the weight is the solid angle of the outgoing cell, in sr."""
