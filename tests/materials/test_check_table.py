@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from lambent.materials import check_table as module
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.check_table import check_table
 from lambent.materials.document import Lobe, Material
+from lambent.materials.export import lbnl_xml
+from lambent.materials.measured import load
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo
 
@@ -83,3 +86,38 @@ def test_a_table_that_returns_more_than_arrives_fails():
 def test_an_albedo_that_is_not_the_integral_fails():
     report = check_table(FCosTakenForF(), shape=SMALL)
     assert any("its quadrature" in text for text in report.failures), report
+
+
+@pytest.fixture
+def film(tmp_path):
+    """A BSDF file of a diffusing film, with transmission alone."""
+    path = tmp_path / "film.xml"
+    lbnl_xml.write(Material(name="film", kt_d=0.6), path)
+    return path
+
+
+def test_a_file_of_transmission_alone_passes(film):
+    """No pair of directions is left to be swapped."""
+    report = check_table(load(film))
+    assert report.passed and not report.warnings, report
+    assert report.reciprocity_share == 0 and report.integrals[0].from_table == pytest.approx(0.6, rel=0.01)
+
+
+def test_a_table_answers_no_question_with_no_values(film):
+    table, none = load(film), np.zeros((0, 3))
+    assert table.eval(none, none).shape == (0, 1)
+    assert all(look_up(none).shape == (0, 1) for look_up in (table.reflectivity, table.transmissivity, table.albedo))
+
+
+@pytest.mark.parametrize("name", ["simple_klems_through_refl_trans", "blinds_20deg_noGlazing_Klems"])
+def test_transmission_alone_of_real_files(shared_data, tmp_path, name):
+    text = (shared_data / "measured" / "lbnl" / f"{name}.xml").read_text()
+    blocks = re.findall("<WavelengthData>.*?</WavelengthData>", text, re.DOTALL)
+    for block in blocks:
+        if "Reflection" in block:
+            text = text.replace(block, "")
+    (tmp_path / "t.xml").write_text(text)
+    table = load(tmp_path / "t.xml")
+    assert table.info.transmits and not table.reflectivity(np.array([[0.6, 0.0, 0.8]])).any()
+    report = check_table(table)
+    assert report.reciprocity_share == 0 and not any("swapping" in text for text in report.failures)

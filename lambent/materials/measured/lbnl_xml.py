@@ -147,7 +147,7 @@ class LbnlTable(MeasuredTable):
                 continue
             look_up = use.part.hemispherical_reversed if use.backwards else use.part.hemispherical
             total[here] = look_up(_entering(flat[here]) * (HALF_TURN if use.backwards else 1.0))
-        return total.reshape(*wi.shape[:-1], -1)
+        return total.reshape(*wi.shape[:-1], total.shape[-1])
 
     def _notes(self, anisotropy: float) -> list[str]:
         notes = ["+z is the side the file calls Back and Radiance calls front"]
