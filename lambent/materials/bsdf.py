@@ -9,13 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.core.plain import Triple
 from lambent.materials import lobes
 from lambent.materials.document import BLACK, Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
 
+ENERGY_TOLERANCE = 0.01  # excess over 1 that rounding, quadrature and devices explain
 SELECTION_FLOOR = 0.02  # share of k: Fresnel can vanish at wo (r0 = 0, wo = n) and not at the half vector
+
+
+def more_than_arrives(albedo: Floats) -> Flags:
+    """(...) whether albedos (...) exceed 1 by more than ENERGY_TOLERANCE; every energy warning goes by it."""
+    return np.asarray(np.asarray(albedo) > 1 + ENERGY_TOLERANCE)
 
 
 def under_fresnel(cosine: Any, ops: Any = NUMPY) -> Any:

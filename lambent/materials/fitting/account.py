@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from lambent.core.directions import Floats, direction
-from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.document import Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
 from lambent.materials.fitting.metrics import METRICS, light_ratios
@@ -19,7 +19,6 @@ from lambent.materials.measured.protocol import MeasuredSamples
 
 AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
-ENERGY_TOLERANCE = 0.01
 TOTAL_TOLERANCE = 0.1  # of the light scattered to one side, over all tuples
 PEAK_SHARE = 0.001  # share of the tuples, the brightest, that form the peak
 LAMBERTIAN_STEPS = 30
@@ -110,7 +109,7 @@ def _energy(material: Material) -> list[str]:
     phi = np.radians([0.0, 90.0])
     albedo = MaterialBSDF(material).albedo(direction(theta[:, None], phi[None, :]), samples=1024)
     highest = np.unravel_index(np.argmax(albedo), albedo.shape)
-    if albedo[highest] <= 1 + ENERGY_TOLERANCE:
+    if not more_than_arrives(albedo).any():
         return []
     at = f"theta {np.degrees(theta[highest[0]]):.0f} deg"
     return [f"scatters more than it receives: albedo {albedo[highest]:.2f} at {at}"]

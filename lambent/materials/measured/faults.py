@@ -6,6 +6,7 @@ import numpy as np
 
 from lambent.core.directions import HALF_TURN, Floats, angles, direction, normalize
 from lambent.core.sequences import r2
+from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured.gonio import GonioTable, Symmetry, groups
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
@@ -122,12 +123,13 @@ def _percent(value: float) -> str:
 
 
 def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
-    """A line where more light returns than arrives."""
-    if not (albedo > 1).any():
+    """A line where more light returns than arrives, as `more_than_arrives` tells."""
+    over = more_than_arrives(albedo)
+    if not over.any():
         return []
     row, channel = np.unravel_index(int(np.argmax(albedo)), albedo.shape)
     name = _CHANNELS[albedo.shape[1]][int(channel)]
-    at = ", ".join(f"{angle:g}" for angle in theta_i_deg[(albedo > 1).any(axis=1)])
+    at = ", ".join(f"{angle:g}" for angle in theta_i_deg[over.any(axis=1)])
     return [
         f"returns {albedo[row, channel]:.3g} of the light{name} at theta_i = {theta_i_deg[row]:g} degrees, "
         f"more than arrives; over 1 at {at} degrees"

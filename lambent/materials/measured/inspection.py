@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.directions import direction
+from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured import faults
 from lambent.materials.measured.gonio import symmetry_of
 from lambent.materials.measured.protocol import MeasuredTable
@@ -25,7 +26,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `albedo`: `theta_i_deg` and, per angle and channel, `reflectivity` and `transmissivity`;
         `tuples`: used, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent`, `negative_percent` of the tuples, `albedo_max`,
-        `energy_above_one` (whether it exceeds 1), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
+        `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
         there is no peak towards the light), `under_sampled` (incident directions), see `faults`;
         `findings`: a sentence for each fault that matters.
     """
@@ -59,7 +60,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "not_finite_percent": percent["not_finite"],
             "negative_percent": percent["negative"],
             "albedo_max": float((r + t).max()),
-            "energy_above_one": bool((r + t).max() > 1),
+            "energy_above_one": bool(more_than_arrives(r + t).any()),
             "non_reciprocal_percent": 100 * non_reciprocal,
             "asymmetry_percent": 100 * off,
             "retro_ratio": retro_ratio,
