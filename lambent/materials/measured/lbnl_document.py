@@ -1,7 +1,8 @@
 """Parser of the XML of LBNL's BSDF files (schema BSDF v1.4): blocks of numbers as text, with their metadata.
 
 The file is untrusted. It is read by events, so nesting costs nothing. A document type declaration is refused, and so
-are the entities it could define; the number of elements, their depth and the length of a tag are limited.
+are the entities it could define; the number of elements, their depth and the length of a tag are limited. A few lines
+of text before the XML are skipped, because genBSDF's own output begins with one ("Recover using: ...").
 """
 
 from __future__ import annotations
@@ -17,6 +18,10 @@ from lambent.core.errors import UserError
 ROOT = "WindowElement"
 _ROOT_TAG = re.compile(rb"<([\w.-]{1,64}:)?WindowElement[\s>/]")
 _LONG_TAG = re.compile(rb"<[A-Za-z_:][^<>]{8192}")
+_PREAMBLE = re.compile(  # at most 16 lines of at most 1024 bytes; a line of markup is none
+    rb"(?:\xef\xbb\xbf)?(?:(?![ \t]*<)[^\r\n\x00-\x08\x0e-\x1f]{0,1024}(?:\r\n?|\n)){1,16}?[ \t]*"
+    rb"(?=<\?xml\s|<(?:[\w.-]{1,64}:)?WindowElement[\s>/])"
+)
 _MOST_ELEMENTS, _DEEPEST, _LONGEST_FIELD = 50_000, 64, 10_000
 
 Texts = dict[str, str]
@@ -45,9 +50,15 @@ class Document:
     blocks: list[Texts]
 
 
+def preamble(head: bytes) -> bytes:
+    """The lines of text before the XML of a file that begins with `head`; empty where there are none, or too many."""
+    found = _PREAMBLE.match(head)
+    return found[0] if found else b""
+
+
 def claims_to_be(head: bytes) -> bool:
     """Whether a file that begins with `head` has this format's root element, in UTF-8 or UTF-16."""
-    plain = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    plain = head[len(preamble(head)) :].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     return plain.startswith(b"<") and _ROOT_TAG.search(plain) is not None
 
 
@@ -89,7 +100,7 @@ def parse(content: bytes, path: Path) -> Document:
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = tree.data, refuse_doctype
     try:
-        parser.Parse(content, True)
+        parser.Parse(memoryview(content)[len(preamble(content)) :], True)
     except expat.ExpatError as error:
         raise UserError(f"not well-formed XML ({error})", file=path) from error
     except (LookupError, ValueError) as error:  # an encoding unknown to Python, or of several bytes

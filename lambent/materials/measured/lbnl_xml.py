@@ -22,6 +22,7 @@ from lambent.materials.measured import lbnl_document, lbnl_parts
 from lambent.materials.measured.lbnl_parts import Part, Side, Way, Where
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
 from lambent.materials.measured.table import on_flat_pairs
+from lambent.materials.measured.text_numbers import shown
 
 NAME = "LBNL BSDF XML"
 LIMIT_BYTES = 1 << 30
@@ -50,8 +51,10 @@ def read(path: Path) -> LbnlTable:
         The file is not well-formed, declares a document type, names an unknown basis, holds another count of values
         than its bases need, a word that is no number or a value that is not finite, or nothing above zero.
     """
-    document = lbnl_document.parse(read_bytes(path, LIMIT_BYTES), path)
-    parts, notes = lbnl_parts.parts_of(document, path)
+    content = read_bytes(path, LIMIT_BYTES)
+    parts, notes = lbnl_parts.parts_of(lbnl_document.parse(content, path), path)
+    if skipped := shown(lbnl_document.preamble(content)).split():
+        notes = (*notes, f"skipped before the XML: {' '.join(skipped)[:120]}")
     return LbnlTable(path.name, parts, notes)
 
 

@@ -219,3 +219,36 @@ def test_a_second_layer_is_ignored_with_a_note(target: Path) -> None:
     assert any("first layer" in note for note in table.info.notes)
     target.write_text(plain)
     np.testing.assert_array_equal(table.eval(WI, WO), load(target).eval(WI, WO))
+
+
+RECOVER = b"Recover using: genBSDF -recover /tmp/genBSDF.4711\n"
+
+
+@pytest.mark.parametrize("lines", [RECOVER, RECOVER.replace(b"\n", b"\r\n"), b"\n\n", b"\xef\xbb\xbf" + RECOVER * 16])
+@pytest.mark.parametrize("declared", [True, False])
+def test_lines_before_the_xml_are_skipped_and_noted(target: Path, lines: bytes, declared: bool) -> None:
+    """genBSDF's own output begins with one."""
+    plain = sound("matrix")
+    if not declared:
+        plain = plain[plain.index(b"<WindowElement") :]
+    target.write_bytes(plain)
+    expected = load(target).eval(WI, WO * (1, 1, -1))
+    assert attempt(target, lines + plain) == ""
+    table = load(target)
+    np.testing.assert_array_equal(table.eval(WI, WO * (1, 1, -1)), expected)
+    assert any("genBSDF -recover" in note for note in table.info.notes) == (b"Recover" in lines)
+    claims = [r.NAME for r in readers() if r.recognise((lines + plain)[:HEAD_BYTES], len(lines + plain))]
+    assert claims == [NAME]
+
+
+@pytest.mark.parametrize(
+    "lines", [RECOVER * 17, b"x" * 1025 + b"\n", b"Recover\0using\n", b"<svg/>\n", b"<!-- a -->\n<!DOCTYPE a>\n"]
+)
+def test_other_beginnings_are_refused(target: Path, lines: bytes) -> None:
+    """Too many lines, too long a line, a binary line, and markup that hides a document type."""
+    assert attempt(target, lines + sound("matrix"))
+
+
+def test_a_document_type_after_the_lines_is_refused(target: Path) -> None:
+    hidden = sound("matrix").replace(b"<WindowElement ", b"<!DOCTYPE a><WindowElement ", 1)
+    assert "document type" in attempt(target, RECOVER + hidden)
