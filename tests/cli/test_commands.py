@@ -278,3 +278,10 @@ def test_a_reader_that_leaves_is_no_error():
     assert b"Traceback" not in process.stderr.read()
     process.stderr.close()
     process.wait()
+
+
+@pytest.mark.parametrize("command", ["inspect", "check", "fit", "convert"])
+def test_infinity_where_a_table_begins_is_no_traceback(refused, tmp_path, command):
+    (tmp_path / "a.txt").write_text("inf 400 500 600\n1 2 3 4 5\n")
+    more = [tmp_path / "b.binary"] if command == "convert" else []
+    assert "known format" in refused(command, tmp_path / "a.txt", *more)

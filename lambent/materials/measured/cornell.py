@@ -31,7 +31,7 @@ def recognise(head: bytes, size: int) -> bool:
         count, *wavelengths = (float(token) for token in tokens)
     except ValueError:
         return False
-    plausible = len(wavelengths) >= 1 and count >= 1 and count == int(count)
+    plausible = len(wavelengths) >= 1 and count >= 1 and count.is_integer()
     first = wavelengths[: int(min(count, 3))] if plausible else []
     return plausible and all(100 <= w <= 5000 for w in first) and first == sorted(set(first))
 

@@ -7,6 +7,8 @@ A reader is a module of this package that has `NAME` (str), `recognise(head: byt
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Protocol
@@ -17,6 +19,8 @@ from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.text_numbers import UTF16, is_utf16
 
 HEAD_BYTES = 1 << 16
+UNREADABLE = "cannot be read as"
+_LONGEST_FAULT = 120
 
 
 class Reader(Protocol):
@@ -50,9 +54,10 @@ def load(path: Path | str) -> MeasuredTable:
     """
     path = Path(path)
     head, size = _head(path)
-    reader = _reader_of(head, size)
+    reader = _reader_of(head, size, path)
     if reader is not None:
-        return reader.read(path)
+        with _foreign_bytes(reader, path):
+            return reader.read(path)
     if head.startswith(UTF16):
         raise is_utf16(path)
     known = ", ".join(reader.NAME for reader in readers())
@@ -60,8 +65,9 @@ def load(path: Path | str) -> MeasuredTable:
 
 
 def is_known(path: Path | str) -> bool:
-    """Whether some reader recognises the file, sound or not."""
-    return _reader_of(*_head(Path(path))) is not None
+    """Whether some reader recognises the file, sound or not; a `UserError` as from `load`."""
+    path = Path(path)
+    return _reader_of(*_head(path), path) is not None
 
 
 def _head(path: Path) -> tuple[bytes, int]:
@@ -77,5 +83,29 @@ def _head(path: Path) -> tuple[bytes, int]:
     return head, size
 
 
-def _reader_of(head: bytes, size: int) -> Reader | None:
-    return next((reader for reader in readers() if reader.recognise(head, size)), None)
+def _reader_of(head: bytes, size: int, path: Path) -> Reader | None:
+    """The first reader that claims the file; where none does, the error of the first that failed to tell."""
+    failed: UserError | None = None
+    for reader in readers():
+        try:
+            with _foreign_bytes(reader, path):
+                if reader.recognise(head, size):
+                    return reader
+        except UserError as error:  # the file may still be another reader's
+            failed = failed or error
+    if failed is not None:
+        raise failed
+    return None
+
+
+@contextmanager
+def _foreign_bytes(reader: Reader, path: Path) -> Iterator[None]:
+    """Turns whatever a reader raises over a file's bytes into a `UserError` with the reader's name."""
+    try:
+        yield
+    except UserError:
+        raise
+    except Exception as error:
+        said = " ".join(str(error).split())
+        fault = type(error).__name__ + (f": {said[:_LONGEST_FAULT]}" if said else "")
+        raise UserError(f"{UNREADABLE} {reader.NAME} ({fault})", file=path) from error

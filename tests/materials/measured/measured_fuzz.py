@@ -23,7 +23,7 @@ import numpy as np
 from lambent.core.directions import angles, direction
 from lambent.core.errors import UserError
 from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.registry import load, readers
+from lambent.materials.measured.registry import UNREADABLE, load, readers
 from lambent.materials.measured.synthetic import Setup, synthesise
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 from tests.materials.measured.measured_files import (
@@ -243,6 +243,7 @@ def attempt(path: Path, content: bytes) -> str:
     except UserError as error:
         said, taken = str(error), time.perf_counter() - start
         assert "\n" not in said and path.name in said, said
+        assert UNREADABLE not in said, said  # the registry caught an error that the reader should have foreseen
     finally:
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.materials.measured import load
+from lambent.materials.measured import load, registry
+from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.registry import HEAD_BYTES, readers
+from tests.materials.measured.measured_fuzz import seeds
 
 
 def test_one_reader_claims_each_file(files: dict[str, Path]) -> None:
@@ -50,3 +53,111 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         load(tmp_path / "nothing.binary")
     with pytest.raises(UserError, match="cannot be read"):
         load(tmp_path)
+
+
+class Failing:
+    """A reader that raises over every file, while recognising it or while reading it."""
+
+    NAME = "made-up format"
+
+    def __init__(self, error: Exception, recognising: bool) -> None:
+        self.error, self.recognising = error, recognising
+
+    def recognise(self, head: bytes, size: int) -> bool:
+        if self.recognising:
+            raise self.error
+        return True
+
+    def read(self, path: Path) -> MeasuredTable:
+        raise self.error
+
+
+@pytest.mark.parametrize("recognising", [True, False])
+@pytest.mark.parametrize(
+    "error",
+    [
+        OverflowError("cannot convert float infinity to integer"),
+        ValueError("Exceeds the limit (4300 digits) for integer string conversion\n" + "9" * 5000),
+        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
+        LookupError("unknown encoding: no-such-code"),
+        MemoryError(),
+        RecursionError("maximum recursion depth exceeded"),
+        ZeroDivisionError("division by zero"),
+        AssertionError(),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_whatever_a_reader_raises_is_one_line(monkeypatch, tmp_path: Path, error: Exception, recognising: bool) -> None:
+    monkeypatch.setattr(registry, "readers", lambda: (Failing(error, recognising),))
+    (tmp_path / "a.bsdf").write_bytes(b"foreign")
+    with pytest.raises(
+        UserError, match=rf"a\.bsdf: cannot be read as made-up format \({type(error).__name__}"
+    ) as found:
+        load(tmp_path / "a.bsdf")
+    assert found.value.__cause__ is error and "\n" not in str(found.value) and len(str(found.value)) < 400
+    if recognising:
+        with pytest.raises(UserError, match="made-up format"):
+            registry.is_known(tmp_path / "a.bsdf")
+
+
+def test_a_reader_that_fails_to_tell_does_not_hide_another(monkeypatch, files: dict[str, Path]) -> None:
+    every = registry.readers()
+    monkeypatch.setattr(registry, "readers", lambda: (Failing(OverflowError(), True), *every))
+    assert load(files["merl"]).info.format.startswith("MERL") and registry.is_known(files["merl"])
+
+
+def test_a_user_error_of_a_reader_stays_as_it_is(monkeypatch, files: dict[str, Path]) -> None:
+    own = UserError("is broken", file="there")
+    monkeypatch.setattr(registry, "readers", lambda: (Failing(own, False),))
+    with pytest.raises(UserError) as found:
+        load(files["merl"])
+    assert found.value is own
+
+
+SOUND = seeds()
+DIGITS = b"9" * 5000
+HOSTILE = {
+    "inf": lambda s: _first_number(s, b"inf"),
+    "nan": lambda s: _first_number(s, b"nan"),
+    "5000 digits": lambda s: _first_number(s, DIGITS),
+    "5000 digits throughout": lambda s: re.sub(rb"(?<![\d.])\d+(?![\d.])", DIGITS, s, count=20),
+    "inf in front": lambda s: b"inf 400 500 600 0 0\n" + s,
+    "-inf in front": lambda s: b"-inf inf nan 1 2 3\n" * 2 + s,
+    "not UTF-8": lambda s: s[:40] + b"\xff\xc3\x28" + s[40:],
+    "lone surrogate": lambda s: s[:40] + b"\xed\xa0\x80" + s[40:],
+    "unknown encoding": lambda s: s.replace(b"UTF-8", b"no-such-code"),
+    "encoding of bytes": lambda s: s.replace(b"UTF-8", b"base64"),
+    "deep": lambda s: s[:200] + b"{<a>(" * 20_000 + s[200:],
+    "NUL": lambda s: s[:100] + b"\0" + s[100:],
+    "all ones": lambda s: s[:16] + b"\xff" * (len(s) - 16),
+    "cut": lambda s: s[: len(s) // 2],
+}
+
+
+def _first_number(content: bytes, word: bytes) -> bytes:
+    return re.sub(rb"(?<![\w.])\d+(?![\w.])", word, content, count=1)
+
+
+@pytest.mark.parametrize("change", HOSTILE)
+@pytest.mark.parametrize("reader", SOUND)
+def test_hostile_bytes_are_a_table_or_one_line(tmp_path: Path, reader: str, change: str) -> None:
+    """No error but a `UserError`, and none that the reader itself did not foresee."""
+    path = tmp_path / "hostile.bsdf"
+    for sound in SOUND[reader]:
+        path.write_bytes(HOSTILE[change](sound))
+        try:
+            assert registry.is_known(path) in (True, False)
+            load(path)
+        except UserError as error:
+            assert "hostile.bsdf" in str(error) and "\n" not in str(error)
+            assert registry.UNREADABLE not in str(error)
+
+
+@pytest.mark.parametrize(
+    "content", [b"inf 400 500 600\n", b"inf\n", b"-inf 1 2\n", b"nan 400\n", DIGITS, b"1e999 400 500"]
+)
+def test_numbers_that_no_reader_claims(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.txt").write_bytes(content)
+    assert not registry.is_known(tmp_path / "a.txt")
+    with pytest.raises(UserError, match="known format"):
+        load(tmp_path / "a.txt")
