@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lambent.core.arrays import Floats
 from lambent.store.contract import ObjectRecord
-
-Floats = NDArray[np.floating]
 
 
 class Geometry:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components, evaluate
@@ -21,8 +22,6 @@ from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, single
-
-Floats = NDArray[np.floating]
 
 FEW = 12_000  # tuples that stand for all while a slider moves
 CHUNK = 100_000  # tuples between two looks at whether to go on

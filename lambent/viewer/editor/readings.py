@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.directions import direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.bsdf import MaterialBSDF, components, evaluate
@@ -21,8 +21,6 @@ from lambent.materials.fitting.disks import brightness, disk_directions, in_plan
 from lambent.materials.fitting.incidence import Incidence
 from lambent.materials.lobes import Vector
 from lambent.viewer.mode import Image
-
-Floats = NDArray[np.floating]
 
 FINE_PX = 72  # of a disk at rest
 WHITE_PERCENTILE = 99.8

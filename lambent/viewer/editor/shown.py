@@ -8,11 +8,12 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from lambent.core.arrays import Floats
 from lambent.materials.document import Material
 from lambent.materials.fitting.disks import in_plane_tuples
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.measurement import Measurement
-from lambent.viewer.editor.readings import FINE_PX, Disks, Floats, incidents_of, white_of
+from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, white_of
 from lambent.viewer.editor.subject import Subject
 from lambent.viewer.mode import Image
 from lambent.viewer.work import Work, pending

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from lambent.core.arrays import Floats
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.matrix import Matrix, matrix
-from lambent.viewer.editor.readings import Floats
 from lambent.viewer.editor.shown import CHANNELS, SCALES, Curves, Plots
 from lambent.viewer.mode import Beside, Textures
 from lambent.viewer.panels.widgets import Colour, choice, coloured, explain

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, texel_solid_angles
@@ -19,8 +19,6 @@ from lambent.scenes.environments import daylight, dusk, from_lat_long, night, st
 from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
 from lambent.scenes.scene import Mesh
 from lambent.viewer.mode import Divider
-
-Floats = NDArray[np.floating]
 
 MEAN_RADIANCE = 0.35  # every environment is scaled to it, so that a change of light keeps the exposure
 LAMP_TOWARDS, LAMP_RADIUS_DEG = (0.07, -0.08, -1.0), 6.0

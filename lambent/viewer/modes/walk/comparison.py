@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import luminance, shown
 from lambent.core.errors import UserError
 from lambent.core.false_colour import STOPS, Range, false_colour, ramp
@@ -26,7 +26,6 @@ from lambent.core.progress import Progress
 from lambent.viewer.mode import Divider, Image
 from lambent.viewer.work import POLL_S, Work, pending
 
-Floats = NDArray[np.floating[Any]]
 Mode = Literal["off", "side by side", "error map"]
 Kind = Literal["difference", "FLIP"]
 MODES: tuple[Mode, ...] = get_args(Mode)

@@ -58,7 +58,7 @@ class Filming:
         self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0
     ) -> None:
         width, height = even_size(frame.width, frame.height)
-        self.file, self.total, self.done = file, max(2, round(path.seconds * fps)), 0
+        self.file, self.total, self.done = file, path.frames(fps), 0
         if self.total > LONGEST_FRAMES:
             raise UserError("the film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
         self.error: str | None = None

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, camera_axes, clip_from_world
 from lambent.core.colour import shown
 from lambent.core.cubemap import sample
@@ -19,7 +19,6 @@ from lambent.realtime.cube_mips import finite, halved
 from lambent.store.contract import ReflectorRecord
 from lambent.viewer.mode import Image
 
-Floats = NDArray[np.floating[Any]]
 BALL_M = 0.12  # radius of a ball in the scene
 SMALLEST_PX, LARGEST_PX = 9.0, 72.0  # radius on the screen, logical
 CUBE_TEXELS = 64  # per face: a ball is small

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.false_colour import Range, fitting_range
 from lambent.core.photometry import LM_PER_W, LUMINANCE, Quantity, photometric
 
-Floats = NDArray[np.floating[Any]]
 KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
 PIXELS = 60_000  # that a reading looks at, evenly spread
 BINS_PER_DECADE = 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import triple
 from lambent.viewer.edits import rescue_file
@@ -14,7 +14,6 @@ from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import Screen
 
-Floats = NDArray[np.floating]
 KEY_S = 0.1  # between two keys of a path
 STILL_S = 0.1  # a longer gap between two frames is standing still, not a slow frame
 LONGEST_S = 600.0

@@ -10,12 +10,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.geometry import area_vectors
 from lambent.viewer.picking import first_hit
 
-Floats = NDArray[np.floating]
 STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 BODY_M = 0.22
 SLIDES = 3  # a corner takes two
