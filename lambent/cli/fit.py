@@ -13,6 +13,7 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.materials.document import Material
     from lambent.materials.fitting.fit import FitResult
+    from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 UNITS = {"mx": "slope", "my": "slope", "r0": "reflectance at normal incidence", "alpha": "exponent"}
 
@@ -30,6 +31,9 @@ def command(
         typer.Option(help="Of the microfacets: ggx has long tails; best tries both."),
     ] = "beckmann",
     coupled: Annotated[bool, typer.Option("--coupled", help="Diffuse reflection falls as Fresnel rises.")] = False,
+    keep_albedo: Annotated[
+        bool, typer.Option("--keep-albedo", help="Hold the albedo over the angle of incidence to the table's.")
+    ] = False,
     gain: Annotated[float, typer.Option(help="Share of the error that one more lobe has to take off (auto).")] = 0.05,
     grid_n: Annotated[int, typer.Option(min=3, max=30, help="Values per parameter and level of the grid.")] = 9,
     grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Levels of the grid.")] = 5,
@@ -71,6 +75,7 @@ def command(
         result = fit(
             samples, lobes=count, method=method, metric=metric, distribution=distribution, coupled=coupled, gain=gain,
             schedule=Schedule(grid_n, grid_levels), fix=fixed, ranges=ranges, seed=seed, source=file, progress=progress,
+            whole=measurement, keep_albedo=keep_albedo,
         )  # fmt: skip
     if output is not None:
         result.material.save(output)
@@ -88,7 +93,11 @@ def command(
         say(f"note: {warning}")
     figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
     facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}
-    show({**facts, "written": output, "plots": plots, "report": report}, describe(result), json)
+    facts |= {"albedos": [one.to_json() for one in result.albedos]}
+    gone = left_out(measurement, samples)
+    facts |= {"tuples": {"used": len(samples), "left_out": gone}}
+    text = f"{describe(result)}\n\n{describe_tuples(len(samples), gone)}\n\n{result.seconds:.1f} s"
+    show({**facts, "written": output, "plots": plots, "report": report}, text, json)
     if result.partial:
         raise typer.Exit(130)
 
@@ -111,13 +120,31 @@ def _count(lobes: str) -> int | Literal["auto"]:
 
 
 def describe(result: FitResult) -> str:
-    """Parameters with their units, then the error under every metric beside that of a Lambertian surface."""
+    """Parameters with units, errors beside those of a Lambertian surface, and the albedo where it is furthest off."""
     from lambent.materials.fitting.metrics import METRICS
 
     rows = [("error", "fit", "Lambertian", "unit")]
     for name, value in result.errors.items():
         rows.append((name, words(value), words(result.lambertian_errors[name]), METRICS[name].unit))
-    return f"{parameters(result.material)}\n\n{table(rows)}\n\n{result.seconds:.1f} s"
+    albedos = "".join(f"\n{one}" for one in result.albedos)
+    return f"{parameters(result.material)}\n\n{table(rows)}{albedos}"
+
+
+def left_out(measurement: MeasuredTable, samples: MeasuredSamples) -> dict[str, int]:
+    """Numbers of tuples that the fit did not use, by the reason in words."""
+    from lambent.materials.measured.lbnl_xml import LbnlTable
+    from lambent.report.fit_report import REASONS
+
+    counts = {why: getattr(samples.left_out, name) for name, why in REASONS.items()}
+    if isinstance(measurement, LbnlTable):
+        counts["of light from -z, the other side of the sheet"] = measurement.tuples_from_behind
+    return {why: count for why, count in counts.items() if count}
+
+
+def describe_tuples(used: int, left_out: dict[str, int]) -> str:
+    """How many tuples were used and left out."""
+    gone = [(f"{count}", f"left out: {why}") for why, count in left_out.items()]
+    return table([(f"{used}", "tuples fitted"), *(gone or [("0", "left out")])])
 
 
 def parameters(material: Material) -> str:

@@ -17,6 +17,7 @@ from lambent.core.sequences import cosine_hemisphere
 from lambent.materials import check
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.check import PHI_DEG, THETA_DEG, Furnace, Report, mean_albedo
+from lambent.materials.measured.faults import extrapolation
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.sampling import TableBSDF
@@ -83,7 +84,7 @@ def check_table(
         furnace=energy,
         integrals=tuple(integrals),
         sampler=sampler,
-        warnings=tuple(_warnings(resampling, energy)),
+        warnings=(*_warnings(resampling, energy), *extrapolation(table)[1]),
         failures=(*_failures(reciprocity, energy, integrals), *check.sampler_failures(sampler)),
     )
 

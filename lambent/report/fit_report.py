@@ -83,6 +83,7 @@ def report(
         *_measurement(table, samples, source),
         *_parameters(material),
         *_errors(samples, result, metric),
+        *_albedos(result),
         *_plots(samples, material, metric, progress),
         page.footer(_colophon(result)),
     ]
@@ -240,6 +241,24 @@ def _errors(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list
     chosen = list(result.errors).index(metric.name)
     table = page.table(head, rows, numbers=(1, 2, 3), chosen=chosen, caption=caption)
     return [page.heading("Errors"), table, *map(page.paragraph, _judgement(samples, result, metric))]
+
+
+def _albedos(result: FitResult) -> list[str]:
+    """Albedo of the fit beside the whole table's."""
+    if not result.albedos:
+        return []
+    rows = []
+    for one in result.albedos:
+        for theta in np.unique(one.theta_deg):
+            table, fit = (float(albedo[one.theta_deg == theta].mean()) for albedo in (one.table, one.fit))
+            ratio = f"{fit / table:.2f}" if table > 0 else "n/a"
+            rows.append((one.side, f"{theta:g}°", f"{table:.3f}", f"{fit:.3f}", ratio))
+    head = ("side", "angle of incidence", "table", "this fit", "ratio")
+    caption = (
+        "Of the whole table, gaps filled as it is drawn, as far as it was measured; means over channels and phi_i."
+    )
+    body = [page.heading("Albedo"), page.table(head, rows, numbers=(1, 2, 3, 4), caption=caption)]
+    return [*body, *(page.paragraph(f"{str(one).capitalize()}.") for one in result.albedos)]
 
 
 def _judgement(samples: MeasuredSamples, result: FitResult, metric: Metric) -> list[str]:

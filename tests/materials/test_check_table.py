@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from lambent.core.directions import direction
 from lambent.materials import check
 from lambent.materials import check_table as module
 from lambent.materials.bsdf import MaterialBSDF
@@ -17,6 +18,7 @@ from lambent.materials.export import lbnl_xml
 from lambent.materials.measured import load
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo
+from lambent.materials.measured.scattered import ScatteredTable
 
 SMALL = GridShape(24, 1, 64, 32)
 GLOSSY = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.2, my=0.2, k=0.5, r0=0.5, alpha=0.2),))
@@ -121,3 +123,15 @@ def test_transmission_alone_of_real_files(shared_data, tmp_path, name):
     assert table.info.transmits and not table.reflectivity(np.array([[0.6, 0.0, 0.8]])).any()
     report = check_table(table)
     assert report.reciprocity_share == 0 and not any("swapping" in text for text in report.failures)
+
+
+def test_a_scattered_table_warns_where_nothing_was_measured(monkeypatch):
+    monkeypatch.setattr(module, "PAIRS", 2000)
+    monkeypatch.setattr(module, "INTEGRAL_THETA_DEG", ())
+    monkeypatch.setattr(check, "check_samplers", lambda *_: ())
+    monkeypatch.setattr(check, "sampler_failures", lambda _: [])
+    random = np.random.default_rng(0)
+    wi, wo = (direction(np.arccos(random.uniform(0.5, 1, 800)), random.uniform(0, 2 * np.pi, 800)) for _ in range(2))
+    table = ScatteredTable(wi, wo, MaterialBSDF(GLOSSY).eval(wi, wo), TableInfo("a", "test", True, False, 3, "f"))
+    report = check_table(table, shape=GridShape(8, 1, 24, 12))
+    assert any("nothing was measured around" in line and "beyond theta 60 degrees" in line for line in report.warnings)

@@ -55,7 +55,7 @@ def small_previews(mi, monkeypatch):
 def made(material, setup, **options):
     table = synthesise(material, setup)
     samples = table.samples()
-    return table, samples, fit(samples, **options)
+    return table, samples, fit(samples, whole=table, **options)
 
 
 def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
@@ -75,6 +75,8 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
         f"{result.lambertian_errors['l1']:.4g}",
         f"{peak_share(samples, evaluate(result.material, samples)):.2f} of the measured peak",
         "undershoot peaks",
+        "Albedo in reflection at worst",
+        f"{result.albedos[0].fit[0].mean():.3f}",
     ):
         assert expected in text, expected
     assert [attributes.get("class") for tag, attributes in read.tags if tag == "tr"].count("chosen") == 1

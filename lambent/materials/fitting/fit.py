@@ -17,7 +17,8 @@ from lambent.core.files import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Lobe, Material, Provenance, Side
-from lambent.materials.fitting import account, gradient, grid, parameters
+from lambent.materials.fitting import account, albedos, gradient, grid, parameters
+from lambent.materials.fitting.albedos import Comparison, Curve
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
@@ -54,6 +55,8 @@ class FitResult:
         Reasons to doubt the numbers.
     partial : bool
         Whether the fit was cancelled and this is the best found so far.
+    albedos : tuple of Comparison
+        Albedo of the material beside the whole table's, per side; empty where the fit was given tuples alone.
     """
 
     material: Material
@@ -62,6 +65,7 @@ class FitResult:
     seconds: float
     warnings: tuple[str, ...]
     partial: bool
+    albedos: tuple[Comparison, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,7 @@ class Task:
     ranges: Ranges
     schedule: Schedule
     seed: int
+    kept: dict[Side, Curve]  # albedos that the model has to follow
 
 
 def fit(
@@ -91,6 +96,8 @@ def fit(
     fix: Fixed | None = None,
     ranges: Ranges | None = None,
     gain: float = GAIN,
+    whole: MeasuredTable | None = None,
+    keep_albedo: bool = False,
     schedule: Schedule | None = None,
     seed: int = 0,
     source: Path | None = None,
@@ -118,6 +125,10 @@ def fit(
         Parameter name -> value, or -> (lo, hi); names as in `parameters.known_parameters`.
     gain : float
         Share of E in (0, 1), for "auto".
+    whole : MeasuredTable, optional
+        The table of the tuples, for its albedos; `table` itself where that is one.
+    keep_albedo : bool
+        Whether the albedo over theta_i has to follow the table's, per channel (`albedos.KEEP`).
     schedule : Schedule, optional
         Values per parameter and number of levels of the grid.
     seed : int
@@ -131,16 +142,21 @@ def fit(
     ------
     UserError
         Unknown method, metric, distribution or parameter; impossible value; number of lobes out of range; a parameter
-        of transmission for a table without transmission.
+        of transmission for a table without transmission; albedos to keep without their table, or by the grid.
     """
     began = time.perf_counter()
     count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
+    whole = table if isinstance(table, MeasuredTable) else whole
     _check(count, gain, method, distribution)
+    if keep_albedo and (whole is None or method == "grid"):
+        raise UserError("albedos are kept by the gradient method, of a table", field="keep_albedo", got=method)
     parameters.check(fix, ranges, count)
     share = gain if lobes == "auto" else 0.0
     kinds = DISTRIBUTIONS[distribution]
-    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, schedule or Schedule(), seed)
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
+    curves = albedos.curves_of(whole, samples) if whole is not None else {}
+    plan, kept = schedule or Schedule(), curves if keep_albedo else {}
+    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, plan, seed, kept)
     far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
@@ -164,15 +180,20 @@ def fit(
     )
     model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
-    kept = {side: one for side, one in found.items() if one.models}
-    warnings = (*account.warnings_of(samples, material, model, kept, task.metric.name), *_fewer(found, lobes))
+    fitted = {side: one for side, one in found.items() if one.models}
+    compared = albedos.compare(curves, material)
+    warnings = (
+        *account.warnings_of(samples, material, model, fitted, task.metric.name),
+        *(one.warning(keep_albedo) for one in compared if one.doubtful),
+        *_fewer(found, lobes),
+    )
     if partial:
         warnings = ("cancelled: the best found so far", *warnings)
     provenance = Provenance(
         source=samples.info.file,
         source_sha256=sha256_of(source) if source is not None else None,
         source_format=samples.info.format,
-        method=f"{method}, {lobes} lobe(s) per side, seed {seed}",
+        method=f"{method}, {lobes} lobe(s) per side, seed {seed}" + (", albedo kept" if keep_albedo else ""),
         metric=task.metric.name,
         errors=errors,
         samples={"used": len(samples), **asdict(samples.left_out)},
@@ -180,7 +201,7 @@ def fit(
     )
     material = material.model_copy(update={"provenance": provenance})
     lambertian = account.lambertian_errors(samples)
-    return FitResult(material, errors, lambertian, time.perf_counter() - began, warnings, partial)
+    return FitResult(material, errors, lambertian, time.perf_counter() - began, warnings, partial, compared)
 
 
 def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
@@ -201,7 +222,8 @@ def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progre
     diffuse = _diffuse(samples, side, task.fix)
     problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled)
     for number, distribution in enumerate(task.distributions):
-        one = Found(replace(problem, distribution=distribution), boxes, [])
+        own = replace(problem, distribution=distribution)
+        one = Found(albedos.keep(task.kept[side], own, task.coupled) if task.kept else own, boxes, [])
         if number == 0:
             found[side] = one
 
@@ -275,7 +297,8 @@ def _by_lobes(found: dict[Side, Found]) -> list[str]:
     for side, one in found.items():
         metric = one.problem.metric
         if len(one.models) > 1:
-            errors = ", ".join(f"{one.problem.remaining(model) ** (1 / metric.power):.4g}" for model in one.models)
+            tuples = replace(one.problem, kept=None)
+            errors = ", ".join(f"{tuples.remaining(model) ** (1 / metric.power):.4g}" for model in one.models)
             lines.append(f"{side}: {metric.name} error {errors} with 1 to {len(one.models)} lobes")
     return lines
 

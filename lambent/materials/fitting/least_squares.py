@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.fitting.parameters import Box
-from lambent.materials.fitting.problem import ALPHA, MU, NU, Mixture, Problem
+from lambent.materials.fitting.problem import ALPHA, MU, NU, KeptAlbedo, Mixture, Problem
 from lambent.materials.fitting.scale import TINY
 
 DAMPING = (1e-3, 1e7)  # at the start, and at most; shares of the normal matrix's diagonal
@@ -99,13 +100,9 @@ def _normal_equations(
     matrix, gradient = np.zeros((len(unknowns),) * 2), np.zeros(len(unknowns))
     for block in problem.blocks:
         metric, c = block.metric, block.c
-        terms = np.stack([c * block.diffuse, *(c * block.basis(lobe.shape) for lobe in mixture.lobes)])
-        slopes = [
-            block.log_derivatives(lobe.shape, box.tied) for box, lobe in zip(bounds.boxes, mixture.lobes, strict=False)
-        ]
+        terms, slopes = _terms(block, mixture, c), _slopes(block, bounds, mixture)
         for channel, target in enumerate(block.target):
-            k = np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=c.dtype)
-            parts = k[:, None] * terms
+            parts = _coefficients(mixture, channel, c.dtype)[:, None] * terms
             model = parts.sum(axis=0)
             residual = target - metric.transform(model)
             w = block.w
@@ -114,18 +111,57 @@ def _normal_equations(
                 w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
             if not metric.linear:
                 parts *= metric.slope(model)
-            here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
-            rows = np.empty((len(here), len(c)), dtype=c.dtype)
-            for row, i in zip(rows, here, strict=True):
-                u = unknowns[i]
-                if u.axis == COEFFICIENT:
-                    row[:] = parts[u.lobe + 1]
-                else:
-                    np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
+            here, rows = _rows(unknowns, channel, parts, slopes, c.dtype)
             weighted = rows * w
             matrix[np.ix_(here, here)] += weighted @ rows.T
             gradient[here] += weighted @ residual
+    if problem.kept is not None:
+        _add_albedos(problem.kept, bounds, mixture, unknowns, matrix, gradient)
     return matrix, gradient
+
+
+def _add_albedos(
+    kept: KeptAlbedo, bounds: Bounds, mixture: Mixture, unknowns: Sequence[Unknown], matrix: Floats, gradient: Floats
+) -> None:
+    """The same of the albedos that the model has to follow."""
+    pairs = kept.pairs
+    terms, slopes = _terms(pairs, mixture, 1.0), _slopes(pairs, bounds, mixture)
+    weight = kept.weight / kept.albedo.shape[1] * 2 / pairs.metric.power  # L1's gradient lacks the 2 of squares
+    for channel, (residual, by_albedo) in enumerate(zip(*kept.off(mixture), strict=True)):
+        parts = _coefficients(mixture, channel, terms.dtype)[:, None] * terms
+        here, rows = _rows(unknowns, channel, parts, slopes, parts.dtype)
+        rows = kept.integral(rows) * by_albedo
+        matrix[np.ix_(here, here)] += weight * rows @ rows.T
+        gradient[here] += weight * rows @ residual
+
+
+def _terms(problem: Problem, mixture: Mixture, cosine: Floats | float) -> Floats:
+    """(1 + L, N) f in 1/sr, times a cosine, of the diffuse term and of every lobe with coefficient 1."""
+    return np.stack([cosine * problem.diffuse, *(cosine * problem.basis(lobe.shape) for lobe in mixture.lobes)])
+
+
+def _coefficients(mixture: Mixture, channel: int, dtype: np.dtype[Any]) -> Floats:
+    return np.array([mixture.diffuse[channel], *(lobe.k[channel] for lobe in mixture.lobes)], dtype=dtype)
+
+
+def _slopes(problem: Problem, bounds: Bounds, mixture: Mixture) -> list[tuple[Floats, Floats, Floats, Floats]]:
+    pairs = zip(bounds.boxes, mixture.lobes, strict=False)
+    return [problem.log_derivatives(lobe.shape, box.tied) for box, lobe in pairs]
+
+
+def _rows(
+    unknowns: Sequence[Unknown], channel: int, parts: Floats, slopes: Sequence[Sequence[Floats]], dtype: np.dtype[Any]
+) -> tuple[list[int], Floats]:
+    """Indices of the unknowns that move a channel, and the derivatives (U, N) of its model by them."""
+    here = [i for i, u in enumerate(unknowns) if u.axis != COEFFICIENT or u.channel == channel]
+    rows = np.empty((len(here), parts.shape[1]), dtype=dtype)
+    for row, i in zip(rows, here, strict=True):
+        u = unknowns[i]
+        if u.axis == COEFFICIENT:
+            row[:] = parts[u.lobe + 1]
+        else:
+            np.multiply(parts[u.lobe + 1], slopes[u.lobe][u.axis], out=row)
+    return here, rows
 
 
 def _unknowns(bounds: Bounds, start: Mixture) -> list[Unknown]:

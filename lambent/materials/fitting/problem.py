@@ -61,6 +61,8 @@ class Problem:
         f in 1/sr.
     w, c : (N,)
         The metric's weight and cosine.
+    kept : KeptAlbedo, optional
+        Albedos that the model has to follow as well.
     """
 
     side: Side
@@ -75,6 +77,7 @@ class Problem:
     measured: Floats
     w: Floats
     c: Floats
+    kept: KeptAlbedo | None = None
 
     def __len__(self) -> int:
         return len(self.w)
@@ -117,7 +120,7 @@ class Problem:
     def blocks(self) -> tuple[Problem, ...]:
         """The tuples in pieces whose intermediate results stay in the processor's cache."""
         return tuple(
-            replace(self, **{name: getattr(self, name)[..., i : i + BLOCK] for name in (*PER_TUPLE, "w")})
+            replace(self, kept=None, **{name: getattr(self, name)[..., i : i + BLOCK] for name in (*PER_TUPLE, "w")})
             for i in range(0, len(self), BLOCK)
         )
 
@@ -127,8 +130,9 @@ class Problem:
         return np.asarray(self.metric.transform(self.c * self.measured))
 
     def remaining(self, mixture: Mixture) -> float:
-        """The metric's sum over all tuples, averaged over channels: E to the metric's power."""
-        return sum(block._remaining(mixture) for block in self.blocks)
+        """The metric's sum over all tuples, averaged over channels: E to the metric's power, and what `kept` adds."""
+        error = sum(block._remaining(mixture) for block in self.blocks)
+        return error if self.kept is None else error + self.kept.remaining(mixture)
 
     def _remaining(self, mixture: Mixture) -> float:
         difference = self.target - self.metric.transform(self.c * self.evaluate(mixture))
@@ -167,6 +171,46 @@ class Problem:
             index, times = np.unique(np.minimum(drawn, len(self) - 1), return_counts=True)
             parts.append(self.take(index, self.w[index] * times * summed[-1] / (count * density[index]), dtype))
         return parts
+
+
+@dataclass(frozen=True)
+class KeptAlbedo:
+    """Albedos that one side's model has to follow: mean squares of ln(model / table), as a part of the error.
+
+    Attributes
+    ----------
+    pairs : Problem
+        The pairs of directions over which a model's albedo is integrated.
+    solid_angle : (N,)
+        Weight of each pair in that integral, cosine included.
+    first : (A,)
+        Index of the first pair of each incident direction.
+    albedo : (C, A)
+        Of the table.
+    weight : float
+        Of the mean squares, in units of E to the metric's power.
+    dark : float
+        Added to both albedos: their logarithm needs it where nothing is scattered.
+    """
+
+    pairs: Problem
+    solid_angle: Floats
+    first: NDArray[np.integer]
+    albedo: Floats
+    weight: float
+    dark: float
+
+    def integral(self, f: Floats) -> Floats:
+        """(..., A) integrals over wo of f (..., N)."""
+        return np.asarray(np.add.reduceat(f * self.solid_angle, self.first, axis=-1))
+
+    def off(self, mixture: Mixture) -> tuple[Floats, Floats]:
+        """ln of the table's albedos over the model's (C, A), and the derivatives (C, A) of the model's logarithm."""
+        model = self.integral(self.pairs.evaluate(mixture)) + self.dark
+        return np.log((self.albedo + self.dark) / model), 1 / model
+
+    def remaining(self, mixture: Mixture) -> float:
+        return self.weight * float(np.mean(self.off(mixture)[0] ** 2))
 
 
 @dataclass(frozen=True)

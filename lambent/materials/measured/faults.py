@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.directions import HALF_TURN, Floats, angles, direction, normalize
-from lambent.core.sequences import r2
+from lambent.core.sequences import r2, radical_inverse
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured.gonio import GonioTable, Symmetry, groups
-from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
+from lambent.materials.measured.protocol import GRAZING_DEG, MeasuredSamples, MeasuredTable
+from lambent.materials.measured.scattered import ScatteredTable
 
 _PAIRS = 4096
 _REACH_DEG = 60  # of the swapped pairs, so that both directions are inside the usual incident grids
@@ -17,11 +18,13 @@ _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
 ASYMMETRIC = 0.05
 RETRO_RATIO = 1.5  # f around the light over f beside it, from which it is a peak
+EXTRAPOLATED = 0.005  # share of the pairs of directions from which it is reported
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
 _RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last two are beside it
 _NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
+_BY_LIGHT_DEG = 20  # where the lamp is in the way of most devices
 _REASONS = {"shadowed": "not measured, or below the horizon", "not_finite": "not finite", "negative": "negative"}
 
 
@@ -85,6 +88,29 @@ def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[s
         '20 degrees beside it; look it up with reconstruction="quadrilinear", as aligning on the half vector moves '
         "that peak"
     ]
+
+
+def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
+    """Share of the pairs of directions, even in solid angle up to GRAZING_DEG, where a scattered table extrapolates."""
+    if not isinstance(table, ScatteredTable):
+        return 0.0, []
+    u = np.stack([radical_inverse(np.arange(_PAIRS), base) for base in (2, 3, 5)])
+    cos_i, cos_o = 1 - u[:2] * (1 - np.cos(np.radians(GRAZING_DEG)))
+    wi, wo = direction(np.arccos(cos_i), 0.0), direction(np.arccos(cos_o), 2 * np.pi * u[2])
+    beyond = table.extrapolates(wi, wo)
+    by_light = np.sum(wi * wo, axis=1) > np.cos(np.radians(_BY_LIGHT_DEG))
+    low = np.minimum(cos_i, cos_o) < table.lowest_cosine
+    places = {
+        f"beyond theta {np.degrees(np.arccos(table.lowest_cosine)):.3g} degrees": low,
+        f"within {_BY_LIGHT_DEG} degrees of the light": by_light & ~low,
+        "elsewhere": ~by_light & ~low,
+    }
+    parts = [f"{_percent(100 * (beyond & there).mean())} {name}" for name, there in places.items()]
+    share = float(beyond.mean())
+    said = f"nothing was measured around {_percent(100 * share)} of the pairs of directions ({', '.join(parts)})"
+    return share, [
+        f"{said}: f is extrapolated there, within the range of the 16 nearest"
+    ] if share > EXTRAPOLATED else []
 
 
 def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:

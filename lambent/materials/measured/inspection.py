@@ -27,7 +27,8 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         `tuples`: used, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent`, `negative_percent` of the tuples, `albedo_max`,
         `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
-        there is no peak towards the light), `under_sampled` (incident directions), see `faults`;
+        there is no peak towards the light), `under_sampled` (incident directions), `extrapolated_percent` (of the pairs
+        of directions, scattered tables alone), see `faults`;
         `findings`: a sentence for each fault that matters.
     """
     info, samples = table.info, table.samples()
@@ -39,6 +40,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     off, asymmetric = faults.asymmetry(table, symmetry)
     retro_ratio, towards_light = faults.retro(table, samples)
     isolated, under_sampled = faults.under_sampled(samples)
+    extrapolated, beyond = faults.extrapolation(table)
     too_bright = faults.too_bright(np.array(_THETA_I_DEG), r + t)
     return {
         "file": info.file,
@@ -65,6 +67,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "asymmetry_percent": 100 * off,
             "retro_ratio": retro_ratio,
             "under_sampled": isolated,
+            "extrapolated_percent": 100 * extrapolated,
         },
-        "findings": [*unusable, *too_bright, *not_mutual, *asymmetric, *towards_light, *under_sampled],
+        "findings": [*unusable, *too_bright, *not_mutual, *asymmetric, *towards_light, *under_sampled, *beyond],
     }

@@ -102,6 +102,12 @@ class LbnlTable(MeasuredTable):
         """Whether the table holds data of light from -z."""
         return any(side == -1 for _, side in self.uses)
 
+    @property
+    def tuples_from_behind(self) -> int:
+        """Number of tuples of light from -z that `samples` leaves out."""
+        parts = [part for (_, side), part in self.parts.items() if side == -1 and not self._turned]
+        return sum(len(part.tuples()[2]) for part in parts)
+
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr of wi, wo (..., 3) on any side; 0 at the horizon."""
         return on_flat_pairs(self._eval, wi, wo)

@@ -161,20 +161,25 @@ class MeasuredTable(ABC):
         return np.array(value).reshape(*wi.shape[:-1], self.info.channels)
 
     def _integral_of_one(self, wi: Floats, side: float) -> Floats:
-        proposal, u = MaterialBSDF(_PROPOSAL), _quadrature()
-        all_wi = np.broadcast_to(wi, u.shape)
-        wo = proposal.sample(all_wi, u)
-        pdf = proposal.pdf(wo, all_wi)
-        inside = (pdf > 0) & (wo[:, 2] * wi[2] > 0)
-        weight = np.abs(wo[inside, 2]) / pdf[inside]
-        f = self.eval(all_wi[inside], wo[inside] * (1, 1, side))
-        return np.asarray((f * weight[:, None]).sum(axis=0) / len(u))
+        wo, weight = quadrature(wi)
+        f = self.eval(np.broadcast_to(wi, wo.shape), wo * (1, 1, side))
+        return np.asarray((f * weight[:, None]).sum(axis=0))
+
+
+def quadrature(wi: Floats, points: int = _QUADRATURE_POINTS) -> tuple[Floats, Floats]:
+    """wo (N, 3) on the side of wi (3,), closer about the mirror direction, and weights (N,) whose sum over f is r."""
+    proposal, u = MaterialBSDF(_PROPOSAL), _low_discrepancy(points)
+    all_wi = np.broadcast_to(wi, u.shape)
+    wo = proposal.sample(all_wi, u)
+    pdf = proposal.pdf(wo, all_wi)
+    inside = (pdf > 0) & (wo[:, 2] * wi[2] > 0)
+    return wo[inside], np.abs(wo[inside, 2]) / (pdf[inside] * points)
 
 
 @cache
-def _quadrature() -> Floats:
-    """Low-discrepancy points of the unit cube: the first coordinate chooses the component, so it is stratified."""
-    k = np.arange(_QUADRATURE_POINTS)
+def _low_discrepancy(points: int) -> Floats:
+    """Points of the unit cube: the first coordinate chooses the component, so it is stratified."""
+    k = np.arange(points)
     return np.stack([radical_inverse(k, 3), (k + 0.5) / len(k), radical_inverse(k, 2)], axis=-1)
 
 
