@@ -3,6 +3,7 @@
 Without inputs it fits tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose answers are
 known. With inputs it fits the caller's measured files, and each fit is judged by the metric it was fitted under, as a
 share of the best Lambertian surface's error; published parameters (`--against FILE.fit`) are judged on the same tuples.
+Files with readings below zero are made as well, and their fits compared with those of their clean versions.
 Both methods fit one lobe in turn, five times; the other rows are least squares alone.
 """
 
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from lambent.bench.below_zero import DARK, spoilt_tables
 from lambent.bench.known_answers import KNOWN, setup_of
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
@@ -49,6 +51,7 @@ class Effort:
     methods: tuple[Method, ...] = METHODS
     runs: int = 5
     known: tuple[Material, ...] = tuple(KNOWN.values())
+    below_zero: bool = True  # whether tables with such readings are fitted
 
 
 FULL, QUICK = Effort(), Effort(6_000, 60_000, ("gradient",), 1)
@@ -78,6 +81,9 @@ def run(
         progress(done, len(sources), case.name)
         rows += _known_rows(case, effort) if case.truth is not None else _measured_rows(case, effort)
         rows += _published_rows(case, published)
+    if effort.below_zero and not inputs:
+        progress(len(sources), len(sources), "readings below zero")
+        rows += _below_zero_rows(effort)
     progress(len(sources), len(sources), "done")
     return {"rows": rows, "summary": _summary(rows)}
 
@@ -107,6 +113,24 @@ def _measured_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
             yield _row(case, method, [turn[method] for turn in results])
         for model in MODELS[1:]:
             yield _row(case, "gradient", [_fitted(case, "gradient", metric, *model)])
+
+
+def _below_zero_rows(effort: Effort) -> Iterator[dict[str, Any]]:
+    """Changes of the albedo at 30 degrees by readings below zero: of the bright channels, relative; of the dark one."""
+    wi = direction(np.radians(ALBEDO_THETA_DEG), 0.0)
+    for spoilt in spoilt_tables():
+        for metric in (KNOWN_METRIC, *METRICS):
+            found = {}
+            for what, table in {"clean": spoilt.clean, **spoilt.changed}.items():
+                case = Case(f"{spoilt.name}, {what}", table, table.samples(effort.tuples))
+                result = _fitted(case, "gradient", metric, *MODELS[0])
+                found[what] = MaterialBSDF(result.material).albedo(wi)
+                change = found[what] / found["clean"] - 1
+                yield _row(case, "gradient", [result]) | {
+                    "below_zero": case.samples.below_zero,
+                    "albedo_change": float(np.abs(np.delete(change, DARK)).max()),
+                    "dark_albedo_change": float(found[what][DARK] - found["clean"][DARK]),
+                }
 
 
 def _fitted(case: Case, method: Method, metric: str, distribution: Any, lobes: int) -> FitResult:
@@ -184,8 +208,11 @@ def _parameters(material: Material) -> dict[str, float]:
 def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Largest deviation from a known parameter, geometric mean of the shares per model, both methods' comparison."""
     known = [row for row in rows if "parameters" in row and row["method"] == "gradient"]
-    measured = [row for row in rows if "parameters" not in row]
+    spoilt = [row for row in rows if "below_zero" in row]
+    measured = [row for row in rows if "parameters" not in row and "below_zero" not in row]
     summary: dict[str, Any] = {}
+    if spoilt:
+        summary["below_zero_albedo_change"] = max(row["albedo_change"] for row in spoilt)
     if known:
         parameters = [p for row in known for p in row["parameters"]]
         summary["largest_deviation"] = max(abs((p["found"] or 0.0) / p["true"] - 1) for p in parameters)

@@ -134,6 +134,8 @@ def describe(report: CheckReport | TableReport) -> str:
             (f"albedo at {i.theta_deg:g} deg", f"{i.from_table:.4f} by the table, {i.quadrature:.4f} by quadrature")
             for i in report.integrals
         ]
+        if report.negative_readings:
+            rows.append(("readings below zero", f"{report.negative_readings}; they are drawn as 0"))
     sampler = [
         (f"sampler at {one.theta_deg:g} deg", f"chi-square p {one.p_value:.3f}, density integrates to "
          f"{one.pdf_integral:.4f}, albedo {one.albedo_sampled:.4f} (quadrature {one.albedo_quadrature:.4f})")

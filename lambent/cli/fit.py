@@ -58,8 +58,10 @@ def command(
     """
     from lambent.core.images import check_writable
     from lambent.materials import measured
+    from lambent.materials.fitting.account import below_zero
     from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.grid import Schedule
+    from lambent.materials.fitting.metrics import METRICS
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
     from lambent.materials.fitting.plot import save_plots
 
@@ -89,7 +91,7 @@ def command(
         with progress_bar() as bar:
             page = fit_report.report(measurement, samples, result, source=file, environment=around, progress=bar)
         write_text(report, page)
-    for warning in (*samples.info.notes, *result.warnings):
+    for warning in (*samples.info.notes, *below_zero(samples, METRICS[metric]), *result.warnings):
         say(f"note: {warning}")
     figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
     facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}

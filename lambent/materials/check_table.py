@@ -19,7 +19,7 @@ from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.check import PHI_DEG, THETA_DEG, Furnace, Report, mean_albedo
 from lambent.materials.measured.faults import extrapolation
 from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.protocol import MeasuredTable, negative_readings
 from lambent.materials.measured.sampling import TableBSDF
 
 PAIRS = 60_000
@@ -55,11 +55,17 @@ class TableReport(Report):
         Integral of |f(wi, wo) - f(wo, wi)| cos cos over that of the mean of both, reflection only.
     resampling_share : float
         Deviation of the path tracer's look-up from the table itself, as a share of the light.
+    tuples : dict of int
+        Numbers of raw tuples: used, those of them below zero, and left out by reason.
+    negative_readings : str
+        The readings below zero in words, which are no fault; empty where there are none.
     """
 
     reciprocity_share: float
     resampling_share: float
     integrals: tuple[IntegralCheck, ...]
+    tuples: dict[str, int]
+    negative_readings: str
 
 
 def check_table(
@@ -77,12 +83,15 @@ def check_table(
         step(f"albedo at {theta:g} degrees")
         integrals.append(check_integral(bsdf, theta, 20.0 + 50 * i, seed))
     sampler = check.check_samplers(bsdf, seed, step)
+    samples = table.samples()
     step("checked")
     return TableReport(
         reciprocity_share=reciprocity,
         resampling_share=resampling,
         furnace=energy,
         integrals=tuple(integrals),
+        tuples=samples.counts,
+        negative_readings=negative_readings(samples),
         sampler=sampler,
         warnings=(*_warnings(resampling, energy), *extrapolation(table)[1]),
         failures=(*_failures(reciprocity, energy, integrals), *check.sampler_failures(sampler)),

@@ -60,7 +60,7 @@ class Provenance(_Strict):
     method: str | None = None
     metric: str | None = None
     errors: dict[str, float] = Field(default_factory=dict)  # metric -> error; the unit is the metric's
-    samples: dict[str, int] = Field(default_factory=dict)  # used, shadowed, negative, not_finite, grazing
+    samples: dict[str, int] = Field(default_factory=dict)  # used, below_zero of these; left out: shadowed, ...
     notes: tuple[str, ...] = ()
 
 

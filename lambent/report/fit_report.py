@@ -21,7 +21,7 @@ from lambent.materials.fitting.fit import FitResult
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.fitting.metrics import METRICS, Metric
 from lambent.materials.fitting.slices import slices
-from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
+from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, negative_readings
 from lambent.report import page
 from lambent.scenes.scene import Environment
 
@@ -33,8 +33,7 @@ STORED = {
 }
 REASONS = {
     "shadowed": "marked as not measured, or hidden by the device",
-    "not_finite": "not a number, infinite, or absurdly large",
-    "negative": "below zero in a channel",
+    "not_finite": "not a number, infinite, or absurdly large or negative",
     "grazing": "theta_i or theta_o beyond 84°, where devices see their own errors",
 }
 MEANINGS = (
@@ -196,6 +195,8 @@ def _measurement(table: MeasuredTable, samples: MeasuredSamples, source: Path | 
         body.append(page.table(head, gone, numbers=(1, 2), caption="Each tuple is counted once, by the first reason."))
     else:
         body.append(page.paragraph("Nothing was left out."))
+    if negative := negative_readings(samples):
+        body.append(page.paragraph(f"{negative}. The fit keeps them; what is drawn takes them as 0."))
     return [*body, page.bullets(info.notes)] if info.notes else body
 
 

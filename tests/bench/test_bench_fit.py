@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from lambent.bench.below_zero import SIZE
 from lambent.bench.fit import METRICS, MODELS, QUICK, run
 from lambent.bench.known_answers import KNOWN
 from lambent.core.errors import UserError
@@ -17,11 +18,22 @@ WARD = "paint = Aggregate(Lambertian(albedo = [.2, .2, .2]), NganWard(albedo = [
 
 @pytest.mark.slow
 def test_known_answers_are_found():
-    report = run(replace(QUICK, known=(KNOWN["white foil"],)))
+    report = run(replace(QUICK, known=(KNOWN["white foil"],), below_zero=False))
     names = [p["parameter"] for p in report["rows"][0]["parameters"]]
     assert names == ["kd", "ks", "mx", "my", "r0", "alpha", "kt (1 - r0)", "t_mx", "t_my", "t_alpha"]
     assert report["summary"]["largest_deviation"] < 0.05
     assert report["summary"]["l1_over_truth"] <= 1
+    json.dumps(report)
+
+
+@pytest.mark.slow
+def test_readings_below_zero_leave_the_albedo():
+    report = run(replace(QUICK, known=()))
+    assert {row["file"].split(", ")[1] for row in report["rows"]} == {"clean", "blue lowered", "noise"}
+    for row in report["rows"]:
+        assert (row["below_zero"] > 0.1 * row["tuples"]) == ("clean" not in row["file"])
+        assert row["albedo_change"] < 0.025 and abs(row["dark_albedo_change"]) < 4 * SIZE
+    assert report["summary"]["below_zero_albedo_change"] < 0.025
     json.dumps(report)
 
 

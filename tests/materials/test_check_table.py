@@ -17,7 +17,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.export import lbnl_xml
 from lambent.materials.measured import load
 from lambent.materials.measured.half_vector_grid import GridShape
-from lambent.materials.measured.protocol import MeasuredTable, TableInfo
+from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect
 from lambent.materials.measured.scattered import ScatteredTable
 
 SMALL = GridShape(24, 1, 64, 32)
@@ -35,7 +35,8 @@ class Exact(MeasuredTable):
         return np.where((wi[..., 2:] > 0) & (wo[..., 2:] > 0), self.bsdf.eval(wi, wo), 0.0)
 
     def samples(self, max_count=None):
-        raise NotImplementedError
+        wi = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
+        return collect(wi, wi, self.eval(wi, wi), np.ones(2), self.info, np.zeros(2, bool))
 
 
 class Asymmetric(Exact):

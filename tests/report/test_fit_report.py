@@ -109,3 +109,11 @@ def test_transmitting_anisotropic_grey_and_partial(small_previews):
     for expected in ("cancelled", "1, grey", "a lamp behind", "brushed along", "PSNR", "reflection and transmission"):
         assert expected in text, expected
     assert sum(tag == "img" for tag, _ in read.tags) >= 3 + 3 + 1
+
+
+def test_readings_below_zero_are_counted_as_kept(no_engine):
+    dark = Material(name="dark", kd=(0.3, 0.2, 0.0), lobes=PAINT.lobes)
+    made_of = made(dark, replace(ISOTROPIC, **FEW, floor=0.02))
+    html = report(*made_of)
+    count = made_of[1].below_zero
+    assert count > 0 and f"{count} of {len(made_of[1])} tuples" in html and "The fit keeps them" in html

@@ -1,5 +1,7 @@
 """What the editor says of a material: errors, disks, curves and albedo are those of its BSDF."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.disks import disk_directions
 from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured.synthetic import synthesise
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.matrix import matrix
 from lambent.viewer.editor.measurement import read_measurement, thinned
@@ -47,6 +50,17 @@ def test_few_tuples_stand_for_all(brushed, material):
         exact = metric.error(brushed.samples, MaterialBSDF(material).eval(brushed.samples.wi, brushed.samples.wo))
         estimate = metric.error(few, MaterialBSDF(material).eval(few.wi, few.wo))
         assert estimate == pytest.approx(exact, rel=0.05), name
+
+
+def test_few_tuples_stand_for_noise_about_zero():
+    """Most tuples of a dark specimen are below zero; each is drawn as often as its weight asks."""
+    dark = synthesise(Material(kd=0.001, lobes=(Lobe(mx=0.1, my=0.1, r0=0.5),)), replace(TURNED, floor=0.02)).samples()
+    assert dark.below_zero > 0.3 * len(dark)
+    few = thinned(dark, 3000)
+    assert len(few) <= 3000 < len(dark) and (few.weight > 0).all() and np.isfinite(few.weight).all()
+    f = [MaterialBSDF(OTHERS[0]).eval(samples.wi, samples.wo) for samples in (few, dark)]
+    for name, metric in METRICS.items():
+        assert metric.error(few, f[0]) == pytest.approx(metric.error(dark, f[1]), rel=0.05), name
 
 
 def test_the_same_tuples_every_time(brushed):

@@ -15,7 +15,7 @@ from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import CHECK_LOG2, is_isotropic, pairs_of
 from lambent.materials.fitting.metrics import errors_and_shares
 from lambent.materials.measured.gonio import Symmetry, symmetry_of
-from lambent.materials.measured.protocol import MeasuredSamples
+from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 from lambent.materials.measured.registry import load
 
 MOST_TUPLES = 200_000  # of a table, at which the written file is compared
@@ -70,8 +70,11 @@ def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
     UserError
         The file is of no readable format.
     """
-    samples = tuples_of(subject)
-    f = load(path).eval(samples.wi, samples.wo)
+    samples, written = tuples_of(subject), load(path)
+    negative = negative_readings(samples)
+    if negative and not written.samples(MOST_TUPLES).below_zero:
+        lost += (f"readings below zero became 0: {negative}",)
+    f = written.eval(samples.wi, samples.wo)
     if f.shape[1] != samples.f.shape[1]:
         f = f.mean(axis=1, keepdims=True) if samples.f.shape[1] == 1 else np.repeat(f, 3, axis=1)
     return Cost(lost, *errors_and_shares(samples, f))

@@ -10,12 +10,12 @@ from lambent.core.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.document import Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
-from lambent.materials.fitting.metrics import METRICS, light_ratios
+from lambent.materials.fitting.metrics import METRICS, Metric, light_ratios
 from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.fresnel import schlick_weight
-from lambent.materials.measured.protocol import MeasuredSamples
+from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 
 AT_BOUND = 0.005  # of the interval
 UNDERSHOOT = 0.7  # of the measured peak
@@ -71,6 +71,14 @@ def warnings_of(
     lines += _energy(material)
     lines += _ambiguity(samples, found)
     return tuple(lines)
+
+
+def below_zero(samples: MeasuredSamples, metric: Metric) -> list[str]:
+    """A line on the readings below zero and on how the metric takes them, where there are any."""
+    if not (negative := negative_readings(samples)):
+        return []
+    taken = "as 0" if metric.clamps else "as measured"
+    return [f"{negative}; they are kept, and the {metric.name} metric takes a reading below zero {taken}"]
 
 
 def restrictions(fix: Fixed, ranges: Ranges) -> list[str]:

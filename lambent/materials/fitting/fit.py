@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -196,8 +196,14 @@ def fit(
         method=f"{method}, {lobes} lobe(s) per side, seed {seed}" + (", albedo kept" if keep_albedo else ""),
         metric=task.metric.name,
         errors=errors,
-        samples={"used": len(samples), **asdict(samples.left_out)},
-        notes=(*samples.info.notes, *account.restrictions(task.fix, task.ranges), *_by_lobes(found), *warnings),
+        samples=samples.counts,
+        notes=(
+            *samples.info.notes,
+            *account.below_zero(samples, task.metric),
+            *account.restrictions(task.fix, task.ranges),
+            *_by_lobes(found),
+            *warnings,
+        ),
     )
     material = material.model_copy(update={"provenance": provenance})
     lambertian = account.lambertian_errors(samples)

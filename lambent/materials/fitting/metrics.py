@@ -41,7 +41,8 @@ class Metric:
     cosine : "wi" or "wo"
         Whose cosine multiplies f before the transform; with "wo", |cos theta_i| multiplies the weight.
     transform, slope : callable
-        T and its derivative, of f cos >= 0 in 1/sr.
+        T of f cos in 1/sr, and its derivative where f cos >= 0. Where T is as good as linear about 0 it takes negative
+        readings as they are, so that noise about zero has no mean; a cube root would magnify it, and takes them as 0.
     """
 
     name: str
@@ -56,6 +57,11 @@ class Metric:
     def linear(self) -> bool:
         """Whether T is the identity, so that the best coefficient has a closed form."""
         return self.transform is _same
+
+    @property
+    def clamps(self) -> bool:
+        """Whether T takes a negative reading as 0."""
+        return bool(self.transform(-1.0) == self.transform(0.0))
 
     def terms(self, samples: MeasuredSamples) -> tuple[Floats, Floats]:
         """(w, c) of every tuple, each (N,)."""
@@ -82,7 +88,7 @@ CUBEROOT = Metric(
     "Fores, Ferwerda & Gu 2012: cosine-weighted L2 of the cube root",
     2,
     "wi",
-    lambda x: np.cbrt(x + CUBEROOT_EPS),
+    lambda x: np.cbrt(np.maximum(x, 0) + CUBEROOT_EPS),
     lambda x: np.cbrt(x + CUBEROOT_EPS) / (3 * (x + CUBEROOT_EPS)),
 )
 LOG = Metric(
@@ -91,7 +97,7 @@ LOG = Metric(
     "Low, Kronander, Ynnerman & Unger 2012: L2 of ln(1 + f cos)",
     2,
     "wi",
-    np.log1p,
+    lambda x: np.copysign(np.log1p(np.abs(x)), x),
     lambda x: 1 / (1 + x),
 )
 

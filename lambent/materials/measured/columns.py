@@ -24,7 +24,7 @@ from lambent.materials.measured.gonio_rows import LONGEST_NAME, check_angles, qu
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
-from lambent.materials.measured.table import isotropic_brdf, require_values, usable_values
+from lambent.materials.measured.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
 from lambent.materials.measured.text_numbers import (
     head_text,
     numbers,
@@ -232,11 +232,11 @@ def _degrees(rows: Floats, layout: Layout, phi_i_deg: float) -> Floats:
 
 
 def _values(values: Floats, layout: Layout) -> tuple[Floats, tuple[str, ...]]:
-    """(N, 1 or 3) grey or linear RGB; NaN where it is not finite."""
-    values = np.where(np.isfinite(values), values, np.nan)
+    """(N, 1 or 3) grey or linear RGB; NaN where it is not finite, or marked as not measured."""
+    values = unmarked(np.where(np.isfinite(values), values, np.nan))
     if layout.kind == "xyz":
         return rgb_of_xyz(values)
     if layout.kind == "spectra":
         order = np.argsort(layout.wavelengths_nm, kind="stable")
-        return rgb_of_measured(values[:, order], usable_values(values), np.array(layout.wavelengths_nm)[order])
+        return rgb_of_measured(values[:, order], sensible(values), np.array(layout.wavelengths_nm)[order])
     return values, ()

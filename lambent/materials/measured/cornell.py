@@ -16,7 +16,7 @@ from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.materials.measured.scattered import ScatteredTable
 from lambent.materials.measured.spectral import rgb_of_measured
-from lambent.materials.measured.table import isotropic_brdf, require_values, usable_values
+from lambent.materials.measured.table import isotropic_brdf, require_values, sensible, unmarked, usable_values
 from lambent.materials.measured.text_numbers import numbers, read_text, without_comments
 
 NAME = "Cornell / pbrt-v2 text"
@@ -59,10 +59,9 @@ def read(path: Path) -> ScatteredTable:
     theta = rows[:, [0, 2]]
     if not (np.isfinite(rows[:, :4]).all() and (theta >= 0).all() and (theta <= np.pi / 2 + 1e-3).all()):
         raise UserError("an angle is outside its range", file=path, expected="theta in [0, pi/2], radians")
-    spectra = rows[:, 4:]
-    usable = usable_values(spectra)
-    require_values(spectra, usable, path)
-    rgb, notes = rgb_of_measured(spectra, usable, wavelengths)
+    spectra = unmarked(rows[:, 4:])
+    require_values(spectra, usable_values(spectra), path)
+    rgb, notes = rgb_of_measured(spectra, sensible(spectra), wavelengths)
     sizes = {"samples": len(rows), "wavelengths": count}
     wi, wo = direction(rows[:, 0], rows[:, 1]), direction(rows[:, 2], rows[:, 3])
     return ScatteredTable(wi, wo, rgb, isotropic_brdf(path, NAME, sizes, notes))

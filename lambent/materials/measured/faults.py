@@ -8,7 +8,13 @@ from lambent.core.directions import HALF_TURN, Floats, angles, direction, normal
 from lambent.core.sequences import r2, radical_inverse
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured.gonio import GonioTable, Symmetry, groups
-from lambent.materials.measured.protocol import GRAZING_DEG, MeasuredSamples, MeasuredTable
+from lambent.materials.measured.protocol import (
+    GRAZING_DEG,
+    MeasuredSamples,
+    MeasuredTable,
+    negative_readings,
+    percentage,
+)
 from lambent.materials.measured.scattered import ScatteredTable
 
 _PAIRS = 4096
@@ -25,15 +31,21 @@ _NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
 _BY_LIGHT_DEG = 20  # where the lamp is in the way of most devices
-_REASONS = {"shadowed": "not measured, or below the horizon", "not_finite": "not finite", "negative": "negative"}
+_REASONS = {"shadowed": "not measured, or below the horizon", "not_finite": "not finite, or impossible"}
 
 
 def left_out(samples: MeasuredSamples) -> tuple[dict[str, float], list[str]]:
     """Percentage of the tuples that are left out, by the reasons of `LeftOut`."""
     counts, total = samples.left_out, len(samples) + samples.left_out.total
     percent = {name: 100 * getattr(counts, name) / total for name in _REASONS}
-    said = [f"{_percent(percent[name])} of the tuples are {what}, and left out" for name, what in _REASONS.items()]
+    said = [f"{percentage(percent[name])} of the tuples are {what}, and left out" for name, what in _REASONS.items()]
     return percent, [line for line, share in zip(said, percent.values(), strict=True) if share > 0]
+
+
+def negative(samples: MeasuredSamples) -> list[str]:
+    """Readings below zero, as noise leaves them: fits keep them, `eval` does not."""
+    found = negative_readings(samples)
+    return [f"{found}; a fit keeps them, what is drawn or converted takes them as 0"] if found else []
 
 
 def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
@@ -43,7 +55,7 @@ def non_reciprocity(table: MeasuredTable) -> tuple[float, list[str]]:
     near = direction(*_mirrored(wi, u[:, 2:]))
     pairs = (np.concatenate([wi, wi]), np.concatenate([wo, near]))
     difference = _difference(table.eval(*pairs), table.eval(*pairs[::-1]))
-    said = f"swapping light and viewer changes f by {_percent(100 * difference)} on average"
+    said = f"swapping light and viewer changes f by {percentage(100 * difference)} on average"
     return difference, [
         f"{said}: a reciprocal model cannot fit closer than that"
     ] if difference > NON_RECIPROCAL else []
@@ -62,7 +74,7 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str
     turned = (direction(np.zeros(_PAIRS), 0.0), HALF_TURN)
     pairs = {"isotropic": [across_y], "quadrant": [across_y, across_x], "half": [turned], "none": []}[symmetry]
     off = max((_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs), default=0.0)
-    said = f"is taken as {symmetry}, but mirrored directions differ by {_percent(100 * off)} of the mean"
+    said = f"is taken as {symmetry}, but mirrored directions differ by {percentage(100 * off)} of the mean"
     return off, [said] if off > ASYMMETRIC else []
 
 
@@ -105,9 +117,9 @@ def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
         f"within {_BY_LIGHT_DEG} degrees of the light": by_light & ~low,
         "elsewhere": ~by_light & ~low,
     }
-    parts = [f"{_percent(100 * (beyond & there).mean())} {name}" for name, there in places.items()]
+    parts = [f"{percentage(100 * (beyond & there).mean())} {name}" for name, there in places.items()]
     share = float(beyond.mean())
-    said = f"nothing was measured around {_percent(100 * share)} of the pairs of directions ({', '.join(parts)})"
+    said = f"nothing was measured around {percentage(100 * share)} of the pairs of directions ({', '.join(parts)})"
     return share, [
         f"{said}: f is extrapolated there, within the range of the 16 nearest"
     ] if share > EXTRAPOLATED else []
@@ -142,10 +154,6 @@ def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:
         f"the peak is under-sampled at {len(peaks)} incident directions: at theta_i = {theta:.3g}, phi_i = {phi:.3g} "
         f"degrees f falls from {highest:.3g} to {beside:.3g} /sr within one step of {step_deg:.2g} degrees"
     ]
-
-
-def _percent(value: float) -> str:
-    return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
 
 
 def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:

@@ -24,6 +24,7 @@ from lambent.core.errors import UserError
 from lambent.core.plain import is_number
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.gonio_rows import check_angles, table_of
+from lambent.materials.measured.table import unmarked
 from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "FRED BSDF text"
@@ -56,7 +57,7 @@ def read(path: Path) -> GonioTable:
     angles = np.concatenate([incident[block_of] + (0, 180), outgoing], axis=1)
     check_angles(angles, path)
     with np.errstate(over="ignore", invalid="ignore"):
-        f = (10 ** rows[:, 2:] if units["bsdf"] == "log" else rows[:, 2:]) * scale
+        f = (10 ** rows[:, 2:] if units["bsdf"] == "log" else unmarked(rows[:, 2:])) * scale
     f = np.where(np.isfinite(f), f, np.nan)
     return table_of(angles, f, path, NAME, Path(path).stem)
 

@@ -5,8 +5,8 @@
     theta_i phi_i theta_o phi_o p_r p_g p_b
     5 0 0 0 0.0213 0.0175 0.0141
 
-Angles are in degrees; theta_o > 90 is transmission; the value columns' names give the quantity; nan or -1 was not
-measured.
+Angles are in degrees; theta_o > 90 is transmission; the value columns' names give the quantity; nan, or exactly -1,
+-99, -999 or -9999, was not measured.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from lambent.materials.measured.gonio import FORMAT, AnySheet, GonioTable
 from lambent.materials.measured.gonio_rows import QUANTITIES, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.protocol import Quantity
 from lambent.materials.measured.sheets import Sheet
+from lambent.materials.measured.table import unmarked
 from lambent.materials.measured.text_numbers import HINT_DECIMAL_COMMA, has_decimal_commas, plain_text, read_text, shown
 
 NAME = FORMAT
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
 _VALUE_COLUMNS = [[q] for q in QUANTITIES] + [[f"{q}_{channel}" for channel in "rgb"] for q in QUANTITIES]
 _HEADER_BYTES = 1 << 16
-_NOT_MEASURED = -1.0
 
 
 def recognise(head: bytes, size: int) -> bool:
@@ -68,8 +68,7 @@ def read(path: Path) -> GonioTable:
         raise UserError("value columns do not say what they hold", file=path, got=got, expected=f"one of: {known}")
     quantity = QUANTITIES[_VALUE_COLUMNS.index(names[4:]) % len(QUANTITIES)]
     rows = _rows(content, len(names), path)
-    values = np.where(rows[:, 4:] == _NOT_MEASURED, np.nan, rows[:, 4:])
-    f, keys = to_f(values, quantity, rows[:, 2]), _keys(content[:_HEADER_BYTES])
+    f, keys = to_f(unmarked(rows[:, 4:]), quantity, rows[:, 2]), _keys(content[:_HEADER_BYTES])
     name = keys.get("name", Path(path).stem)
     return table_of(rows[:, :4], f, path, NAME, name, stored=quantity, named=keys.get("symmetry"))
 

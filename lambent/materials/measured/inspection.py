@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,9 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     dict
         `file`, `format`, `stored`, `channels`, `symmetry`, `transmits`, `sizes`, `notes` as in `TableInfo`;
         `albedo`: `theta_i_deg` and, per angle and channel, `reflectivity` and `transmissivity`;
-        `tuples`: used, and left out by reason;
-        `faults`: `not_measured_percent`, `not_finite_percent`, `negative_percent` of the tuples, `albedo_max`,
+        `tuples`: used, how many of these are below zero in a channel, and left out by reason;
+        `faults`: `not_measured_percent`, `not_finite_percent` of the tuples, `negative_percent` of those used,
+        `albedo_max`,
         `energy_above_one` (`more_than_arrives`), `non_reciprocal_percent`, `asymmetry_percent`, `retro_ratio` (1 where
         there is no peak towards the light), `under_sampled` (incident directions), `extrapolated_percent` (of the pairs
         of directions, scattered tables alone), see `faults`;
@@ -36,6 +36,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     r, t = table.reflectivity(wi), table.transmissivity(wi)
     symmetry = symmetry_of(table)
     percent, unusable = faults.left_out(samples)
+    negative = faults.negative(samples)
     non_reciprocal, not_mutual = faults.non_reciprocity(table)
     off, asymmetric = faults.asymmetry(table, symmetry)
     retro_ratio, towards_light = faults.retro(table, samples)
@@ -56,11 +57,11 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "reflectivity": r.round(5).tolist(),
             "transmissivity": t.round(5).tolist(),
         },
-        "tuples": {"used": len(samples), **asdict(samples.left_out)},
+        "tuples": samples.counts,
         "faults": {
             "not_measured_percent": percent["shadowed"],
             "not_finite_percent": percent["not_finite"],
-            "negative_percent": percent["negative"],
+            "negative_percent": 100 * samples.below_zero / len(samples),
             "albedo_max": float((r + t).max()),
             "energy_above_one": bool(more_than_arrives(r + t).any()),
             "non_reciprocal_percent": 100 * non_reciprocal,
@@ -69,5 +70,14 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             "under_sampled": isolated,
             "extrapolated_percent": 100 * extrapolated,
         },
-        "findings": [*unusable, *too_bright, *not_mutual, *asymmetric, *towards_light, *under_sampled, *beyond],
+        "findings": [
+            *unusable,
+            *negative,
+            *too_bright,
+            *not_mutual,
+            *asymmetric,
+            *towards_light,
+            *under_sampled,
+            *beyond,
+        ],
     }

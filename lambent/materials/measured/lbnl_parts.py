@@ -151,12 +151,12 @@ def _matrix_of(
         raise UserError("colours have other bases than Visible", file=file)
     values = np.stack([values for _, _, values in channels], axis=-1)
     if len(channels) == 3:
-        read = np.asarray((values >= 0).all(axis=-1, keepdims=True))
+        read = np.asarray((values >= 0).all(axis=-1, keepdims=True))  # else noise, which is no saturated colour
         rgb = rgb_of_xyz(values[..., [1, 0, 2]])
         outside = int((rgb.min(axis=-1) < -_SATURATED * values[..., 0])[read[..., 0]].sum())
         if outside:
             notes.append(f"{outside} values are more saturated than Rec.709 and were desaturated")
-        values = np.where(read, within_rec709(rgb), -1.0)
+        values = np.where(read, within_rec709(rgb), rgb)
     return PatchMatrix(incident, outgoing, values)
 
 

@@ -170,7 +170,7 @@ class LbnlTable(MeasuredTable):
         if 0 < anisotropy <= ISOTROPIC_WITHIN:
             notes.append(f"turning the sheet changes f by {100 * anisotropy:.2g} %: taken as isotropic")
         negative = {where: part.negative for where, part in self.parts.items() if part.negative}
-        notes += [f"{_NAMES[where]}: {count} negative values count as 0" for where, count in negative.items()]
+        notes += [f"{_NAMES[where]}: {count} values are negative" for where, count in negative.items()]
         direct = {where: part.direct_share for where, part in self.parts.items() if part.direct_share > _DIRECT_SHARE}
         if direct:
             shares = ", ".join(f"{100 * share:.0f} % of the {_NAMES[where]}" for where, share in direct.items())

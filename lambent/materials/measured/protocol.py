@@ -38,8 +38,7 @@ class LeftOut:
     """Number of raw tuples that cannot be used, by the first reason that holds, in this order."""
 
     shadowed: int = 0  # not measured: the device was in the way, or the file marks the cell as empty
-    not_finite: int = 0
-    negative: int = 0  # any channel
+    not_finite: int = 0  # or impossible: beyond LARGEST_F, or further below zero than the brightest tuple is above it
     grazing: int = 0  # theta_i or theta_o beyond GRAZING_DEG
 
     @property
@@ -89,7 +88,8 @@ class MeasuredSamples:
     wi, wo : (N, 3) float64
         Unit directions to the light and to the viewer; wi.z > 0; wo.z < 0 is transmission.
     f : (N, C) float64
-        BSDF in 1/sr, without the cosine; C = 1 or 3; finite and >= 0.
+        BSDF in 1/sr, without the cosine; C = 1 or 3; finite. A dark reading is noise about zero, so that a channel can
+        be negative: clamped at 0, it would have a mean above what was measured.
     weight : (N,) float64
         Solid angle of the tuple, in sr: sin(theta_o) dtheta_o dphi_o of its cell where the table has incident
         directions (the sin(theta_o) of (3.7)); the share of the joint measure d_wi d_wo, in sr^2, where it has none
@@ -112,6 +112,16 @@ class MeasuredSamples:
     def p(self) -> Floats:
         """(N, C) transfer probability f |cos theta_o| in 1/sr (2.4)."""
         return self.f * np.abs(self.wo[:, 2:])
+
+    @property
+    def below_zero(self) -> int:
+        """Number of tuples with a negative channel."""
+        return int((self.f < 0).any(axis=1).sum())
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of tuples: used, those of them below zero, and left out by reason."""
+        return {"used": len(self), "below_zero": self.below_zero, **asdict(self.left_out)}
 
     @property
     def transmitted(self) -> Flags:
@@ -203,12 +213,11 @@ def collect(
     UserError
         Nothing is left.
     """
-    finite = (np.isfinite(f) & (f <= LARGEST_F)).all(axis=1)
-    negative = (np.where(np.isfinite(f), f, 0) < 0).any(axis=1)
+    finite = (np.isfinite(f) & (np.abs(f) <= LARGEST_F)).all(axis=1)
     grazing = (np.abs(wi[:, 2]) < _COS_GRAZING) | (np.abs(wo[:, 2]) < _COS_GRAZING)
     used = np.ones(len(f), dtype=bool)
     counts = []
-    for reason in (shadowed, ~finite, negative, grazing):
+    for reason in (shadowed, ~finite | _too_negative(f, wo, ~shadowed & finite), grazing):
         counts.append(int((used & reason).sum()))
         used &= ~reason
     left_out = LeftOut(*counts)
@@ -220,12 +229,35 @@ def collect(
     return MeasuredSamples(wi[chosen], wo[chosen], f[chosen], weight[chosen], left_out, info)
 
 
+def _too_negative(f: Floats, wo: Floats, measured: Flags) -> Flags:
+    """(N,) whether f cos theta_o is further below zero than any measured one is above it: a mark, not noise."""
+    p = np.where(measured[:, None], f, 0) * np.abs(wo[:, 2:])
+    return np.asarray(p.min(axis=1) < -p.max(initial=0))
+
+
 def even_choice(count: int, most: int) -> Indices:
     """(most,) numbers below `count` >= `most`, jittered and evenly spread, always the same."""
     return ((np.arange(most) + np.random.default_rng(0).random(most)) * (count / most)).astype(np.int64)
 
 
+def negative_readings(samples: MeasuredSamples) -> str:
+    """How many of the tuples are negative, in which channels and how far; empty where none is."""
+    count = samples.below_zero
+    if not count:
+        return ""
+    names = ("red", "green", "blue") if samples.f.shape[1] == 3 else ("f",)
+    each = zip(names, (samples.f < 0).sum(axis=0), samples.f.min(axis=0), strict=True)
+    found = ", ".join(f"{name} in {times}, down to {lowest:.2g} /sr" for name, times, lowest in each if times)
+    share = f"{count} of {len(samples)} tuples ({percentage(100 * count / len(samples))})"
+    return f"{share} are below zero: {found}"
+
+
+def percentage(value: float) -> str:
+    """A value in per cent with two digits, such as '.3 %'."""
+    return f"{value:.0f} %" if value >= 10 else f"{value:.2g} %"
+
+
 def describe(left_out: LeftOut) -> str:
-    """The counts in words, such as '12 shadowed, 3 negative'."""
+    """The counts in words, such as '12 shadowed, 3 grazing'."""
     counts = asdict(left_out).items()
     return ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in counts if count) or "none left out"

@@ -19,7 +19,14 @@ from lambent.core.errors import UserError
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
-from lambent.materials.measured.table import ReflectionTable, fill_holes, mirrored_to_range, require_values, sensible
+from lambent.materials.measured.table import (
+    ReflectionTable,
+    fill_holes,
+    mirrored_to_range,
+    require_values,
+    sensible,
+    usable_values,
+)
 from lambent.materials.measured.tensor_file import MAGIC, Tensors, read_tensors
 
 NAME = "RGL tensor file"
@@ -101,14 +108,13 @@ class RglTable(ReflectionTable):
         self._with_jacobian = bool(np.any(tensors.get("jacobian", np.ones(1))))
         self._raw = values
         finite = sensible(values)
-        usable = np.asarray(finite & (values >= 0).all(axis=-1))
-        require_values(values, usable, path)
+        require_values(values, usable_values(values), path)
         slices = (-1, *values.shape[2:])
         self._values = fill_holes(values, finite).reshape(slices).astype(np.float64)
         self._warp = Warp(tensors["vndf"].astype(np.float64).reshape(-1, *tensors["vndf"].shape[2:]))
         self._ndf, self._sigma = (tensors[name].astype(np.float64)[None] for name in ("ndf", "sigma"))
         negative = int((values < 0).sum())
-        notes = [f"{negative} of {values.size} stored values are negative; eval takes them as 0"] if negative else []
+        notes = [f"{negative} of {values.size} stored values are negative"] if negative else []
         if not finite.all():
             notes.append(f"{int((~finite).sum())} nodes are not finite; eval takes the nearest node")
         sizes = dict(zip(("phi_i", "theta_i", "rows", "columns"), values.shape[:4], strict=True))

@@ -12,7 +12,7 @@ from lambent.core.directions import Floats, direction
 from lambent.core.sequences import radical_inverse
 from lambent.materials.measured.merl import half_difference_angles
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
-from lambent.materials.measured.table import ReflectionTable, sensible, usable_values
+from lambent.materials.measured.table import ReflectionTable, sensible
 
 NEIGHBOURS = 16
 _SLOPE_PENALTY = 1e-4  # of the plane, per radius of the neighbourhood: keeps it flat where the data are on a line
@@ -42,7 +42,7 @@ class ScatteredTable(ReflectionTable):
 
     def __init__(self, wi: Floats, wo: Floats, f: Floats, info: TableInfo) -> None:
         self._wi, self._wo, self._f, self.info = wi, wo, f, info
-        self._usable = sensible(f) & usable_values(f)
+        self._usable = sensible(f)
 
     @cached_property
     def _tree(self) -> Any:  # scipy's class is imported where it is needed
@@ -110,8 +110,8 @@ class ScatteredTable(ReflectionTable):
         wi, wo = direction(np.arccos(u[0]), 0.0), direction(np.arccos(u[1]), 2 * np.pi * u[2])
         _, nearest = cKDTree(_place(self._wi, self._wo)).query(_place(wi, wo))
         weight = np.bincount(nearest, minlength=len(self._f)) * ((2 * np.pi) ** 2 / count)
-        shadowed = np.zeros(len(self._f), dtype=bool)
-        return collect(self._wi, self._wo, self._f, weight, self.info, shadowed, max_count)
+        not_measured = np.asarray(np.isnan(self._f).any(axis=1))
+        return collect(self._wi, self._wo, self._f, weight, self.info, not_measured, max_count)
 
 
 def _place(wi: Floats, wo: Floats) -> Floats:

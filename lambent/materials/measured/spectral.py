@@ -32,13 +32,10 @@ def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
 
 
 def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Linear RGB (N, 3) of spectra (N, K), and notes; NaN stays NaN, a negative spectrum becomes -1."""
+    """Linear RGB (N, 3) of spectra (N, K), and notes; NaN where not usable; readings below zero stay below."""
     rgb = np.full((len(spectra), 3), np.nan)
     rgb[usable] = spectra[usable] @ rgb_of_spectra(wavelengths_nm).T
-    outside = int((rgb[usable] < 0).any(axis=1).sum())
-    rgb[usable] = np.maximum(rgb[usable], 0)
-    with np.errstate(invalid="ignore"):
-        rgb[(spectra < 0).any(axis=1)] = -1
+    rgb, outside = _within_gamut(rgb, spectra)
     notes: tuple[str, ...] = ("spectra became linear RGB under D65",)
     if outside:
         notes += (f"{outside} spectra are more saturated than Rec.709; the negative channel became 0",)
@@ -47,11 +44,18 @@ def rgb_of_measured(spectra: Floats, usable: Flags, wavelengths_nm: Floats) -> t
 
 def rgb_of_xyz(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Linear RGB (..., 3) of tristimulus values under D65, and notes; negative ones stay negative."""
-    rgb = xyz_to_rgb(values)
-    with np.errstate(invalid="ignore"):
-        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(values >= 0, axis=-1, keepdims=True)
-    rgb = np.where(outside, np.maximum(rgb, 0), rgb)
+    rgb, outside = _within_gamut(xyz_to_rgb(values), values)
     notes: tuple[str, ...] = ("tristimulus values became linear RGB under D65",)
-    if outside.any():
-        notes += (f"{int(outside.sum())} values are more saturated than Rec.709; the negative channel became 0",)
+    if outside:
+        notes += (f"{outside} values are more saturated than Rec.709; the negative channel became 0",)
     return rgb, notes
+
+
+def _within_gamut(rgb: Floats, source: Floats) -> tuple[Floats, int]:
+    """RGB (..., 3) without the negative channels of colours outside Rec.709, and how many there are.
+
+    The source (..., K) of such a colour, spectral or tristimulus values, is nowhere negative; otherwise it is noise.
+    """
+    with np.errstate(invalid="ignore"):
+        outside = np.any(rgb < 0, axis=-1, keepdims=True) & np.all(source >= 0, axis=-1, keepdims=True)
+    return np.where(outside, np.maximum(rgb, 0), rgb), int(outside.sum())

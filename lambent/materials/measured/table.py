@@ -13,6 +13,8 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.errors import UserError
 from lambent.materials.measured.protocol import LARGEST_F, MeasuredTable, TableInfo
 
+MARKS = (-1.0, -99.0, -999.0, -9999.0)  # exactly these; any other negative number is a reading below zero
+
 
 class ReflectionTable(MeasuredTable):
     """Base of three-channel tables of reflection alone; f is 0 where wi or wo is below the surface."""
@@ -68,13 +70,18 @@ def bracket(nodes: Floats, x: Floats) -> tuple[Indices, Indices, Floats]:
 def sensible(values: Floats) -> Flags:
     """(...) whether all channels of values (..., C) are finite and possible for a surface."""
     with np.errstate(invalid="ignore"):
-        return np.asarray((np.isfinite(values) & (values <= LARGEST_F)).all(axis=-1))
+        return np.asarray((np.isfinite(values) & (np.abs(values) <= LARGEST_F)).all(axis=-1))
 
 
 def usable_values(values: Floats) -> Flags:
-    """(...) whether all channels of values (..., C) are finite and not negative."""
+    """(...) whether all channels of values (..., C) are finite and one of them is not negative."""
     with np.errstate(invalid="ignore"):
-        return np.asarray((np.isfinite(values) & (values >= 0)).all(axis=-1))
+        return np.asarray(np.isfinite(values).all(axis=-1) & (values >= 0).any(axis=-1))
+
+
+def unmarked(values: Floats) -> Floats:
+    """`values` as in a text file, NaN where a number is one of those that by custom mean: not measured."""
+    return np.where(np.isin(values, MARKS), np.nan, values)
 
 
 def fill_holes(values: Floats, measured: Flags, periodic_axis: int | None = None) -> Floats:

@@ -121,12 +121,12 @@ class TreePart:
         return _on_sphere(np.stack([r, np.zeros(_RADII)], axis=-1))
 
     def _value(self, place: Floats) -> Floats:
-        """(N, C), negative where the luminance is."""
+        """(N, C), negative and grey where the luminance is."""
         y, *chroma = (tree.look_up(place)[0] for tree in self.trees)
         if not chroma:
             return y[:, None]
         rgb = within_rec709(rgb_of_xyz(xyz_of_yuv(y, *chroma)))
-        return np.asarray(np.where(y[:, None] < 0, -1.0, rgb))
+        return np.asarray(np.where(y[:, None] < 0, y[:, None], rgb))
 
     def _summed(self, fixed: tuple[int, ...], place: Floats) -> Floats:
         total = np.zeros((len(place), self.channels))

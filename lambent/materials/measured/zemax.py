@@ -26,6 +26,7 @@ from lambent.materials.measured.gonio_rows import spanned_symmetry
 from lambent.materials.measured.protocol import LARGEST_F
 from lambent.materials.measured.sheets import Sheet, specular_frame
 from lambent.materials.measured.spectral import rgb_of_xyz
+from lambent.materials.measured.table import unmarked
 from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
 NAME = "Zemax BSDF text"
@@ -164,7 +165,7 @@ def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Values with NaN where a channel is 0, which writers of the format use for directions that were not measured."""
     with np.errstate(invalid="ignore"):
         empty = np.any(values == 0, axis=-1, keepdims=True)
-        values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, values)
+        values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, unmarked(values))
     return values, ("a BSDF of exactly 0 counts as not measured",) if empty.any() else ()
 
 

@@ -91,7 +91,7 @@ def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:
     """
     if len(samples) <= count:
         return samples
-    p = samples.p.mean(axis=1)
+    p = np.maximum(samples.p.mean(axis=1), 0)
     shares = [samples.weight, samples.weight * np.cbrt(p), samples.weight * p]
     density = np.mean([share / max(float(share.sum()), 1e-300) for share in shares], axis=0)
     cumulated = np.cumsum(density)

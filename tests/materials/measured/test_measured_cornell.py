@@ -82,8 +82,10 @@ def test_bad_samples_are_counted(tmp_path: Path) -> None:
     rows[3, 5], rows[4, 6], rows[5, 6] = np.nan, -0.1, -0.2
     path = tmp_path / "a"
     path.write_text(cornell_text(rows, np.linspace(400, 700, 5)))
-    left_out = load(path).samples().left_out
-    assert (left_out.not_finite, left_out.negative) == (1, 2)
+    samples = load(path).samples()
+    assert (len(samples), samples.left_out.shadowed) == (len(rows) - 1, 1)
+    assert (samples.f[[3, 4], 1] < 0.1).all()  # their green reading is below zero
+    np.testing.assert_allclose(np.delete(samples.f, [3, 4], axis=0), 0.2, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -204,14 +204,14 @@ def test_a_file_of_light_from_behind_is_turned_over_for_a_fit(tmp_path: Path) ->
     assert any("turned over" in note for note in table.info.notes)
 
 
-def test_negative_values_count_as_zero_and_are_no_tuples(tmp_path: Path) -> None:
+def test_negative_values_are_tuples_and_looked_up_as_zero(tmp_path: Path) -> None:
     values = np.full((145, 145), 0.2)
     values[3, 4] = values[5, 6] = -0.1
     path = tmp_path / "n.xml"
     path.write_text(lbnl_xml("Columns", [("Visible", "Reflection Back", words(values))]))
     table = read(path)
-    assert table.samples().left_out.negative == 2 * 9  # each pair gives nine tuples
-    assert any("2 negative" in note for note in table.info.notes)
+    assert table.samples().below_zero == 2 * 9  # each pair gives nine tuples
+    assert any("2 values are negative" in note for note in table.info.notes)
     back = np.array((-1, -1, 1))
     assert table.eval(KLEMS_FULL.centres[4] * back, KLEMS_FULL.centres[3]) == 0
 

@@ -1,0 +1,62 @@
+"""Readings below zero are counted by every command that uses a table's tuples, and each says what it does with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.cli.check import describe
+from lambent.materials import check, check_table
+from lambent.materials.measured import load
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.half_vector_grid import GridShape
+from lambent.materials.measured.synthetic import synthesise
+from tests.materials.fitting.known_answers import FEW, PAINT
+from tests.materials.measured.measured_files import rgl_fields, tensor_bytes
+
+
+@pytest.fixture
+def spoilt(tmp_path: Path) -> Path:
+    """An RGL file with blue below zero over half of each incident direction."""
+    fields = rgl_fields(np.zeros(1))
+    fields["rgb"][:, :, 2, ::2] = -0.005
+    (tmp_path / "spoilt.bsdf").write_bytes(tensor_bytes(fields))
+    return tmp_path / "spoilt.bsdf"
+
+
+def test_inspect_and_fit_count_alike(lambent, spoilt):
+    samples = load(spoilt).samples()
+    words = f"{samples.below_zero} of {len(samples)} tuples"
+    assert samples.below_zero > 0.3 * len(samples)
+    inspected = lambent("inspect", spoilt)
+    assert words in inspected.out and "below zero: blue in" in inspected.out and "a fit keeps them" in inspected.out
+    fitted = lambent("fit", spoilt)
+    assert (
+        words in fitted.err and "they are kept, and the cuberoot metric takes a reading below zero as 0" in fitted.err
+    )
+
+
+def test_check_finds_them_and_no_fault_in_them(spoilt, monkeypatch):
+    monkeypatch.setattr(check, "SAMPLER_THETA_DEG", (45.0,))
+    monkeypatch.setattr(check_table, "INTEGRAL_THETA_DEG", (40.0,))
+    samples = load(spoilt).samples()
+    report = check_table.check_table(load(spoilt), shape=GridShape(24, 1, 64, 32))
+    facts = report.to_json()
+    words = f"{samples.below_zero} of {len(samples)} tuples"
+    assert facts["tuples"]["below_zero"] == samples.below_zero and words in facts["negative_readings"]
+    assert not any("zero" in text for text in (*report.warnings, *report.failures))
+    (line,) = (line for line in describe(report).splitlines() if words in line)
+    assert line.startswith("readings below zero") and line.endswith("they are drawn as 0")
+
+
+def test_convert_says_whether_they_are_kept(lambent, spoilt, tmp_path):
+    (lost,) = (line for line in lambent("convert", spoilt, tmp_path / "a.txt", "--json").json["lost"] if "zero" in line)
+    assert lost.startswith("readings below zero became 0: ") and "blue in" in lost
+    assert load(tmp_path / "a.txt").samples().below_zero == 0
+    noisy = tmp_path / "noisy.txt"
+    write_gonio(noisy, synthesise(PAINT, replace(FEW, floor=0.1)))
+    assert lambent("convert", noisy, tmp_path / "b.txt", "--json").json["lost"] == []
+    assert load(tmp_path / "b.txt").samples().below_zero == load(noisy).samples().below_zero > 0

@@ -1,0 +1,149 @@
+"""Readings below zero are noise about zero and stay tuples; marks of what was not measured are no readings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.directions import direction
+from lambent.core.errors import UserError
+from lambent.materials.measured import load
+from lambent.materials.measured.inspection import inspect_table
+from lambent.materials.measured.lbnl_xml import read as read_xml
+from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect, negative_readings
+from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
+from lambent.materials.measured.table import MARKS
+from tests.materials.measured.lbnl_files import lbnl_xml, words
+from tests.materials.measured.measured_files import cornell_rows, cornell_text, fred_text, merl_bytes, zemax_text
+
+COUNT = 12
+GREY, RGB = (TableInfo("a", "test", True, False, channels, "f") for channels in (1, 3))
+
+
+def collected(f: np.ndarray, theta_o: np.ndarray | float = 0.5) -> MeasuredSamples:
+    wi, wo = direction(np.full(len(f), 0.3), 0.0), direction(np.broadcast_to(theta_o, len(f)), 1.0)
+    return collect(wi, wo, f, np.ones(len(f)), GREY if f.shape[1] == 1 else RGB, np.zeros(len(f), bool))
+
+
+def test_a_negative_channel_does_not_cost_the_tuple() -> None:
+    f = np.full((COUNT, 3), (0.3, 0.2, -0.005))
+    f[:4, 2] = 0.01
+    samples = collected(f)
+    np.testing.assert_array_equal(samples.f, f)
+    assert samples.left_out.total == 0 and samples.counts["used"] == COUNT and samples.counts["below_zero"] == 8
+    assert negative_readings(samples) == "8 of 12 tuples (67 %) are below zero: blue in 8, down to -0.005 /sr"
+    assert negative_readings(collected(np.abs(f))) == ""
+
+
+def test_noise_keeps_its_mean() -> None:
+    noise = np.random.default_rng(0).normal(0, 0.01, (4000, 1))
+    noise[0] = 0.2
+    assert abs(collected(noise).f[1:].mean()) < 5e-4  # clamped at 0 it would be .004
+
+
+@pytest.mark.parametrize("mark", [-0.5, -50.0, -32768.0, -1e30])
+def test_what_no_noise_reaches_is_no_reading(mark: float) -> None:
+    """Other programs' marks: further below zero than the brightest tuple is above."""
+    f = np.full((COUNT, 3), 0.3)
+    f[3, 1] = mark
+    samples = collected(f)
+    assert len(samples) == COUNT - 1 and samples.left_out.not_finite == 1 and samples.below_zero == 0
+
+
+def test_noise_near_the_horizon_is_noise() -> None:
+    """There f = p / cos theta_o is large on either side of zero."""
+    theta_o = np.radians(np.linspace(0, 83, COUNT))
+    f = np.where(np.arange(COUNT)[:, None] % 2, -0.01, 0.05) / np.cos(theta_o)[:, None]
+    assert collected(f, theta_o).below_zero == COUNT // 2
+
+
+def test_nothing_above_zero_is_nothing_measured() -> None:
+    with pytest.raises(UserError, match="holds no measured value"):
+        collected(np.full((COUNT, 1), -0.1))
+
+
+@pytest.mark.parametrize("names", ["theta_i phi_i theta_o phi_o f", "theta_in phi_in theta_out phi_out brdf_cos"])
+def test_marks_in_columns(tmp_path: Path, names: str) -> None:
+    """Exactly -1, -99, -999 and -9999; numbers beside them are readings, and -.5 of a table up to 1.2 is one too."""
+    values = [*MARKS, -0.01, -0.5, 0.2, 0.3, 1.2, 0.4, 0.5, 0.6]
+    rows = [f"10 0 {t} {p}" for t in (20, 40, 60) for p in (0, 90, 180, 270)]
+    path = tmp_path / "a"
+    path.write_text("\n".join([names, *(f"{row} {value}" for row, value in zip(rows, values, strict=True))]) + "\n")
+    samples = load(path).samples()
+    assert samples.left_out.shadowed == len(MARKS) and samples.left_out.total == len(MARKS)
+    assert samples.below_zero == 2 and len(samples) == len(values) - len(MARKS)
+
+
+def test_marks_in_other_texts(tmp_path: Path) -> None:
+    rows = cornell_rows()
+    rows[2, 4:], rows[3, 6] = -1, -99
+    path = tmp_path / "a"
+    path.write_text(cornell_text(rows, np.linspace(400, 700, 5)))
+    assert load(path).samples().left_out.shadowed == 2
+    blocks = {(30.0, 0.0): (np.array([(t, p) for t in (10, 20, 40) for p in (0, 120, 240)], float), np.full(9, 0.2))}
+    blocks[30.0, 0.0][1][4] = -999
+    path.write_text(fred_text(blocks))
+    assert load(path).samples().left_out.shadowed == 1
+    path.write_text(
+        zemax_text(lambda wi, wo: 0.2 + 0 * wo[..., 2:], "PlaneSymmetrical").replace("2.000000e-01", "-1", 1)
+    )
+    fewer = load(path).samples()
+    path.write_text(zemax_text(lambda wi, wo: 0.2 + 0 * wo[..., 2:], "PlaneSymmetrical"))
+    assert len(load(path).samples()) == len(fewer) + 1 and fewer.below_zero == 0
+
+
+def test_negative_merl_values_are_marks(tmp_path: Path) -> None:
+    f = np.full((6, 6, 12, 3), 0.2)
+    f[1, 1, :3, 2] = -0.001
+    path = tmp_path / "a"
+    path.write_bytes(merl_bytes(f))
+    samples = load(path).samples()
+    assert samples.left_out.shadowed == 3 and samples.below_zero == 0
+
+
+def test_colours_of_noise_keep_their_sign() -> None:
+    """A spectrum or XYZ with a reading below zero is noise; one without is a colour outside Rec.709."""
+    nm = np.array([450.0, 550.0, 650.0])
+    spectra = np.array([[-0.01, 0.2, 0.3], [0.0, 0.0, 0.3], [-0.02, -0.02, -0.02]])
+    rgb, notes = rgb_of_measured(spectra, np.ones(3, bool), nm)
+    assert rgb[0, 2] < 0 < rgb[0, 0] and rgb[1].min() == 0 and "1 spectra" in notes[-1]
+    np.testing.assert_allclose(rgb[2], -0.02, rtol=1e-9)
+    xyz, notes = rgb_of_xyz(np.array([[0.2, 0.2, -0.01], [0.3, 0.01, 0.01]]))
+    assert xyz[0].min() < 0 and xyz[1].min() == 0 and "1 values" in notes[-1]
+
+
+def test_colour_of_a_matrix_with_one_negative_reading(tmp_path: Path) -> None:
+    """X, Y and Z of a patch: Z alone is below zero, and the light of the others stays."""
+    y, z = np.full((145, 145), 0.2), np.full((145, 145), 0.2)
+    z[0, 0] = -0.001
+    path = tmp_path / "a"
+    path.write_text(
+        lbnl_xml("Columns", [(band, "Reflection Back", words(values)) for band, values in
+                             (("Visible", y), ("CIE-X", y), ("CIE-Z", z))])
+    )  # fmt: skip
+    table, up = read_xml(path), direction(0.01, 0.0)
+    f = table.eval(up, up)
+    assert f[2] == 0 and f[0] > 0.15 and f[1] > 0.15
+    assert table.samples().below_zero == 9
+
+
+def test_inspect_tells_what_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text(zemax_text(lambda wi, wo: 0.1 * wo[..., 2:] - 0.03, "PlaneSymmetrical"))
+    report = inspect_table(load(path))
+    count = report["tuples"]["below_zero"]
+    assert 0 < count < report["tuples"]["used"]
+    assert report["faults"]["negative_percent"] == pytest.approx(100 * count / report["tuples"]["used"])
+    (line,) = (line for line in report["findings"] if "below zero" in line)
+    assert line.startswith(f"{count} of ") and "a fit keeps them" in line and "left out" not in line
+
+
+def test_what_is_drawn_is_nowhere_negative(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text(zemax_text(lambda wi, wo: 0.1 * wo[..., 2:] - 0.03, "PlaneSymmetrical"))
+    rng = np.random.default_rng(0)
+    wi, wo = (direction(np.arccos(rng.random(500)), 2 * np.pi * rng.random(500)) for _ in range(2))
+    f = load(path).eval(wi, wo)
+    assert (f >= 0).all() and f.max() > 0.05
