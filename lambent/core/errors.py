@@ -11,6 +11,8 @@ from typing import Any
 class UserError(Exception):
     """Input that cannot be used, said in one line: file, field, found, expected, hint.
 
+    Long values that were found are cut; what is expected and the hint, which are the program's own words, never are.
+
     Parameters
     ----------
     message : str
@@ -39,7 +41,7 @@ class UserError(Exception):
         if got is not None:
             parts.append(f"; found {_short(got)}")
         if expected is not None:
-            parts.append(f"; expected {_short(expected)}")
+            parts.append(f"; expected {expected}")
         if hint is not None:
             parts.append(f"; {hint}")
         super().__init__("".join(parts).replace("\n", " "))

@@ -58,7 +58,7 @@ def _tensors(scatterer: Scatterer, progress: Progress) -> Tensors:
     values = np.moveaxis(values.reshape(*incident, n, n, 3), -1, 2)
     description = f"{scatterer.name}: resampled by Lambent; rgb is f cos theta_o"
     return {
-        "description": np.frombuffer(description.encode("utf-8"), dtype=np.uint8),
+        "description": np.frombuffer(description.encode("utf-8", "backslashreplace"), dtype=np.uint8),
         "phi_i": phi_i.astype(np.float32),
         "theta_i": theta_i.astype(np.float32),
         "ndf": np.ones((2, 2), np.float32),

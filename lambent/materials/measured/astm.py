@@ -58,7 +58,8 @@ def read(path: Path) -> MeasuredTable:
     rows = rows_of(text[found.end() :], len(names), path)
     stated = keys.get("NUM_POINTS")
     if stated is not None and stated.split()[0] != str(len(rows)):
-        raise UserError("number of tuples does not fit", file=path, field="NUM_POINTS", got=len(rows), expected=stated)
+        expected = f"{len(rows)}, the number of rows"
+        raise UserError("number of tuples does not fit", file=path, field="NUM_POINTS", got=stated, expected=expected)
     theta = rows[:, [layout.angles["theta_i"], layout.angles["theta_o"]]]
     finite = np.abs(theta[np.isfinite(theta)])
     radians = layout.radians or (len(finite) > 0 and float(finite.max()) <= np.pi / 2 + 1e-3)

@@ -191,7 +191,15 @@ def rows_of(body: bytes, columns: int, path: Path) -> Floats:
 
 
 def assemble(
-    rows: Floats, layout: Layout, phi_i_deg: float, path: Path, reader: str, name: str, notes: tuple[str, ...]
+    rows: Floats,
+    layout: Layout,
+    phi_i_deg: float,
+    path: Path,
+    reader: str,
+    name: str,
+    notes: tuple[str, ...],
+    *,
+    gridded: bool = True,
 ) -> MeasuredTable:
     """A gonio table if the incident directions form a grid, else a scattered one.
 
@@ -200,6 +208,8 @@ def assemble(
     phi_i_deg : float
         Used where no column holds phi_i. A theta_o without a phi_o is in the plane of incidence, positive ahead of the
         normal, in the mirror direction.
+    gridded : bool
+        False for rows whose format has no columns for the light, so that a grid of them is chance.
     """
     angles = _degrees(rows, layout, phi_i_deg)
     check_angles(angles, path)
@@ -209,7 +219,8 @@ def assemble(
     if "phi_i" not in layout.angles:
         notes += (f"phi_i not stated, taken as {phi_i_deg:g}",)
     incident = np.unique(np.round(angles[:, :2], 5), axis=0)
-    if len(incident) * _SCATTERED > len(rows) and not (angles[:, 2] > 90).any():
+    few = len(incident) * _SCATTERED > len(rows)
+    if (few or not gridded) and not (angles[:, 2] > 90).any():
         notes += ("incident directions form no grid: the material is taken as isotropic",)
         wi, wo = (direction(*np.radians(angles[:, k : k + 2].T)) for k in (0, 2))
         if f.shape[1] == 1:

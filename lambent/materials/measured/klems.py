@@ -17,9 +17,13 @@ from functools import cached_property
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
-from lambent.core.directions import HALF_TURN, angles, direction
+from lambent.core.directions import HALF_TURN, direction
+from lambent.materials.lobes import NUMPY
+from lambent.materials.measured.half_vector_grid import turns
 
 OUTSIDE = -1
+BEYOND = 4.0  # as sin^2(theta): above that of any direction
+WHOLE_DEG = 90 - 1e-3  # a basis up to here reaches the horizon
 _TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0)
 _EXACT = 1e-9
 _THIRDS = 3  # pieces of a patch, in theta and in phi, that give a tuple each
@@ -65,14 +69,25 @@ class AngleBasis:
         """(R + 1,) cos^2 of the rings' bounds."""
         return np.asarray(np.cos(np.radians(self.edges_deg)) ** 2)
 
+    @cached_property
+    def upper_sin2(self) -> Floats:
+        """(R,) sin^2 of the rings' upper bounds, rounded to float32; BEYOND at the horizon.
+
+        A direction belongs to the first ring whose bound is above the sum of its squares of x and y. All look-ups, on
+        tables and in sheets, decide by these very numbers: a direction on a border is in the same patch everywhere.
+        """
+        upper = np.array(self.edges_deg[1:])
+        sin2 = np.where(upper < WHOLE_DEG, np.sin(np.radians(upper)) ** 2, BEYOND)
+        return np.asarray(sin2.astype(np.float32).astype(float))
+
     def index(self, w: Floats) -> Indices:
         """(N,) patch of unit directions (N, 3) of the upper hemisphere; OUTSIDE beyond the last ring."""
-        theta, phi = angles(w)
-        ring = np.searchsorted(np.array(self.edges_deg), np.degrees(theta), side="right") - 1
+        x, y = w[..., 0], w[..., 1]
+        ring = np.searchsorted(self.upper_sin2, x * x + y * y, side="right")
         inside = ring < len(self.n_phis)
         ring = np.where(inside, ring, 0)
         n = np.array(self.n_phis)[ring]
-        place = np.floor(phi / (2 * np.pi) * n + 0.5).astype(np.int64) % n
+        place = np.floor(turns(y, x, NUMPY) * n + 0.5).astype(np.int64) % n
         return np.where(inside, self.starts[ring] + place, OUTSIDE)
 
     @cached_property

@@ -104,7 +104,7 @@ def parse(content: bytes, path: Path) -> Document:
     except expat.ExpatError as error:
         raise UserError(f"not well-formed XML ({error})", file=path) from error
     except (LookupError, ValueError) as error:  # an encoding unknown to Python, or of several bytes
-        raise UserError(f"encoding cannot be read ({error})", file=path, expected="XML in UTF-8") from error
+        raise UserError("encoding cannot be read", file=path, got=error, expected="XML in UTF-8") from error
     return _document(tree.close(), path)
 
 

@@ -25,15 +25,13 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid, chosen_side, first_above, turns
 from lambent.materials.measured.half_vector_resampling import grid_of
-from lambent.materials.measured.klems import AngleBasis, PatchMatrix
+from lambent.materials.measured.klems import BEYOND, WHOLE_DEG, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_parts import Side, Way
 from lambent.materials.measured.lbnl_xml import LbnlTable, Use
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
-_BEYOND = 4.0  # as sin^2(theta): above that of any direction
-_WHOLE_DEG = 90 - 1e-3  # a basis up to here reaches the horizon
 _BOUNDS = 6
 _SLIVER = 1e-5  # rad; float32 bounds of phi are no better
 _BELOW_ONE = 1 - 2.0**-24
@@ -261,10 +259,10 @@ def _arrays(
     peak = np.zeros(patches)
     peak[: viewer.count] = (mean * highest_cos).max(axis=-1)
     found = {"values": values, "cdf": cdf, "density": density, "albedo": total, "peak": peak}
-    edges, counts, starts = np.full((2, rings), _BEYOND), np.zeros((2, rings)), np.zeros((2, rings))
+    edges, counts, starts = np.full((2, rings), BEYOND), np.zeros((2, rings)), np.zeros((2, rings))
     for role, basis in enumerate((viewer, light)):
-        n, upper = len(basis.n_phis), np.array(basis.edges_deg[1:])
-        edges[role, :n] = np.where(upper < _WHOLE_DEG, np.sin(np.radians(upper)) ** 2, _BEYOND)
+        n = len(basis.n_phis)
+        edges[role, :n] = basis.upper_sin2
         counts[role, :n], starts[role, :n] = basis.n_phis, basis.starts
     found |= {"edges": edges, "counts": counts, "starts": starts, "signs": np.array([viewer_sign, light_sign])}
     return found | {"bounds": _bounds(light, light_sign, patches)}
@@ -274,8 +272,8 @@ def _bounds(basis: AngleBasis, sign: float, patches: int) -> Floats:
     """(patches, 6) as `PatchSheet.bounds`."""
     n, ring, place = np.array(basis.n_phis), basis.rings, basis.places
     edges_deg = np.array(basis.edges_deg)
-    cos2 = np.where(edges_deg < _WHOLE_DEG, np.cos(np.radians(edges_deg)) ** 2, 0.0)
-    sin2 = np.where(edges_deg < _WHOLE_DEG, np.sin(np.radians(edges_deg)) ** 2, 1.0)
+    cos2 = np.where(edges_deg < WHOLE_DEG, np.cos(np.radians(edges_deg)) ** 2, 0.0)
+    sin2 = np.where(edges_deg < WHOLE_DEG, np.sin(np.radians(edges_deg)) ** 2, 1.0)
     phi0 = 2 * np.pi * (place - 0.5) / n[ring] + (np.pi if sign < 0 else 0.0)
     found = np.zeros((patches, _BOUNDS))
     columns = sin2[ring], sin2[ring + 1], cos2[ring], cos2[ring + 1], phi0, 2 * np.pi / n[ring]

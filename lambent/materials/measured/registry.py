@@ -17,6 +17,7 @@ from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.text_numbers import UTF16, is_utf16
+from lambent.materials.measured.unread import kind_of
 
 HEAD_BYTES = 1 << 16
 UNREADABLE = "cannot be read as"
@@ -60,6 +61,8 @@ def load(path: Path | str) -> MeasuredTable:
             return reader.read(path)
     if head.startswith(UTF16):
         raise is_utf16(path)
+    if (kind := kind_of(head)) is not None:
+        raise UserError(f"is {kind[0]}, which is not read", file=path, hint=kind[1])
     known = ", ".join(reader.NAME for reader in readers())
     raise UserError("not a measured material of a known format", file=path, expected=f"one of: {known}")
 

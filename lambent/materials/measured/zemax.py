@@ -18,14 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.arrays import Flags, Floats
+from lambent.core.arrays import Floats
 from lambent.core.directions import direction
 from lambent.core.errors import UserError, did_you_mean
-from lambent.materials.measured.gonio import GonioTable, Sheets
-from lambent.materials.measured.gonio_rows import spanned_symmetry
+from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import LARGEST_F
-from lambent.materials.measured.sheets import Sheet, specular_frame
 from lambent.materials.measured.spectral import rgb_of_xyz
+from lambent.materials.measured.specular_grids import SpecularGrid, specular_table
 from lambent.materials.measured.table import unmarked
 from lambent.materials.measured.text_numbers import begins_with, numbers, read_text, shown, without_comments
 
@@ -128,37 +127,10 @@ def _table(values: Floats, tis: Floats, lists: dict[str, Floats], words: dict[st
     if values.shape[-1] == 3:
         values, said = rgb_of_xyz(values)
         notes += said
-    azimuth = lists["ScatterAzimuth"]
-    images = None
-    if words["Symmetry"] == "PlaneSymmetrical":
-        azimuth, values, images = _mirrored(azimuth, values)
-    elif azimuth[-1] - azimuth[0] >= 360:
-        azimuth, values = azimuth[:-1], values[:, :, :-1]
-    phi_i, order = np.unique(lists["SampleRotation"] % 360, return_index=True)
-    symmetry = spanned_symmetry(phi_i)
-    if len(phi_i) > 1:
-        notes += (f"sample rotation is taken as phi_i, and the symmetry as {symmetry} from its range",)
-    else:
-        phi_i = np.zeros(1)
-    theta_i, radial = lists["AngleOfIncidence"], lists["ScatterRadial"]
-
-    def sheet(i: int, k: int, theta: float, phi: float) -> Sheet:
-        made = Sheet(radial, azimuth, values[k, i].swapaxes(0, 1), specular_frame(theta, phi), images)
-        if not np.isfinite(made.values).all(axis=1).any():
-            field = f"angle of incidence {theta:g}, rotation {phi:g}"
-            raise UserError("no value was measured for an incident direction", file=path, field=field)
-        return made
-
-    rotations = list(zip(order, phi_i, strict=True))
-    sheets = tuple(tuple(sheet(i, k, theta, phi) for k, phi in rotations) for i, theta in enumerate(theta_i))
-    nodes = np.concatenate([sheet.directions[sheet.measured] for row in sheets for sheet in row])
-    if below := int((nodes[:, 2] <= 0).sum()):
-        notes += (f"{below} of {len(nodes)} directions are below the horizon and left out",)
-    far = words["ScatterType"] == "BTDF"
-    sides: tuple[Sheets, Sheets] = ((), sheets) if far else (sheets, ())
-    file = Path(path)
-    table = GonioTable(file.stem, theta_i, phi_i, *sides, symmetry=symmetry, file=file.name, notes=notes, format=NAME)
-    return _with_tis(table, tis[order[0]])
+    grid = SpecularGrid(*(lists[name] for name in LISTS))
+    plane, far = words["Symmetry"] == "PlaneSymmetrical", words["ScatterType"] == "BTDF"
+    table = specular_table(grid, values, path, NAME, far=far, mirrored=plane, notes=notes)
+    return _with_tis(table, tis[np.argmin(grid.rotation % 360)])
 
 
 def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
@@ -167,15 +139,6 @@ def _measured(values: Floats) -> tuple[Floats, tuple[str, ...]]:
         empty = np.any(values == 0, axis=-1, keepdims=True)
         values = np.where(empty | (np.abs(values) > LARGEST_F), np.nan, unmarked(values))
     return values, ("a BSDF of exactly 0 counts as not measured",) if empty.any() else ()
-
-
-def _mirrored(azimuth: Floats, values: Floats) -> tuple[Floats, Floats, Flags]:
-    """Azimuths and values of the whole turn, mirrored from a to -a, and flags (radials, azimuths) of the images."""
-    half = azimuth <= 180
-    inner = (azimuth > 0) & (azimuth < 180)
-    whole = np.concatenate([azimuth[half], 360 - azimuth[inner][::-1]])
-    images = np.broadcast_to(whole > 180, (values.shape[3], len(whole)))
-    return whole, np.concatenate([values[:, :, half], values[:, :, inner][:, :, ::-1]], axis=2), images
 
 
 def _with_tis(table: GonioTable, tis: Floats) -> GonioTable:

@@ -2,8 +2,8 @@
 
     python -m tests.materials.measured.measured_fuzz --seconds 600 --reader "Zemax" --seed 7
 
-A file is a table that can be used, or a `UserError` of one line, within 2 s and 10 times the file's size (and a few
-MB).
+A file is a table that can be used, or a `UserError` of one line, within 2 s and 10 times the file's size (and some
+32 MB).
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ from tests.materials.measured.measured_files import (
     tensor_bytes,
     zemax_text,
 )
+from tests.materials.measured.vendor_files import alta_text, beam, ddr, lighttools
 
 LONGEST_S = 2.0
-LARGEST, FLOOR_BYTES = 10, 8 << 20
+LARGEST, FLOOR_BYTES = 10, 32 << 20  # scattered tables weigh their tuples with many points
 WI, WO = direction(np.array([0.0, 0.6, 1.2]), 0.3), direction(np.array([0.3, 0.6, 1.4]), 3.4)
 Random = np.random.Generator
 ODD_WORDS = (
@@ -63,7 +64,26 @@ def seeds() -> dict[str, list[bytes]]:
     basis = angle_basis("mine", [(0, 30, 1), (30, 60, 4), (60, 90, 4)])
     matrix = [("Visible", d, words(random.random((9, 9)) * 0.3)) for d in ("Reflection Back", "Transmission Front")]
     tree = "{" + " ".join(random_tree(random, 3, 1) for _ in range(8)) + "}"
+    half = np.stack([np.radians(grid[:, 0]) / 2, np.radians(grid[:, 0]) / 2, np.radians(grid[:, 1])], axis=-1)
     return {
+        "ALTA text": [
+            alta_text("RUSIN_TH_TD_PD", half, np.full((len(half), 4), 0.2), "RGB_COLOR", vs="1").encode(),
+            alta_text("COS_TH_TD", np.cos(half[:, :2]), np.full(len(half), 0.2)).encode(),
+            alta_text("CARTESIAN", np.column_stack([wo, wi]), np.full(len(wi), 0.2)).encode(),
+        ],
+        "pab-opto text": [
+            "".join(beam(t, p, step=(20, 40)) for t in (0, 30) for p in (0, 60, 120)).encode(),
+            beam(150, 0, far=True, kind="BSDF", step=(20, 40)).encode(),
+        ],
+        "Integra DDR/DDT text": [
+            ddr(phi=(0, 90, 180), model="RGB", tint=(1.0, 0.5, 0.2)).encode(),
+            ddr(phi=(0, 90, 180, 270), kind="Intensity Relative", psi=(0, 90), sigmat=(0, 20, 40, 60)).encode(),
+            ddr(phi=(0, 180), model="spectral 3", tint=(1.0, 0.5, 0.2)).encode(),
+        ],
+        "LightTools BSDF text": [
+            lighttools(kinds=("BRDF", "BTDF")).encode(),
+            lighttools(channels=((0, "TrisX"), (0, "TrisY"), (0, "TrisZ")), xyz=True).encode(),
+        ],
         "MERL binary": [merl_bytes(np.full((6, 5, 4, 3), 0.25))],
         "RGL tensor file": [tensor_bytes(rgl_fields(p)) for p in (np.zeros(1), np.linspace(-np.pi, -np.pi / 2, 3))],
         "Cornell / pbrt-v2 text": [cornell_text(cornell_rows(count=20), np.linspace(400, 700, 5)).encode()],

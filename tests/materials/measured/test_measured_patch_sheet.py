@@ -73,6 +73,18 @@ def test_look_ups_agree_with_the_table(table, reverse):
     assert expected.any() and not (~np.isclose(got, expected, rtol=1e-6, atol=0)).any(axis=-1).sum() > 2
 
 
+@pytest.mark.parametrize("border_deg", KLEMS_FULL.edges_deg[1:-1])
+def test_a_direction_on_a_border_is_in_one_patch_everywhere(border_deg):
+    mirror = np.diag(1 / KLEMS_FULL.projected_sr)[..., None] * 0.4
+    table = LbnlTable("pane", {("reflection", 1): PatchMatrix(KLEMS_FULL, KLEMS_FULL, mirror)})
+    bsdf, u = TableBSDF(table), np.random.default_rng(0).random((16, 3))
+    for phi in np.radians(np.arange(0, 360, 2.5)):  # with borders between the patches of every ring
+        wo = np.broadcast_to(direction(np.radians(border_deg), phi), u.shape)
+        wi = bsdf.sample(wo, u)
+        np.testing.assert_allclose(bsdf.eval(wi, wo)[:, 0] * wi[:, 2] / bsdf.pdf(wi, wo), 0.4, rtol=1e-5)
+        assert (bsdf.eval(wo * (-1, -1, 1), wo) > 0).all()
+
+
 @pytest.mark.parametrize("reverse", [False, True])
 def test_every_sample_has_the_albedo_as_its_weight(table, reverse):
     """f cos / pdf is the same for every sample of a row: the table's exact sum over patches."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.progress import silent
+from lambent.materials.export.registry import writer_for
 from lambent.materials.measured import load, registry
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.registry import HEAD_BYTES, readers
@@ -46,6 +49,62 @@ def test_unknown_content(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     with pytest.raises(UserError, match="empty" if not content else "known format.*MERL"):
         load(path)
+
+
+def test_the_formats_are_listed_whole(tmp_path: Path) -> None:
+    path = tmp_path / "what.txt"
+    path.write_bytes(b"hello world\n")
+    with pytest.raises(UserError) as found:
+        load(path)
+    assert str(found.value).endswith(readers()[-1].NAME) and all(r.NAME in str(found.value) for r in readers())
+
+
+def test_hints_and_expected_values_are_never_cut() -> None:
+    long = "one of: " + ", ".join(f"format {k}" for k in range(100))
+    said = str(UserError("is unknown", got="x" * 5000, expected=long, hint=long))
+    assert said.count(long) == 2 and "x" * 200 not in said
+
+
+UNREAD = {
+    "ALTA binary.*data2data": b"#DIM 3 1\n#PARAM_IN RUSIN_TH_TD_PD\n#FORMAT binary\n#BEGIN_STREAM\n\0\1\2\3\xff\n",
+    "SPEOS.*export it as Zemax": b"OPTIS - brdf surface file v3.0\n0\nComment\n4\nabcd\n1 0\n",
+    "SPEOS": b"OPTIS - Anisotropic BSDF surface file v7.0\r\n0\r\n",
+    "SSDD.*DDR": b"VERSION 0.2\nSOFTWARE x\n\nDATA_TYPE brdf\nCOLOR_MODEL rgb\n",
+    "MDL measured": b"NVIDIA ARC MBSDF V1\n\0\0\0\1",
+    "VIAVI.*Zemax BSDF file.*name the columns": b"VIAVI Solutions\tEngineered Diffuser EDS-20\nAngle\tBTDF\n-30\t.1\n",
+    "RPC Photonics": b"# RPC Photonics, Inc. \xb0 measured\r\nPart: EDC-10-G\r\n",
+    "HDF5": b"\x89HDF\r\n\x1a\n\0\0",
+    "ZIP archive.*unpack": b"PK\x03\x04\x14\0\0\0",
+    "gzip archive.*unpack": b"\x1f\x8b\x08\0\0\0",
+}
+
+
+@pytest.mark.parametrize("said", UNREAD)
+def test_known_files_that_are_not_read_say_what_they_are(tmp_path: Path, said: str) -> None:
+    path = tmp_path / "vendor.dat"
+    path.write_bytes(UNREAD[said])
+    assert not registry.is_known(path)
+    with pytest.raises(UserError, match=f"is .*{said}"):
+        load(path)
+
+
+def test_a_vendor_s_name_in_a_comment_does_not_hide_the_format(tmp_path: Path) -> None:
+    path = tmp_path / "EDS-20.bsdf"
+    path.write_bytes(b"# VIAVI Engineered Diffuser EDS-20\n" + SOUND["Zemax BSDF text"][0])
+    assert load(path).info.format == "Zemax BSDF text"
+
+
+def test_the_page_has_a_row_for_every_reader() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "formats.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1].split() for line in page.split("\n") if line.startswith("| ")]
+    for reader in readers():
+        assert any(row and row[0] == reader.NAME.split()[0] for row in rows), reader.NAME
+
+
+@pytest.mark.parametrize("reader", seeds())
+def test_the_first_claim_is_the_format_s_own(reader: str) -> None:
+    for content in SOUND[reader]:
+        assert next(r.NAME for r in readers() if r.recognise(content[:HEAD_BYTES], len(content))) == reader
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
@@ -161,3 +220,16 @@ def test_numbers_that_no_reader_claims(tmp_path: Path, content: bytes) -> None:
     assert not registry.is_known(tmp_path / "a.txt")
     with pytest.raises(UserError, match="known format"):
         load(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize("kind", ["gonio_text", "rgl"])
+def test_names_that_utf_8_cannot_hold_are_written_as_escapes(tmp_path: Path, kind: str) -> None:
+    """A file system's name of any bytes reaches Python with lone surrogates in it."""
+    path = tmp_path / os.fsdecode(b"m\xe4\xdfig.bsdf")
+    try:
+        path.write_bytes(SOUND["Zemax BSDF text"][0])
+    except OSError:
+        pytest.skip("this file system takes UTF-8 names alone")
+    out = tmp_path / "out"
+    writer_for(out, kind).write(load(path), out, silent)
+    assert load(out).info.channels

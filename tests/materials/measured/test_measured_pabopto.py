@@ -1,0 +1,136 @@
+"""pab-opto text: Radiance's conventions of angles, cosine and sides; one file or several joined."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.directions import direction
+from lambent.core.errors import UserError
+from lambent.materials.measured import load
+from tests.materials.measured.vendor_files import beam, glossy
+
+
+def brushed(wi, wo):
+    """Not isotropic: darker where light and view lie along x."""
+    return 0.2 + 0.1 * wi[..., 1] ** 2 + 0.05 * wi[..., 0] * wo[..., 0]
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "f_Rvis.txt"
+    path.write_text(text)
+    return path
+
+
+def test_the_manual_page_s_example(tmp_path: Path) -> None:
+    """A DSF is f cos theta_o: 0.009744 at 84.968 degrees is .1111 1/sr."""
+    rows = "84.968 125.790 0.009744\n84.889 125.610 0.007737\n84.805 125.427 0.008569\n0 0 .3\n"
+    table = load(written(tmp_path, "#incident_angle 82.5 180\n#format: theta phi DSF\n" + rows))
+    assert table.info.format == "pab-opto text" and table.info.stored == "f_cos"
+    wi, wo = direction(np.radians(82.5), np.pi), direction(*np.radians([84.968, 125.79]))
+    assert float(table.eval(wi, wo)[0]) == pytest.approx(0.009744 / np.cos(np.radians(84.968)), rel=1e-3)
+    assert any("one incident direction" in note and "join" in note for note in table.info.notes)
+
+
+@pytest.mark.parametrize(("kind", "stored"), [("DSF", "f_cos"), ("BSDF", "f"), ("BRDF", "f")])
+def test_joined_files_make_one_table(tmp_path: Path, kind: str, stored: str) -> None:
+    path = written(tmp_path, "".join(beam(theta, 180, kind=kind) for theta in (60, 0, 30)))
+    table = load(path)
+    assert table.info.stored == stored and table.info.sizes["theta_i"] == 3 and table.info.isotropic
+    assert table.name == "felt 7"
+    for theta_i, theta_o, phi in ((30, 30, 180), (30, 60, 90), (60, 54, 180), (0, 12, 45)):
+        wi, wo = direction(np.radians(theta_i), 0.7), direction(np.radians(theta_o), 0.7 + np.radians(phi))
+        np.testing.assert_allclose(table.eval(wi, wo)[0], glossy(wi, wo), rtol=1e-4)
+
+
+def test_transmission_and_light_from_the_back(tmp_path: Path) -> None:
+    """theta over 90 is the back; a specimen whose back is lit is turned over, so that its near side reflects."""
+    both = "".join(beam(t, 180, far=far, head=f"# side {far}") for t in (0, 30) for far in (False, True))
+    back = "".join(beam(180 - t, 180, far=far) for t in (0, 30) for far in (False, True))
+    wi = direction(np.radians(30), 0.0)
+    for text in (both, back):
+        table = load(written(tmp_path, text))
+        assert table.info.transmits
+        for wo in (wi * (-1, 1, 1), -wi, direction(np.radians(132), 1.0)):
+            np.testing.assert_allclose(table.eval(wi, wo)[0], glossy(wi, wo), rtol=0.05)
+    assert any("turned over" in note for note in table.info.notes)
+
+
+def test_up_is_at_90_degrees(tmp_path: Path) -> None:
+    """The same specimen, measured with up at 0 (the default) and at 90, is the same table."""
+    tables = []
+    for up, head in ((0, ""), (90, "#upphi 90\n")):
+        turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]) if up == 0 else np.eye(3)
+
+        def f(wi, wo, turned=turned):
+            return brushed(wi @ turned.T, wo @ turned.T)
+
+        phis = (np.arange(0, 360, 30) + up) % 360
+        text = "".join(beam(40, phi, f, "BSDF", head=head) for phi in phis) + beam(0, 17, f, "BSDF", head=head)
+        tables.append(load(written(tmp_path, text)))
+    for wi, wo in ((direction(np.radians(40), a), direction(np.radians(36), b)) for a, b in ((0, 1), (np.pi / 2, 2.5))):
+        for table in tables:
+            assert table.symmetry == "none"
+            np.testing.assert_allclose(table.eval(wi, wo)[0], brushed(wi, wo), rtol=2e-3)
+
+
+def test_half_a_turn_is_mirrored_as_in_radiance(tmp_path: Path) -> None:
+    def lopsided(wi, wo):  # its own mirror image at x = 0, not turned by 180 degrees
+        return 0.2 + 0.1 * wi[..., 1] + 0.05 * wo[..., 1] * wi[..., 1] ** 2
+
+    # up at 90: the files' phi are the table's; incident directions from -90 to 90 degrees
+    text = "".join(beam(40, phi, lopsided, "BSDF", head="#upphi 90") for phi in (270, 315, 0, 45, 90))
+    table = load(written(tmp_path, text))
+    assert any("mirrored at phi = 270" in note for note in table.info.notes)
+    for phi_i in np.radians((45, 135, 180, 225, 315)):
+        wi, wo = direction(np.radians(40), phi_i), direction(*np.radians([36, 120]))
+        np.testing.assert_allclose(table.eval(wi, wo)[0], lopsided(wi, wo), rtol=1e-4)
+    quarter = "".join(beam(40, phi, brushed, "BSDF", head="#upphi 90") for phi in (0, 45, 90))
+    assert load(written(tmp_path, quarter)).symmetry == "quadrant"
+
+
+def test_xyz(tmp_path: Path) -> None:
+    white = " ".join(f"{0.3 * v:.6f}" for v in (0.95047, 1.0, 1.08883))
+    rows = "".join(f"{t} {p} {white}\n" for t in range(0, 90, 15) for p in range(0, 360, 30))
+    head = "#colorimetry: CIE-XYZ\n#format: theta phi BSDF\n#intheta 20\n#inphi 180\n"
+    table = load(written(tmp_path, head + rows))
+    np.testing.assert_allclose(table.eval(direction(np.radians(20), 0), direction(0.5, 2)), [0.3] * 3, rtol=2e-3)
+
+
+def test_what_the_next_file_looks_like(tmp_path: Path) -> None:
+    """CRLF, a mark of the byte order, Latin-1, tabs, comments among the rows, motors that stop a little off."""
+    text = beam(0, 180) + beam(30.002, 179.998) + beam(60, 180)
+    text = text.replace("#format: theta phi DSF", "#format: theta\tphi\tDSF").replace("felt", "Gläser")
+    lines = text.split("\n")
+    lines.insert(200, "# a pause of the lamp")
+    path = tmp_path / "a.dat"
+    path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join(lines).encode("latin-1"))
+    table = load(path)
+    assert table.info.sizes["theta_i"] == 3 and table.info.isotropic
+    wi, wo = direction(np.radians(30), 0), direction(np.radians(30), np.pi)
+    np.testing.assert_allclose(table.eval(wi, wo)[0], glossy(wi, wo), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("#incident_angle 30 0\n#format: theta phi intensity\n0 0 1\n", "format is unknown; found theta phi intensity"),
+        ("#intheta 30\n#format: theta phi DSF\n0 0 1\n", "inphi is not an angle; found nothing"),
+        ("#intheta inf\n#incident_angle 3 0\n#inphi 0\n#format: theta phi DSF\n0 0 1\n", "intheta is not an angle"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1 2\n", "rows do not fit"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n#colorimetry: CIE-XYZ\n0 0 1\n", "5 per row"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n#colorimetry: RGB\n0 0 1\n", "colorimetry is unknown"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n", "rows do not fit the header; found 0"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 0,5\n", "decimal commas"),
+        ("#incident_angle 90 0\n#format: theta phi DSF\n0 0 1\n", "outside its range"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1\n#incident_angle 150 0\n#format: theta phi DSF\n0 0 1\n",
+         "both sides"),
+        ("#incident_angle 30 0\n#format: theta phi DSF\n0 0 1\n#incident_angle 40 0\n#format: theta phi BSDF\n0 0 1\n",
+         "different formats"),
+    ],
+)  # fmt: skip
+def test_refusals(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        load(written(tmp_path, text))
