@@ -37,6 +37,7 @@ def command(
         if not cost.errors and is_known(output):
             cost = read_back(subject, output, cost.lost)
     facts = {"written": output, "format": writer.NAME, "lost": cost.lost, "errors": cost.errors, "share": cost.share}
+    facts |= {"light": cost.light, "verdict": cost.verdict.word, "reason": cost.verdict.reason}
     show(facts, describe(output, writer, cost), json)
 
 
@@ -82,9 +83,10 @@ def _check_kind(subject: Subject, writer: Writer, file: Path) -> None:
 
 
 def describe(output: Path, writer: Writer, cost: Cost) -> str:
-    """The file, its losses, and its errors, absolute and as shares of the subject's own size."""
+    """The file, its losses, its errors, absolute and as shares of the subject's own size, and the verdict."""
     losses = cost.lost or ("nothing but what the errors say",)
     lines = [f"{output}: {writer.NAME}", *(f"lost: {loss}" for loss in losses)]
     if cost.errors:
         lines += ["", metric_errors(cost.errors, cost.share)]
+    lines += ["", f"verdict: {cost.verdict}"]
     return "\n".join(lines)

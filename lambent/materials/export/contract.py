@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from lambent.core.progress import Progress
-from lambent.materials.document import Material
+from lambent.materials.document import Material, Side
+from lambent.materials.export.verdict import Verdict, verdict_of
 from lambent.materials.measured.protocol import MeasuredTable
 
 Subject = Material | MeasuredTable
@@ -37,11 +38,19 @@ class Cost:
         Metric name -> E between the subject and the written file, in the metric's unit.
     share : dict of float
         The errors as shares of the subject's own size under that metric (E against black).
+    light : dict of float
+        Side -> light that the written file scatters there over the subject's.
     """
 
     lost: tuple[str, ...] = ()
     errors: dict[str, float] = field(default_factory=dict)
     share: dict[str, float] = field(default_factory=dict)
+    light: dict[Side, float] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the file stands for the subject, in a word with its reason."""
+        return verdict_of(self.share, self.light)
 
 
 class Writer(Protocol):

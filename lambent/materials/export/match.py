@@ -98,12 +98,13 @@ def _differences(pairs: Pairs) -> Callable[[Floats], Floats]:
 
 def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
     """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's."""
-    light = [
+    light = light_ratios(pairs.samples, f_written)
+    mentioned = [
         f"the {'reflected' if side == 'reflection' else 'transmitted'} light is {ratio:.2f} times the material's"
-        for side, ratio in light_ratios(pairs.samples, f_written).items()
+        for side, ratio in light.items()
         if abs(ratio - 1) > ALBEDO_TOLERANCE
     ]
-    return Cost((*lost, *light), *errors_and_shares(pairs.samples, f_written))
+    return Cost((*lost, *mentioned), *errors_and_shares(pairs.samples, f_written), light)
 
 
 def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str]:

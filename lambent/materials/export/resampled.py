@@ -13,7 +13,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import CHECK_LOG2, is_isotropic, pairs_of
-from lambent.materials.fitting.metrics import errors_and_shares
+from lambent.materials.fitting.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.gonio import Symmetry, symmetry_of
 from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 from lambent.materials.measured.registry import load
@@ -55,11 +55,11 @@ def scatterer_of(subject: Subject) -> Scatterer:
     return Scatterer(Path(info.file).stem, subject.eval, symmetry_of(subject), info.transmits, info.channels)
 
 
-def tuples_of(subject: Subject) -> MeasuredSamples:
-    """The measured tuples of a table; for a material, pairs spread as in a measurement."""
+def tuples_of(subject: Subject, most: int = MOST_TUPLES) -> MeasuredSamples:
+    """At most so many of a table's measured tuples; for a material, pairs spread as in a measurement."""
     if isinstance(subject, Material):
         return pairs_of(subject, CHECK_LOG2, seed=1).samples
-    return subject.samples(MOST_TUPLES)
+    return subject.samples(most)
 
 
 def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
@@ -77,4 +77,4 @@ def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
     f = written.eval(samples.wi, samples.wo)
     if f.shape[1] != samples.f.shape[1]:
         f = f.mean(axis=1, keepdims=True) if samples.f.shape[1] == 1 else np.repeat(f, 3, axis=1)
-    return Cost(lost, *errors_and_shares(samples, f))
+    return Cost(lost, *errors_and_shares(samples, f), light_ratios(samples, f))

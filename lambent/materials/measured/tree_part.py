@@ -102,13 +102,13 @@ class TreePart:
         light = np.repeat(entering, [len(c.side) for c in cells], axis=0)
         middle = np.concatenate([c.middle for c in cells])
         area = np.concatenate([c.side for c in cells]) ** 2
-        leaving = _on_sphere(disk_of(middle))
+        leaving = on_sphere(disk_of(middle))
         place = np.column_stack([incident_coordinates(self.rank, light), middle])
         return light, leaving, self._value(place), np.pi * area / leaving[:, 2]
 
     def tuples_reversed(self) -> Tuples:
         """Tuples of reversed light on a regular grid; `entering` and `leaving` are its own headings."""
-        entering, out = self._even_incident(), _on_sphere(_square_grid(_REVERSED_GRID))
+        entering, out = self._even_incident(), on_sphere(_square_grid(_REVERSED_GRID))
         light, leaving = np.repeat(entering, len(out), axis=0), np.tile(out, (len(entering), 1))
         f = self.at(leaving * HALF_TURN, light * HALF_TURN)
         return light, leaving, f, np.pi / (_REVERSED_GRID**2 * leaving[:, 2])
@@ -116,9 +116,9 @@ class TreePart:
     def _even_incident(self) -> Floats:
         """(N, 3) even headings of incident light; at phi = 0 for rank 3, as in the tree."""
         if self.rank == 4:
-            return _on_sphere(_square_grid(_GRID))
+            return on_sphere(_square_grid(_GRID))
         r = 1 - (np.arange(_RADII) + 0.5) / _RADII
-        return _on_sphere(np.stack([r, np.zeros(_RADII)], axis=-1))
+        return on_sphere(np.stack([r, np.zeros(_RADII)], axis=-1))
 
     def _value(self, place: Floats) -> Floats:
         """(N, C), negative and grey where the luminance is."""
@@ -216,7 +216,7 @@ def _square_grid(n: int) -> Floats:
     return disk_of((grid_points(n, 2) + 0.5) / n)
 
 
-def _on_sphere(disk: Floats) -> Floats:
+def on_sphere(disk: Floats) -> Floats:
     """Unit directions (N, 3) above points (N, 2) of the disk."""
     z = np.sqrt(np.maximum(1 - np.sum(disk**2, axis=-1), 0))
     return np.concatenate([disk, z[:, None]], axis=-1)

@@ -10,8 +10,9 @@ import pytest
 
 from lambent.materials.document import Material
 from lambent.materials.export.materialx import TOOL, likeness, write
-from lambent.materials.export.pairs import Pairs, pairs_of
+from lambent.materials.export.pairs import CHECK_LOG2, Pairs, pairs_of
 from tests.materials.export.export_materials import BRUSHED, FOIL, GOLD, PAPER, PLASTIC
+from tests.materials.export.facets_by_hand import assert_costs
 
 
 def inputs_of(node: ET.Element) -> dict[str, np.ndarray]:
@@ -69,3 +70,15 @@ def test_roughness_is_the_slope_itself(tmp_path: Path) -> None:
     for name, material in {"gold": GOLD, "foil": FOIL}.items():
         (written,) = (inputs_of(node)["roughness"] for node in ET.parse(tmp_path / f"{name}.mtlx").getroot().iter(kind))
         np.testing.assert_allclose(written, (material.lobes[0].mx, material.lobes[0].my), rtol=0.15)
+
+
+@pytest.mark.parametrize("material", [PLASTIC, BRUSHED, GOLD, FOIL, PAPER], ids=lambda material: material.name)
+def test_the_file_costs_what_is_stated(tmp_path: Path, material: Material) -> None:
+    cost = write(material, tmp_path / "a.mtlx")
+    pairs = pairs_of(material, CHECK_LOG2, seed=1)
+    assert_costs(pairs.samples, written_f(tmp_path / "a.mtlx", pairs), cost.share)
+    for kind, mode in {"generalized_schlick_bsdf": "R", "dielectric_bsdf": "T"}.items():
+        for node in ET.parse(tmp_path / "a.mtlx").getroot().iter(kind):
+            (scatter,) = (one.get("value") for one in node if one.get("name") == "scatter_mode")
+            assert scatter == mode
+            assert mode == "T" or inputs_of(node)["exponent"] == 5  # Schlick's

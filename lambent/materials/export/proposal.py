@@ -1,0 +1,39 @@
+"""Where a subject's light is expected: a BSDF to draw directions from, and whether a table knows light from behind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.directions import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import BLACK, Lobe, Material
+from lambent.materials.export.contract import Subject
+
+_WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes of the proposal for a table
+_ASKED_DEG, _TURN_DEG = (1.0, 20.0, 45.0, 70.0), 45.0  # theta at which light from behind is looked for, steps of phi
+
+
+def proposal_of(subject: Subject) -> MaterialBSDF:
+    """A material itself; for a table, a material with lobes of every width a measured one can have."""
+    if isinstance(subject, Material):
+        return MaterialBSDF(subject)
+    white, part = (1.0, 1.0, 1.0), (1 / len(_WIDTHS),) * 3
+    lobes = [Lobe(distribution="ggx", mx=m, my=m, r0=white, k=part) for m in _WIDTHS]
+    if subject.info.transmits:
+        lobes += [lobe.model_copy(update={"side": "transmission", "r0": BLACK}) for lobe in lobes]
+    quarter = (0.25, 0.25, 0.25)
+    return MaterialBSDF(Material(kd=quarter, kt_d=quarter if subject.info.transmits else BLACK, lobes=tuple(lobes)))
+
+
+def knows_the_back(subject: Subject) -> bool:
+    """Whether light from -z is scattered: as the table states by `has_a_back`, or at any of many directions.
+
+    A material is the same from both sides.
+    """
+    if isinstance(subject, Material):
+        return True
+    stated: bool | None = getattr(subject, "has_a_back", None)
+    if stated is not None:
+        return stated
+    theta, phi = np.meshgrid(180 - np.array(_ASKED_DEG), np.arange(0, 360, _TURN_DEG))
+    return bool(subject.albedo(direction(np.radians(theta), np.radians(phi))).any())

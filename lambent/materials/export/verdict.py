@@ -1,0 +1,57 @@
+"""The verdict on an export in one word, by limits that stand here alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from lambent.materials.document import Side
+
+# E as a share of the subject's own size: (faithful up to, approximate up to). L1 is light in wrong directions; the
+# cube root is close to what is seen; Ngan's L2 sees peaks above all: beyond 1 they are worse than a black surface.
+LIMITS: dict[str, tuple[float, float]] = {
+    "l1": (0.1, 0.5),
+    "l2_ngan": (0.3, 1.0),
+    "cuberoot": (0.1, 0.35),
+    "log": (0.2, 0.75),
+}
+LIGHT_LIMITS = (0.05, 0.25)  # relative difference of the light to either side
+_LIGHT: dict[Side, str] = {"reflection": "reflected light", "transmission": "transmitted light"}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an export stands for its subject.
+
+    Attributes
+    ----------
+    word : str
+        faithful, approximate or unusable; "not compared" where there are no errors to judge by.
+    reason : str
+        The figures that decided it.
+    """
+
+    word: Literal["faithful", "approximate", "unusable", "not compared"]
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.word}: {self.reason}"
+
+
+def verdict_of(share: Mapping[str, float], light: Mapping[Side, float]) -> Verdict:
+    """The verdict by errors as shares of the subject's size, and by the light written over the subject's.
+
+    The worst figure decides; all figures beyond the same limit are named.
+    """
+    if not share:
+        return Verdict("not compared", "the file was not compared with its source")
+    measures = [(f"{name} {value:.0%}", value, *LIMITS[name]) for name, value in share.items()]
+    measures += [(f"{_LIGHT[side]} {ratio:.2f} times", abs(ratio - 1), *LIGHT_LIMITS) for side, ratio in light.items()]
+    unusable = [f"{text} (limit {limit:.0%})" for text, value, _, limit in measures if not value <= limit]
+    if unusable:
+        return Verdict("unusable", ", ".join(unusable))
+    approximate = [f"{text} (faithful to {limit:.0%})" for text, value, limit, _ in measures if value > limit]
+    if approximate:
+        return Verdict("approximate", ", ".join(approximate))
+    return Verdict("faithful", ", ".join(text for text, *_ in measures))
