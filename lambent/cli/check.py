@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Json, metric_errors, progress_bar, show, table, words
+from lambent.cli.console import Force, Json, metric_errors, progress_bar, show, table, words
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def command(
         bool, typer.Option("--normalise", help="Write a document's energy-safe version instead: alpha lowered, then k.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", help="With --normalise: document to write (.json).")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Check reciprocity, energy, and the sampler by chi-square and hemisphere integrals.
@@ -50,7 +51,7 @@ def command(
     from lambent.materials.models.model import Model
 
     if normalise or output is not None:
-        _normalise(subject, values or [], normalise, output, seed, json)
+        _normalise(subject, values or [], normalise, output, seed, force, json)
         return
     found = _subject(subject, values or [])
     with progress_bar() as progress:
@@ -64,9 +65,11 @@ def command(
         raise typer.Exit(1)
 
 
-def _normalise(subject: str, values: list[str], asked: bool, output: Path | None, seed: int, json: bool) -> None:
+def _normalise(
+    subject: str, values: list[str], asked: bool, output: Path | None, seed: int, force: bool, json: bool
+) -> None:
     """Write the energy-safe version of a material document, where it needs one."""
-    from lambent.core.images import check_writable
+    from lambent.core.outputs import check_output
     from lambent.materials.document import Material
     from lambent.materials.models.model import Model
     from lambent.materials.normalise import normalisation
@@ -74,7 +77,7 @@ def _normalise(subject: str, values: list[str], asked: bool, output: Path | None
     if not asked or output is None:
         lacking = "-o" if output is None else "--normalise"
         raise UserError("--normalise and -o go together", hint=f"{lacking} is missing: --normalise -o OUT.json")
-    check_writable(output, (".json",))
+    check_output(output, (".json",), force=force, inputs=[subject])
     found = _subject(subject, values)
     if isinstance(found, Model):
         raise UserError("only material documents can be normalised, not a model", got=subject)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Json, show, table
+from lambent.cli.console import Force, Json, show, table
 from lambent.core.errors import UserError
 
 
@@ -15,6 +15,7 @@ def command(
     reference: Annotated[Path, typer.Argument(help="Image taken as the truth: EXR, HDR, PNG or JPEG.")],
     test: Annotated[Path, typer.Argument(help="Image to judge, of the same size.")],
     output: Annotated[Path | None, typer.Option("-o", help="Write the FLIP difference as an image (.png).")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Compare two images: PSNR, RMSE in RGB and L*a*b*, FLIP with its worst 16x16 tile.
@@ -25,11 +26,12 @@ def command(
     Example: lambent compare reference.exr frame.exr -o difference.png
     """
     from lambent.core.colour import srgb_decode
-    from lambent.core.images import HDR_SUFFIXES, check_writable, read_image, write_image
+    from lambent.core.images import HDR_SUFFIXES, read_image, write_image
     from lambent.core.metrics import compare
+    from lambent.core.outputs import check_output
 
     if output is not None:
-        check_writable(output, (".png",))
+        check_output(output, (".png",), force=force, inputs=[reference, test])
     images = read_image(reference), read_image(test)
     if images[0].shape != images[1].shape:
         sizes = ["{1}x{0}".format(*image.shape) for image in images]

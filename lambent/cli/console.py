@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,21 +11,38 @@ from typing import Annotated, Any
 
 import typer
 
+import lambent
 from lambent.core.errors import UserError
-from lambent.core.plain import plain
+from lambent.core.plain import plain, printable
 from lambent.core.progress import Progress
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist, even the input.")]
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(lambent.__version__)
+        raise typer.Exit
+
+
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """The options of `lambent` itself."""
+
 
 def show(result: Mapping[str, Any], text: str, as_json: bool) -> None:
     """Print the result of a command: `text` for people, `result` for machines."""
-    typer.echo(json.dumps(plain(result), indent=1, allow_nan=False) if as_json else text)
+    typer.echo(json.dumps(plain(result), indent=1, allow_nan=False) if as_json else _lines(text))
 
 
 def table(lines: Iterable[Iterable[str]]) -> str:
     """Rows of words as aligned columns."""
-    rows = [tuple(line) for line in lines]
+    rows = [tuple(map(printable, line)) for line in lines]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
                      for row in rows)  # fmt: skip
@@ -51,7 +69,7 @@ def progress_bar() -> Iterator[Progress]:
     from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
     with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
         tasks: dict[str, Any] = {}
 
@@ -59,7 +77,7 @@ def progress_bar() -> Iterator[Progress]:
             if what not in tasks:
                 for other in tasks.values():
                     bars.update(other, visible=False)
-                tasks[what] = bars.add_task(what, total=total)
+                tasks[what] = bars.add_task(printable(what), total=total)
             bars.update(tasks[what], completed=done, total=total, visible=True)
 
         yield update
@@ -75,4 +93,21 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def say(text: str) -> None:
     """A line on stderr that is not part of the result."""
-    sys.stderr.write(text + "\n")
+    sys.stderr.write(_lines(text) + "\n")
+
+
+def log_to_stderr() -> None:
+    """Warnings of all rooms as lines on stderr."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(_LogLine("lambent: %(message)s"))
+    logging.basicConfig(handlers=[handler], level=logging.WARNING)
+
+
+class _LogLine(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return _lines(super().format(record))
+
+
+def _lines(text: str) -> str:
+    """Text of several lines, each `printable`: names in it are from files."""
+    return "\n".join(map(printable, text.split("\n")))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Json, metric_errors, progress_bar, show
+from lambent.cli.console import Force, Json, metric_errors, progress_bar, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -18,18 +18,20 @@ def command(
     file: Annotated[Path, typer.Argument(help="Measured table in any format, or material document (.json).")],
     output: Annotated[Path, typer.Argument(help="File to write; its ending says the format.")],
     as_: Annotated[str | None, typer.Option("--as", help="Format, where the ending does not say it.")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Write a measurement or material in another format, and say what was lost and how large the errors are.
 
     Example: lambent convert chrome.binary chrome.bsdf --as rgl
     """
+    from lambent.core.outputs import check_output
     from lambent.materials.export.registry import writer_for
     from lambent.materials.export.resampled import read_back
     from lambent.materials.measured.registry import is_known
 
     writer = writer_for(output, as_)
-    _check_places(file, output)
+    check_output(output, force=force, inputs=[file])
     subject = subject_of(file)
     _check_kind(subject, writer, file)
     with progress_bar() as progress:
@@ -61,16 +63,6 @@ def head_of(file: Path, size: int) -> bytes:
 def is_document(head: bytes) -> bool:
     """Whether a file that begins so is a material document, with a byte order mark or without."""
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
-
-
-def _check_places(file: Path, output: Path) -> None:
-    """`UserError` where the output is the input, or has no folder to be in."""
-    if output.is_dir():
-        raise UserError("is a folder", file=output)
-    if not output.parent.is_dir():
-        raise UserError("folder does not exist", file=output.parent)
-    if output.exists() and file.exists() and output.samefile(file):
-        raise UserError("output is the input", file=output, hint="write to another file")
 
 
 def _check_kind(subject: Subject, writer: Writer, file: Path) -> None:

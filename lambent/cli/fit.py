@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from lambent.cli.console import Json, progress_bar, say, show, table, words
+from lambent.cli.console import Force, Json, progress_bar, say, show, table, words
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -50,24 +50,27 @@ def command(
     environment: Annotated[
         Path | None, typer.Option(help="Lat-long image (.hdr, .exr) around the report's previews; else daylight.")
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Fit a diffuse term and lobes to a measured material.
 
     Example: lambent fit brushed.bsdf --lobes auto -o brushed.json --report brushed.html
     """
-    from lambent.core.images import check_writable
+    from lambent.core.outputs import check_output
     from lambent.materials import measured
     from lambent.materials.fitting.account import below_zero
     from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.grid import Schedule
     from lambent.materials.fitting.metrics import METRICS
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
-    from lambent.materials.fitting.plot import save_plots
+    from lambent.materials.fitting.plot import plot_files, save_plots
 
-    for written, suffix in ((output, ".json"), (plot, ".png"), (report, ".html")):
+    inputs = [file, *([] if environment is None else [environment])]
+    plotted = () if plot is None else (plot, *plot_files(plot.parent, plot.stem))
+    for written, suffix in ((output, ".json"), *((one, ".png") for one in plotted), (report, ".html")):
         if written is not None:
-            check_writable(written, (suffix,))
+            check_output(written, (suffix,), force=force or written == plot, inputs=inputs)
     if environment is not None:
         _check_environment(environment, report)
     count, fixed, ranges = _count(lobes), parse_fix(fix or ()), parse_ranges(range_ or ())

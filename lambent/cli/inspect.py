@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lambent.cli.console import Json, show, table, words
+from lambent.cli.console import Force, Json, show, table, words
 from lambent.cli.convert import head_of, is_document
 from lambent.core.errors import UserError
 from lambent.core.plain import plain
@@ -22,6 +22,7 @@ Facts = dict[str, Any]
 def command(
     file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
     plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Describe any file of ours or of other tools: format, dimensions, symmetry, albedo, faults.
@@ -29,9 +30,9 @@ def command(
     Example: lambent inspect brushed.bsdf --plot brushed.png
     """
     if plot is not None:
-        from lambent.core.images import check_writable
+        from lambent.core.outputs import check_output
 
-        check_writable(plot, (".png", ".pdf", ".svg"))
+        check_output(plot, (".png", ".pdf", ".svg"), force=force, inputs=[file])
     inspect = inspector_of(file)
     if plot is None:
         facts = plain(inspect(file))

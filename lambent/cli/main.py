@@ -2,34 +2,52 @@
 
 Every module of this folder with a function `command` is a command of the module's name; nothing else to register.
 Exit codes: 0 done; 1 done, and the answer is no (a failed check, a missing part); 2 wrong input; 130 interrupted.
+
+Nothing is imported at the top but what Python has loaded: Ctrl-C must be answered while the rest is imported.
 """
 
 from __future__ import annotations
 
 import errno
-import logging
 import os
+import signal
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING
 
-import typer
-from typer.exceptions import TyperException
-
-import lambent
-from lambent import cli
-from lambent.core.discovery import modules_in
-from lambent.core.errors import UserError
-from lambent.core.progress import Cancelled
+if TYPE_CHECKING:
+    import typer
 
 INTERRUPTED = 130
+AGAIN_S = 0.02
+INTERRUPTION = "lambent: interrupted; what was finished is kept\n"
 FAULTS_OF_THE_DISK = {
-    errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EISDIR,
-    errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR,
+    errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
 }  # fmt: skip
+
+
+def main() -> None:
+    """Entry point of the `lambent` command."""
+    signal.signal(signal.SIGINT, _leave)
+    build_app()  # imports the commands; nothing has begun that could be lost
+    sys.unraisablehook = _unraisable
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        code = run(sys.argv[1:])
+    except KeyboardInterrupt:  # while the end of the command was reported
+        code = INTERRUPTED
+    signal.signal(signal.SIGINT, lambda *_: os._exit(code))  # all is said; what the libraries close can wait
+    sys.exit(code)
 
 
 def build_app() -> typer.Typer:
     """The application with every command found."""
+    import typer
+
+    from lambent import cli
+    from lambent.cli.console import options
+    from lambent.core.discovery import modules_in
+
     app = typer.Typer(
         name="lambent",
         help="Measured materials where they will live: fit, place, bake, walk.",
@@ -38,62 +56,79 @@ def build_app() -> typer.Typer:
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     )
-    app.callback()(_options)
+    app.callback()(options)
     for name, module in modules_in(cli, having="command").items():
         app.command(name)(module.command)
     return app
 
 
-def main() -> None:
-    """Entry point of the `lambent` command."""
-    sys.exit(run(sys.argv[1:]))
-
-
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code; faults of the user are one line on stderr."""
-    logging.basicConfig(format="lambent: %(message)s", level=logging.WARNING)
+    from typer.exceptions import TyperException
+
+    from lambent.cli.console import log_to_stderr
+    from lambent.core.errors import UserError
+    from lambent.core.progress import Cancelled
+
+    log_to_stderr()
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that lacks a letter still shows the rest
     try:
         code = build_app()(arguments or ["--help"], prog_name="lambent", standalone_mode=False) or 0
+        sys.stdout.flush()
     except UserError as error:
         return _fail(str(error))
     except TyperException as error:  # unknown commands and options, missing arguments
         return _fail(error.format_message())
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
-    except SystemError as error:  # raised where an interruption meets the import of an extension module
-        if not isinstance(error.__cause__, KeyboardInterrupt):
-            raise
-        code = INTERRUPTED
     except BrokenPipeError:
         # The reader of the output is gone; flushing at exit must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:
-        if error.errno not in FAULTS_OF_THE_DISK:
+    except Exception as error:
+        if _is_interruption(error):
+            code = INTERRUPTED
+        elif isinstance(error, OSError) and error.errno in FAULTS_OF_THE_DISK:
+            return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
+        else:
             raise
-        return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
     if code == INTERRUPTED:
-        sys.stderr.write("lambent: interrupted; what was finished is kept\n")
+        sys.stderr.write(INTERRUPTION)
     return int(code)
 
 
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: half an import fails in many ways."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _leave(*_: object) -> None:
+    """End at once on Ctrl-C, without the traceback of an import."""
+    os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, INTERRUPTION.encode("ascii"))
+    os._exit(INTERRUPTED)
+
+
+def _unraisable(fault: sys.UnraisableHookArgs) -> None:
+    """Interrupt again, a moment later, where Ctrl-C met a place that cannot raise, such as the end of an object."""
+    if issubclass(fault.exc_type, KeyboardInterrupt):
+        import threading
+
+        later = threading.Timer(AGAIN_S, signal.raise_signal, [signal.SIGINT])
+        later.daemon = True
+        later.start()
+    else:
+        sys.__unraisablehook__(fault)
+
+
 def _fail(message: str) -> int:
-    sys.stderr.write(f"lambent: error: {' '.join(message.split())}\n")
+    from lambent.core.plain import printable
+
+    sys.stderr.write(f"lambent: error: {printable(' '.join(message.split()))}\n")
     return 2
-
-
-def _version(value: bool) -> None:
-    if value:
-        typer.echo(lambent.__version__)
-        raise typer.Exit
-
-
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
-) -> None:
-    pass
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Json, parse_size, progress_bar, say, show
+from lambent.cli.console import Force, Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def command(
     ] = "auto",
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
+    force: Force = False,
     json: Json = False,
 ) -> None:
     """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through a view transform.
@@ -60,20 +61,23 @@ def command(
     Example: lambent render room.store --camera entrance -o entrance.png
     """
     from lambent import render
-    from lambent.core.film import FILM, SEQUENCES
-    from lambent.core.images import WRITABLE, check_writable
+    from lambent.core.film import FILM, SEQUENCES, check_pictures
+    from lambent.core.images import WRITABLE
+    from lambent.core.outputs import check_output
 
-    check_writable(output, (*WRITABLE, FILM))
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar
     )
     settings.check()
     moves = output.suffix.lower() == FILM or (path is not None and output.suffix.lower() in SEQUENCES)
+    check_output(output, (*WRITABLE, FILM), force=force or moves)
     if moves and camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
     if path is not None and not moves:
         raise UserError("a path makes a film", field="--path", hint="write to .mp4, .png or .exr")
+    if moves:
+        check_pictures(output, force=force)
 
     def note(text: str) -> None:
         say(f"note: {text}")

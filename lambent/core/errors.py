@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+LONGEST = 600  # characters of a message or a path
+
 
 class UserError(Exception):
     """Input that cannot be used, said in one line: file, field, found, expected, hint.
-
-    Long values that were found are cut; what is expected and the hint, which are the program's own words, never are.
 
     Parameters
     ----------
@@ -23,6 +23,9 @@ class UserError(Exception):
         The value found there, and the values that belong there.
     hint : str, optional
         A remedy.
+
+    What may come from a file is cut to a length that a terminal shows. What is expected may be four times
+    as long. The hint is shown whole.
     """
 
     def __init__(
@@ -37,11 +40,12 @@ class UserError(Exception):
     ) -> None:
         self.message, self.file, self.field = message, file, field
         self.got, self.expected, self.hint = got, expected, hint
-        parts = [f"{file}: " if file is not None else "", f"{field}: " if field is not None else "", message]
+        parts = [f"{_end_of(file)}: " if file is not None else "", f"{_short(field)}: " if field is not None else ""]
+        parts.append(_short(message, LONGEST))
         if got is not None:
             parts.append(f"; found {_short(got)}")
         if expected is not None:
-            parts.append(f"; expected {expected}")
+            parts.append(f"; expected {_short(expected, 4 * LONGEST)}")
         if hint is not None:
             parts.append(f"; {hint}")
         super().__init__("".join(parts).replace("\n", " "))
@@ -61,9 +65,18 @@ def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserErro
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:
     """Hint for an unknown name, or None when nothing is close."""
     close = difflib.get_close_matches(name, list(known), n=1)
-    return f"did you mean {close[0]!r}?" if close else None
+    return f"did you mean {_short(close[0])!r}?" if close else None
+
+
+def _end_of(file: object) -> str:
+    """A path, or the end of a long one, where its name is."""
+    text = str(file)
+    return text if len(text) <= LONGEST else f"...{text[3 - LONGEST :]}"
 
 
 def _short(value: object, limit: int = 120) -> str:
-    text = str(value)
+    try:
+        text = str(value)
+    except ValueError:  # Python writes no integers of more than 4300 digits
+        text = "a number of more digits than can be shown"
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -17,6 +17,7 @@ import numpy as np
 
 from lambent.core.arrays import Image
 from lambent.core.errors import UserError
+from lambent.core.outputs import MARK
 
 MAGIC = b"v/1\x01"
 _STDERR = 2
@@ -56,7 +57,9 @@ def encode(image: Image, path: Path) -> None:
     """Write linear RGB (H, W, 3) as 32-bit float, ZIP compressed (without loss); OSError where that cannot be."""
     import OpenEXR
 
-    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header: dict[str, Any] = {
+        "compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, "comments": MARK,
+    }  # fmt: skip
     try:
         OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, np.float32)}).write(str(path))
     except RuntimeError as error:  # the library's only kind: its text ends with what the system says

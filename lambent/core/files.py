@@ -1,49 +1,130 @@
-"""File safety: whole files or none, hashes, names that stay inside their folder."""
+"""File safety: whole files or none, nothing but regular files, hashes, names that stay inside their folder."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import platform
+import re
+import secrets
+import stat
+import sys
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 
 from lambent.core.errors import UserError
+
+# Of files that are being written: the machine, the process, its run (a new process may get the number of a dead one).
+_MACHINE = f".lambent-{hashlib.sha256(platform.node().encode()).hexdigest()[:8]}-"
+_RUN = secrets.token_hex(4)
+_BESIDE = re.compile(re.escape(_MACHINE) + r"(\d+)-([0-9a-f]{8})-")
+_STALE_S = 86400.0  # where one cannot ask whether a process lives: nothing is written for so long
+_numbers = count()
+_cleared: set[Path] = set()
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """Path to write beside `path`; on leaving without an error it is flushed to disk and renamed into place.
 
-    A reader sees the old file or the new one, never a part; a crash leaves the old one.
+    A reader sees the old file or the new one, never a part; a crash leaves the old one. The folder is made where there
+    is none. A symbolic link is followed: its target is replaced, and it stays. A new file has the mode that the umask
+    says, a replaced one keeps its mode. What a killed process left beside goes.
+
+    Raises
+    ------
+    UserError
+        Where `path` is a folder, a device or a pipe, or the disk is full, read-only or fails. It names `path`.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
-    os.close(handle)
-    beside = Path(name)
+    target = real_file(path)
+    beside = target.with_name(f"{_MACHINE}{os.getpid()}-{_RUN}-{next(_numbers)}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    if target.parent not in _cleared:
+        _cleared.add(target.parent)
+        remove_left_over(target.parent)
     try:
         yield beside
         with beside.open("rb+") as file:
             os.fsync(file.fileno())
-        os.chmod(beside, 0o644)
-        os.replace(beside, path)
+        with suppress(FileNotFoundError):
+            os.chmod(beside, stat.S_IMODE(target.stat().st_mode) & 0o777)
+        os.replace(beside, target)
+    except OSError as error:
+        if error.filename is not None and str(error.filename) != str(beside):
+            raise  # of another file
+        raise _unwritable(path, error) from error
     finally:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def real_file(path: Path) -> Path:
+    """The place of the file that `path` names, links followed; `UserError` where something other than a file is there.
+
+    A device, a pipe or a socket is not replaced by a file, whoever asks.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        mode = target.stat().st_mode
+    except FileNotFoundError:
+        return target
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    if stat.S_ISDIR(mode):
+        raise UserError("is a folder", file=path, expected="a name for a file")
+    if not stat.S_ISREG(mode):
+        raise UserError("is a device or a pipe", file=path, expected="a name for a file")
+    return target
 
 
 def check_place(path: Path) -> None:
     """`UserError` where no file can be written at `path`, before long work begins. Leaves nothing behind."""
-    path = Path(path)
-    if path.is_dir():
-        raise UserError("is a folder", file=path, expected="a name for a file")
-    folder = next((p for p in path.absolute().parents if p.exists()), path.parent)
+    target = real_file(path)
+    folder = next((p for p in target.parents if p.exists()), target.parent)
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
+        target.with_name(f"{_MACHINE}{target.suffix}").exists()  # an ending can be too long
     except OSError as error:
-        raise UserError(f"cannot be written ({error.strerror})", file=path) from error
+        raise _unwritable(path, error) from error
+    if target.exists() and not os.access(target, os.W_OK):
+        raise UserError("is read-only", file=path, hint="write to another file")
+
+
+def remove_left_over(folder: Path) -> None:
+    """Remove what processes of this machine were writing in `folder` when they were killed."""
+    with suppress(OSError):  # what is left over does not stop what comes
+        for path in Path(folder).iterdir():
+            found = _BESIDE.match(path.name)
+            if found is not None and not _is_alive(int(found[1]), found[2], path):
+                path.unlink(missing_ok=True)
+
+
+def _is_alive(process: int, run: str, path: Path) -> bool:
+    """Whether the process that began to write `path` still runs."""
+    if process == os.getpid():
+        return run == _RUN
+    if sys.platform == "win32":  # where asking after a process can end it
+        return time.time() - path.stat().st_mtime < _STALE_S
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        pass
+    return True
+
+
+def _unwritable(path: Path, error: OSError) -> UserError:
+    return UserError(f"cannot be written ({error.strerror or error})", file=path)
 
 
 def write_text(path: Path, text: str) -> None:

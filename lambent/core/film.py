@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path
+from lambent.core.outputs import MARK, check_output
 
 Frame = NDArray[np.uint8]
 FILM = ".mp4"
@@ -23,6 +24,7 @@ SEQUENCES = (".png", ".exr")
 # The matrix is converted and named: players take small films for BT.601 and large ones for BT.709 when it is not.
 _BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
           "-color_trc", "bt709", "-color_range", "tv"]  # fmt: skip
+_MARKED = ["-metadata", f"comment={MARK}"]
 _CONSTANT_QUALITY = ["-crf", "18", "-preset", "medium", "-movflags", "+faststart"]
 
 
@@ -57,7 +59,7 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
                 pix_fmt_out="yuv420p",
                 quality=None,
                 macro_block_size=2,
-                output_params=[*_BT709, *_CONSTANT_QUALITY],
+                output_params=[*_BT709, *_CONSTANT_QUALITY, *_MARKED],
             )
             writer.send(None)
 
@@ -72,7 +74,8 @@ def film_writer(path: Path, width: int, height: int, fps: float = 30) -> Iterato
             if not _is_whole(beside):  # ffmpeg does not report errors at its end, such as a full disk
                 raise OSError(errno.ENOSPC, "the end of the film could not be written: is the disk full?")
         except (OSError, RuntimeError) as error:
-            raise UserError(f"film could not be written ({error})", file=path) from error
+            said = str(error).replace(str(beside), str(path))
+            raise UserError(f"film could not be written ({said})", file=path) from error
 
 
 def _is_whole(path: Path) -> bool:
@@ -103,6 +106,21 @@ def sequence_file(path: Path, number: int) -> Path:
         raise UserError("name of a picture sequence", file=path, expected="one run of # signs, as in tour-####.png")
     return path.with_name(f"{stem}{number:0{len(signs)}}{rest}{path.suffix}" if signs else
                           f"{path.stem}-{number:04}{path.suffix}")  # fmt: skip
+
+
+def pictures_there(path: Path) -> list[Path]:
+    """The film, or the pictures of the sequence, that are there already."""
+    if path.suffix.lower() == FILM or not path.parent.is_dir():
+        return [path] if path.exists() else []
+    numbered = ((file, map(int, re.findall(r"[0-9]+", file.stem))) for file in path.parent.iterdir())
+    return [file for file, numbers in numbered if any(sequence_file(path, n).name == file.name for n in numbers)]
+
+
+def check_pictures(path: Path, *, force: bool) -> None:
+    """`check_output` of a film, or of every picture of a sequence."""
+    check_output(path if path.suffix.lower() == FILM else sequence_file(path, 1), (FILM, *SEQUENCES), force=force)
+    for file in pictures_there(path):
+        check_output(file, force=force)
 
 
 @contextmanager

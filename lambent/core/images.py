@@ -18,7 +18,8 @@ from lambent.core import exr, rgbe
 from lambent.core.arrays import Image
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, check_place, read_bytes
+from lambent.core.files import atomic_path, read_bytes
+from lambent.core.outputs import MARK, check_output
 
 MAX_PIXELS = 1 << 26  # 8192 x 8192: 800 MB as float32 RGB
 LIMIT_BYTES = 2 << 30
@@ -92,15 +93,16 @@ def write_shown(path: Path, picture: NDArray[np.uint8]) -> None:
 
 def _save_png(path: Path, picture: NDArray[np.uint8]) -> None:
     from PIL import Image as Pillow
+    from PIL.PngImagePlugin import PngInfo
 
-    Pillow.fromarray(picture).save(path, format="PNG")
+    info = PngInfo()
+    info.add_text("Software", MARK)
+    Pillow.fromarray(picture).save(path, format="PNG", pnginfo=info)
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...] = WRITABLE) -> None:
     """`UserError` where a picture cannot be written at `path`, or not with its suffix; called before long work."""
-    if Path(path).suffix.lower() not in suffixes:
-        raise UserError("unknown kind of file", file=path, got=Path(path).suffix or None, expected=", ".join(suffixes))
-    check_place(path)
+    check_output(Path(path), suffixes, force=True)
 
 
 def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:

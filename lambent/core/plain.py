@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+_UNSHOWN = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of Unicode
 Triple = tuple[float, float, float]
 
 
@@ -21,6 +23,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return str(value) if isinstance(value, Path) else value
+
+
+def printable(text: str) -> str:
+    """`text` as one line that a terminal shows and does not obey, `\\x1b` for an escape.
+
+    Escaped are control characters, line ends among them, marks that change the direction of writing or have no width,
+    and halves of characters.
+    """
+    return "".join(c if unicodedata.category(c) not in _UNSHOWN else ascii(c)[1:-1] for c in text)
 
 
 def is_number(word: str) -> bool:

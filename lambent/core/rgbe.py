@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Image
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError
+from lambent.core.outputs import MARK
 from lambent.core.plain import is_number
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
@@ -52,7 +53,8 @@ def encode(image: Image) -> bytes:
     exponent = np.clip(np.where(rgb.max(axis=-1) > 0, exponent + 128, 0), 0, 255)
     pixels = np.concatenate([mantissa, exponent[..., None]], axis=-1).astype(np.uint8)
     height, width = image.shape[:2]
-    return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + pixels.tobytes()
+    header = f"#?RADIANCE\nSOFTWARE={MARK}\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
+    return header.encode("ascii") + pixels.tobytes()
 
 
 def _pixels(data: bytes, at: int, height: int, width: int, file: Path) -> NDArray[np.uint8]:

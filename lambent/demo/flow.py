@@ -28,6 +28,7 @@ from lambent.bake.quality import Quality, quality_named
 from lambent.bake.reference.goniophotometer import measure
 from lambent.core.camera import Camera
 from lambent.core.colour import srgb_decode
+from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.images import write_image, write_shown
 from lambent.core.metrics import compare
@@ -97,7 +98,10 @@ class Flow:
         self.report: dict[str, Any] = {"seconds": {}, "fits": {}}
         self._plots = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
         self._plotted: list[Future[list[Path]]] = []
-        self.out.mkdir(parents=True, exist_ok=True)
+        if not (self.out / "measured").is_dir() and (self.out.is_file() or list(self.out.glob("*"))):
+            hint = "choose another folder with --out"
+            raise UserError("is no folder of a demo, nor empty", file=self.out, hint=hint)
+        (self.out / "measured").mkdir(parents=True, exist_ok=True)
 
     @property
     def store_path(self) -> Path:

@@ -12,6 +12,7 @@ import numpy as np
 
 from lambent.core.directions import Floats, direction
 from lambent.core.files import atomic_path
+from lambent.core.outputs import MARK
 from lambent.materials.fitting.disks import measured_disk
 from lambent.materials.fitting.incidence import Incidence, incidences
 from lambent.materials.measured.protocol import MeasuredTable
@@ -44,7 +45,7 @@ def plot_plane_of_incidence(path: Path, evals: Mapping[str, Eval], *, title: str
     figure = new_figure(3 * len(THETA_I_DEG), IN_PLANE_INCHES)
     _draw_plane(figure, evals, transmits)
     figure.suptitle(title, fontsize=10)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
@@ -72,7 +73,7 @@ def plot_measurement(path: Path, table: MeasuredTable, *, title: str) -> None:
         _draw_matrix(below, placed, (rows, columns))
     else:
         below.text(0.5, 0.5, "too few tuples per incident direction for disks", ha="center", fontsize=9)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def disk_places(shown: Sequence[Incidence], transmits: bool) -> tuple[list[Placed], tuple[int, int]]:
@@ -121,9 +122,11 @@ def draw_source(axis: Any, theta_deg: float, limit: float) -> None:
     axis.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
 
 
-def _save(figure: Any, path: Path) -> None:
+def save_figure(figure: Any, path: Path, dpi: int = 120) -> None:
+    """Write a figure, atomically, in the format of the suffix: .png, .pdf or .svg."""
+    made_by = "Software" if path.suffix.lower() == ".png" else "Creator"
     with atomic_path(path) as beside:
-        figure.savefig(beside, dpi=120)
+        figure.savefig(beside, dpi=dpi, metadata={made_by: MARK})
 
 
 def _draw_plane(figure: Any, evals: Mapping[str, Eval], transmits: bool) -> None:

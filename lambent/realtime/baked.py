@@ -14,6 +14,7 @@ from lambent.core.plain import triple
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
+from lambent.store.consistency import numbers_of, read_geometry
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
@@ -103,7 +104,7 @@ def read_baked(store: Store) -> BakedScene:
     back = "light through two-sided sheets is black" if two_sided else None
     return BakedScene(
         record,
-        **{name: store.read(f"geometry/{name}") for name in ("positions", "normals", "tangents", "uv", "uv2", "faces")},
+        **read_geometry(store),
         irradiance=light("light_map/irradiance", "diffuse light is black"),
         irradiance_back=light("light_map/irradiance_back", back),
         environment=light("environment/radiance", None),
@@ -117,12 +118,12 @@ def read_baked(store: Store) -> BakedScene:
 
 
 def _probe(store: Store, name: str, radiance: Floats) -> Probe:
-    meta = store.artefact(contract.probe_name(name, "radiance")).meta
+    centre = numbers_of(store, contract.probe_name(name, "radiance"), "centre", 3)
     distance, planes = (contract.probe_name(name, part) for part in ("distance", "planes"))
     return Probe(
-        triple(meta["centre"]),
+        triple(centre),
         radiance,
         store.read(distance) if distance in store else None,
         store.read(planes).reshape(-1, 4) if planes in store else np.zeros((0, 4), np.float32),
-        contract.probe_irradiance(meta),
+        contract.probe_irradiance(store, name),
     )

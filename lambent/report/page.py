@@ -10,6 +10,8 @@ import struct
 from collections.abc import Iterable, Sequence
 from html import escape
 
+from lambent.core.outputs import MARK
+
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c1e21; --soft: #5c6370; --line: #d9dce1; --page: #fff; --card: #f5f6f8;
   --mark: #8a5a00; --note: #fdf6e3; --note-line: #e5c97a; }
@@ -61,6 +63,7 @@ def page(title: str, body: Iterable[str]) -> str:
     head = (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta name="generator" content="{MARK}">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n"
     )
     return head + "<body>\n<main>\n" + "\n".join(body) + "\n</main>\n</body>\n</html>\n"

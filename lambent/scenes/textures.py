@@ -107,7 +107,7 @@ def _bounded(textures: Mapping[str, MaterialTextures]) -> dict[str, MaterialText
     for material, of_material in textures.items():
         changed: dict[str, Any] = {}
         for part, texture in parts(of_material).items():
-            _check(material, part, texture)
+            check(material, part, texture)
             if max(texture.texels.shape[:2]) > SIDE_MAX:
                 if id(texture.texels) not in smaller:
                     smaller[id(texture.texels)] = replace(texture, texels=_reduced(texture.texels))
@@ -123,7 +123,8 @@ def _reduced(texels: Floats) -> Floats:
     return values.astype(np.float16)
 
 
-def _check(material: str, part: str, texture: Texture) -> None:
+def check(material: str, part: str, texture: Texture) -> None:
+    """`UserError` where a texture cannot be `part` of a material."""
     shape = texture.texels.shape
     field = f"{part} texture of {material}"
     if len(shape) != 3 or shape[2] != CHANNELS[part] or 0 in shape:

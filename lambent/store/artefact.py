@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
 
-LIMIT_BYTES = 1 << 34  # of one array: a manifest that promises more is not believed
+LIMIT_BYTES = 1 << 34  # of one array or chunk: a manifest that promises more is not believed
+LIMIT_CHUNKS, LIMIT_AXES = 1 << 20, 8
 Array = NDArray[Any]
 Chunk = tuple[int, ...]
 Region = tuple[slice, ...]
@@ -65,6 +66,12 @@ class Artefact:
         """The writing of a chunk that counts; None where it is not written yet."""
         return self.done.get(chunk_id(chunk))
 
+    def has(self, chunk: str) -> bool:
+        """Whether a chunk of this id is part of the array."""
+        numbers = chunk.split(".") if chunk else []
+        inside = [n.isdecimal() and int(n) < count for n, count in zip(numbers, self.chunk_counts, strict=False)]
+        return len(numbers) == len(self.shape) and all(inside) and chunk == chunk_id(tuple(map(int, numbers)))
+
     def region(self, chunk: Chunk) -> Region:
         """Index of the array that a chunk covers, cut at the array's end."""
         parts = zip(chunk, self.chunks, self.shape, strict=True)
@@ -82,9 +89,14 @@ class Artefact:
 
     def check(self, store: Path) -> None:
         """`UserError` where the shape is impossible, or larger than any array of a store."""
-        if min(self.shape, default=0) < 0 or math.prod(self.shape) * np.dtype(self.dtype).itemsize > LIMIT_BYTES:
-            limit = f"at most {LIMIT_BYTES} bytes"
-            raise UserError("impossible shape", file=store, field=self.name, got=self.shape, expected=limit)
+        itemsize = np.dtype(self.dtype).itemsize
+        for what, sizes in (("shape", self.shape), ("chunks", self.chunks)):
+            if min(sizes, default=1) < (what == "chunks") or math.prod(sizes) * itemsize > LIMIT_BYTES:
+                limit = f"at most {LIMIT_BYTES} bytes"
+                raise UserError(f"impossible {what}", file=store, field=self.name, got=sizes, expected=limit)
+        if len(self.shape) > LIMIT_AXES or math.prod(self.chunk_counts) > LIMIT_CHUNKS:
+            got, limit = f"{self.shape} in {self.chunks}", f"at most {LIMIT_AXES} axes and {LIMIT_CHUNKS} chunks"
+            raise UserError("too many chunks", file=store, field=self.name, got=got, expected=limit)
 
     def entry(self) -> dict[str, Any]:
         """What the manifest says: a chunk is its crc, or (crc, generation) where it was rewritten."""
@@ -92,14 +104,30 @@ class Artefact:
         return {name: value for name, value in vars(self).items() if name != "name"} | {"done": done}
 
     @classmethod
-    def of_entry(cls, name: str, e: Mapping[str, Any]) -> Artefact:
+    def of_entry(cls, name: str, e: Mapping[str, Any], store: Path) -> Artefact:
         """The manifest's entry, or an error that `Store.open` turns into "manifest is damaged"."""
-        shape, chunks = tuple(map(int, e["shape"])), tuple(map(int, e["chunks"]))
-        done = {chunk: Version(*said) if isinstance(said, list) else Version(said) for chunk, said in e["done"].items()}
+        shape, chunks = (tuple(map(_count, e[axes])) for axes in ("shape", "chunks"))
+        said = {chunk: v if isinstance(v, list) else [v] for chunk, v in e["done"].items()}
+        done = {chunk: Version(*map(_count, v)) for chunk, v in said.items()}
+        if not (isinstance(e["dtype"], str) and all(isinstance(e[text], str) for text in ("kind", "key"))):
+            raise ValueError(f"{name}: kind, key and dtype are texts")
+        if np.dtype(e["dtype"]).kind not in "biuf":
+            raise ValueError(f"{name}: no array of numbers, but of {e['dtype']}")
         a = cls(name, e["kind"], shape, chunks, e["dtype"], e["key"], dict(e["meta"]), done, e["complete"] is True)
+        a.check(store)
+        unknown = next((chunk for chunk in done if not a.has(chunk)), None)
+        if unknown is not None:
+            raise ValueError(f"{name}: there is no chunk {unknown}")
         if a.complete and len(a.done) != math.prod(a.chunk_counts):
             raise ValueError(f"{name}: complete with {len(a.done)} chunks")
         return a
+
+
+def _count(value: object) -> int:
+    """A whole number that is not negative, or a `ValueError`."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise ValueError(f"not a count: {str(value)[:40]}")
+    return value
 
 
 def chunk_id(chunk: Chunk) -> str:

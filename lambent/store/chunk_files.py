@@ -12,6 +12,7 @@ of a full disk, neither counts nor spoils the next. Reading a line twice changes
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
@@ -25,10 +26,11 @@ import numpy as np
 from numcodecs import Zstd
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, inside
+from lambent.core.files import atomic_path, inside, read_bytes
 from lambent.store.artefact import Array, Artefact, Chunk, Region, Version, chunk_id
 
 LENGTH = "length"
+LIMIT_JOURNAL_BYTES = 1 << 28
 _LINE = re.compile(rb"^([\d.]*|length) (\d+) (\d+);$", re.MULTILINE)
 _ZSTD = Zstd(level=0)
 
@@ -39,8 +41,10 @@ class ChunkFiles:
     def __init__(self, store_folder: Path, artefact: Artefact) -> None:
         self.artefact, self._store_folder = artefact, store_folder
         self._folder = inside(store_folder, artefact.name)
+        if not {".", ".."}.isdisjoint(artefact.name.split("/")) or self._folder == store_folder.resolve():
+            raise UserError("is not the name of an array", file=store_folder, got=artefact.name)
         self._dtype = np.dtype(artefact.dtype).newbyteorder("<")
-        self.journal = self._folder / "journal"
+        self.journal = inside(self._folder, "journal")
 
     def create(self) -> None:
         """Make the array's folder anew, without chunks."""
@@ -57,7 +61,7 @@ class ChunkFiles:
         files: dict[str, Any] = {}
         a, codec = self.artefact, ZstdCodec(level=_ZSTD.level)
         create_array(MemoryStore(files), shape=a.shape, chunks=a.chunks, dtype=a.dtype, compressors=codec)
-        with atomic_path(self._folder / "zarr.json") as beside:
+        with atomic_path(inside(self._folder, "zarr.json")) as beside:
             beside.write_bytes(files["zarr.json"].to_bytes())
 
     def write(self, chunk: Chunk, data: Array) -> None:
@@ -78,12 +82,15 @@ class ChunkFiles:
 
     def read(self, chunk: Chunk, version: Version) -> Array | None:
         """One writing of a chunk, cut at the array's end; None where its file is gone or fails its checksum."""
-        encoded = _content(self._path(chunk, version))
+        size = math.prod(self.artefact.chunks) * self._dtype.itemsize
+        encoded = _content(self._path(chunk, version), size + size // 128 + 1024)  # what cannot be made smaller
         if zlib.crc32(encoded) != version.crc:
             return None
         if not encoded:
             return np.zeros([part.stop for part in self._inner(chunk)], self._dtype)
         try:
+            if content_size(encoded) != size:
+                raise ValueError(f"it holds {content_size(encoded)} bytes, not {size}")
             whole = np.frombuffer(_ZSTD.decode(encoded), self._dtype).reshape(self.artefact.chunks)
         except (RuntimeError, ValueError) as error:
             where, name = self._store_folder, f"{self.artefact.name} {chunk_id(chunk)}"
@@ -101,14 +108,25 @@ class ChunkFiles:
     def read_journal(self) -> None:
         """Bring the artefact up to what the journal says."""
         a = self.artefact
-        for name, number, crc in ((w.decode(), int(n), int(c)) for w, n, c in _LINE.findall(_content(self.journal))):
+        for name, number, crc in ((w.decode(), int(n), int(c)) for w, n, c in self._lines()):
             if name == LENGTH:
                 if number > a.shape[0]:
                     a.shape, a.complete = (number, *a.shape[1:]), False
                 continue
-            chunk = tuple(map(int, name.split("."))) if name else ()
-            if all(i < n for i, n in zip(chunk, a.chunk_counts, strict=True)):
+            if a.has(name):
                 a.done[name] = Version(crc, number)
+            elif len(name.split(".") if name else ()) != len(a.shape):
+                raise ValueError(f"{a.name}: the journal has a chunk {name}")
+
+    def _lines(self) -> list[tuple[bytes, bytes, bytes]]:
+        """Name, number and checksum of every whole line of the journal."""
+        return _LINE.findall(_content(self.journal, LIMIT_JOURNAL_BYTES))
+
+    def size_bytes(self, chunk: Chunk) -> int:
+        """Size of a chunk's file; 0 where there is none."""
+        version = self.artefact.version(chunk)
+        path = None if version is None else self._path(chunk, version)
+        return path.stat().st_size if path is not None and path.exists() else 0
 
     def settle(self) -> None:
         """When the manifest has all that the journal has: remove the journal and the files that nothing names."""
@@ -127,8 +145,8 @@ class ChunkFiles:
             os.fsync(file.fileno())
 
     def _path(self, chunk: Chunk, version: Version) -> Path:
-        path = self._folder.joinpath("c", *map(str, chunk))
-        return path.with_name(f"{path.name}.{version.generation}") if version.generation else path
+        name = "/".join(["c", *map(str, chunk)])
+        return inside(self._folder, f"{name}.{version.generation}" if version.generation else name)
 
     def _encoded(self, chunk: Chunk, data: Array) -> bytes:
         """Bytes of a chunk's file; none for a chunk of zeros, which has no file."""
@@ -141,12 +159,23 @@ class ChunkFiles:
         return tuple(slice(0, part.stop - part.start) for part in self.artefact.region(chunk))
 
 
-def _content(path: Path) -> bytes:
+def _content(path: Path, limit_bytes: int) -> bytes:
     """Content of a file; nothing where there is none."""
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
+        return read_bytes(path, limit_bytes)
+    except UserError:
+        if path.exists():
+            raise
         return b""
+
+
+def content_size(frame: bytes) -> int:
+    """Bytes that a zstd frame says it holds (RFC 8878, 3.1.1.1); -1 where it is no frame, or does not say."""
+    if frame[:4] != b"\x28\xb5\x2f\xfd" or len(frame) < 5:
+        return -1
+    kind, is_single, dictionary = frame[4] >> 6, frame[4] >> 5 & 1, frame[4] & 3
+    at, length = 6 - is_single + (0, 1, 2, 4)[dictionary], (is_single, 2, 4, 8)[kind]
+    return int.from_bytes(frame[at : at + length], "little") + 256 * (kind == 1) if length else -1
 
 
 def _remove(path: Path) -> None:

@@ -32,17 +32,17 @@ is absent, partial or complete (`Store.availability`); of a partial one, `Store.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, invalid
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
-from lambent.store.store import Store
+from lambent.store.consistency import check_record, numbers_of
+from lambent.store.store import MANIFEST, Store
 
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
@@ -164,12 +164,10 @@ def probe_name(object_name: str, part: str) -> str:
     return f"probe/{object_name}/{part}"
 
 
-def probe_irradiance(meta: Mapping[str, Any]) -> tuple[float, ...]:
+def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
     """What a probe alone would give (see the head), where the light map is to scale it; else nothing."""
-    found = meta.get("seen_irradiance", [])
-    if not isinstance(found, list) or len(found) not in (0, 9):
-        raise UserError("broken store", field="seen_irradiance", got=found, expected="nine numbers")
-    return tuple(float(value) for value in found)
+    name = probe_name(object_name, "radiance")
+    return numbers_of(store, name, "seen_irradiance", 9) if store.artefact(name).meta.get("seen_irradiance") else ()
 
 
 def noise_name(side: str) -> str:
@@ -193,10 +191,15 @@ def is_two_sided(material: Material, *, masked: bool = False) -> bool:
 
 
 def scene_record(store: Store) -> SceneRecord:
-    """The scene record of a baked store."""
+    """The scene record of a baked store; `UserError` where it is damaged, or contradicts the arrays or itself."""
     if SCENE not in store.documents:
-        store.artefact("geometry/positions")  # raises the clear error of an unbaked store
-    return SceneRecord.model_validate(store.documents[SCENE])
+        raise UserError("store has no scene record", file=store.folder, field=SCENE, hint="bake it first")
+    try:
+        record = SceneRecord.model_validate(store.documents[SCENE])
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    check_record(store, record)
+    return record
 
 
 def write_scene_record(store: Store, record: SceneRecord) -> None:

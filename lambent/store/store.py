@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -20,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.files import write_text
+from lambent.core.files import read_bytes, remove_left_over, write_text
+from lambent.core.machine import memory_bytes
 from lambent.store.artefact import Array, Artefact, Chunk, Region, chunk_id
 from lambent.store.chunk_files import ChunkFiles
 from lambent.store.lock import WriterLock
@@ -28,6 +30,8 @@ from lambent.store.lock import WriterLock
 FORMAT, VERSIONS = "lambent-store", (1, 2)  # 2 where a chunk was rewritten: readers of 1 do not find its file
 MANIFEST = "manifest.json"
 __all__ = ["Array", "Artefact", "Chunk", "Store", "Writer"]
+LIMIT_BYTES = 1 << 28  # of a manifest
+SPARSE_BYTES, DENSEST = 1 << 30, 1 << 16  # an array of more bytes has files, which zstd packs no denser
 _DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
 
 
@@ -187,7 +191,12 @@ class Store:
 
     def _gathered(self, artefact: Artefact, region: Region, chunks: Iterable[Chunk]) -> Array:
         """Values of a region from these chunks."""
-        files = ChunkFiles(self.folder, artefact)
+        files, chunks = ChunkFiles(self.folder, artefact), list(chunks)
+        size = math.prod(max(0, part.stop - part.start) for part in region) * np.dtype(artefact.dtype).itemsize
+        if size > memory_bytes() // 2:
+            raise self._error(f"array of {size} bytes does not fit into memory", artefact.name, "use a larger machine")
+        if size > SPARSE_BYTES and size > DENSEST * sum(map(files.size_bytes, chunks)):
+            raise self._error(f"array of {size} bytes has next to nothing in its files", artefact.name, "bake again")
         gathered = np.zeros([max(0, part.stop - part.start) for part in region], artefact.dtype)
         for chunk in chunks:
             covered = artefact.region(chunk)
@@ -224,6 +233,8 @@ class Store:
         if self._writes:
             return
         self._lock = WriterLock(self.folder)
+        for folder, _, _ in os.walk(self.folder):
+            remove_left_over(Path(folder))
         try:
             if (self.folder / MANIFEST).exists():
                 self._load()
@@ -244,13 +255,19 @@ class Store:
             raise UserError("not a store", file=self.folder, expected=MANIFEST, hint=hint)
         try:
             text = None
-            while text != (text := path.read_text(encoding="utf-8")):  # ends when none has replaced it meanwhile
+            while text != (
+                text := read_bytes(path, LIMIT_BYTES).decode("utf-8")
+            ):  # ends when none has replaced it meanwhile
                 manifest = json.loads(text)
+                if "\\ud" in text.lower():
+                    json.dumps(manifest, ensure_ascii=False).encode("utf-8")  # fails where a text has half a character
                 if manifest["format"] != FORMAT or manifest["version"] not in VERSIONS:
                     found, expected = f"{manifest['format']} {manifest['version']}", f"{FORMAT} 1 or 2"
                     raise UserError("unknown store", file=path, got=found, expected=expected)
-                inputs, documents = manifest["inputs"], manifest["documents"]
-                artefacts = {name: Artefact.of_entry(name, entry) for name, entry in manifest["artefacts"].items()}
+                inputs, documents = dict(manifest["inputs"]), dict(manifest["documents"])
+                artefacts = {
+                    name: Artefact.of_entry(name, entry, path) for name, entry in manifest["artefacts"].items()
+                }
                 for artefact in artefacts.values():
                     ChunkFiles(self.folder, artefact).read_journal()
                     artefact.check(path)

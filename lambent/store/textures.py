@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lambent.scenes.scene import MaterialTextures, Texture
-from lambent.scenes.textures import CHANNELS, digest, parts
+from lambent.scenes.textures import CHANNELS, check, digest, parts
 from lambent.store.contract import SceneRecord, TexturesRecord, texture_name
 from lambent.store.store import Store
 
@@ -39,5 +39,6 @@ def read_textures(store: Store, record: SceneRecord) -> dict[str, MaterialTextur
             if key not in read:
                 read[key] = Texture(store.read(name), said.parts[part])
             textures[part] = read[key]
+            check(material, part, read[key])
         found[material] = MaterialTextures(**textures, cutoff=said.cutoff)
     return found

@@ -7,7 +7,6 @@ windows on one store do not lose each other's views.
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -21,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import read_bytes, write_text
+from lambent.store.consistency import is_usable
 from lambent.store.contract import SceneRecord
 from lambent.store.lock import lock
 
@@ -73,10 +73,7 @@ def change_views(folder: Path, change: Callable[[Views], Views]) -> Views:
     """
     with _alone(Path(folder)):
         views = change(read_views(folder))
-        try:
-            write_text(Path(folder) / FILE, json.dumps(views.model_dump(mode="json"), indent=1) + "\n")
-        except OSError as error:
-            raise UserError(f"cannot be written ({error.strerror})", file=Path(folder) / FILE) from error
+        write_text(Path(folder) / FILE, json.dumps(views.model_dump(mode="json"), indent=1) + "\n")
     return views
 
 
@@ -132,8 +129,7 @@ def free_name(stem: str, taken: set[str]) -> str:
 def _check(views: Views, path: Path) -> None:
     for kind, cameras in (("cameras", views.cameras), *((f"paths.{p.name}", p.keys) for p in views.paths)):
         for camera in cameras:
-            numbers = (*camera.position, *camera.target, *camera.up, camera.fov_y_deg)
-            if not all(map(math.isfinite, numbers)) or not 0 < camera.fov_y_deg < 180:
+            if not is_usable(camera):
                 raise UserError("a camera is not finite, or sees no angle", file=path, field=f"{kind}.{camera.name}")
     for walk in views.paths:
         times = walk.times_s or ()

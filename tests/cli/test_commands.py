@@ -241,7 +241,7 @@ def test_a_place_that_takes_no_file_is_one_line(refused, monkeypatch, pictures, 
 
 def test_a_byte_order_mark_changes_nothing(lambent, material, tmp_path):
     def said():
-        converted = lambent("convert", material, tmp_path / "out.txt", "--as", "gonio_text")
+        converted = lambent("convert", material, tmp_path / "out.txt", "--as", "gonio_text", "--force")
         return converted, (tmp_path / "out.txt").read_bytes(), lambent("inspect", material)
 
     plain = said()

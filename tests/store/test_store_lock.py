@@ -158,3 +158,21 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         Store.create(tmp_path / "file/s", {})
+
+
+def test_what_a_killed_writer_left_goes_with_the_next_writer(tmp_path: Path) -> None:
+    """A reader leaves it: it does not hold the lock."""
+    with Store.create(tmp_path / "s", {}) as store:
+        store.put("a", "x", np.ones((4, 4), np.float32), key="k")
+    program = (
+        "import os, signal, sys; from pathlib import Path; from lambent.core.files import atomic_path\n"
+        "with atomic_path(Path(sys.argv[1])): os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    for name in ("manifest.json", "a/c/0/0"):
+        subprocess.run([sys.executable, "-c", program, str(tmp_path / "s" / name)], check=False)
+    left = list((tmp_path / "s").rglob(".lambent-*"))
+    Store.open(tmp_path / "s").read("a")
+    assert len(left) == 2 and all(path.exists() for path in left)
+    with Store.create(tmp_path / "s", {}) as store:
+        np.testing.assert_array_equal(store.read("a"), np.ones((4, 4)))
+    assert not any(path.exists() for path in left)

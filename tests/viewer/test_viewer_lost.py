@@ -113,7 +113,7 @@ def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatc
         raise PermissionError(errno.EACCES, "Permission denied")
 
     walk_and_edit(state)
-    monkeypatch.setattr("tempfile.mkstemp", refused)
+    monkeypatch.setattr("os.open", refused)
     state.materials.edits.undo()
     mode.close()
     said = capsys.readouterr().err

@@ -130,3 +130,10 @@ def test_names_of_films_that_are_none(tmp_path, name):
 def test_names_of_films(tmp_path):
     for name in ("tour.mp4", "t.MP4", "tour-####.png", "tour.exr"):
         assert film_file(tmp_path, f" {name} ") == tmp_path / name
+
+
+def test_a_film_replaces_no_file_of_others(tmp_path):
+    for name, asked in (("tour.mp4", "tour.mp4"), ("tour-0007.png", "tour-####.png")):
+        (tmp_path / name).write_text("mine")
+        with pytest.raises(UserError, match=f"{name}: exists already"):
+            film_file(tmp_path, asked)

@@ -251,7 +251,7 @@ def test_a_folder_that_takes_no_files_is_said(renderer, state, monkeypatch):
     pictures = Pictures(renderer, state)
     drawn(pictures, state)
     monkeypatch.setattr("tempfile.TemporaryFile", refused)
-    monkeypatch.setattr("tempfile.mkstemp", refused)
+    monkeypatch.setattr("os.open", refused)
     pictures.save()
     said = state.screen.messages
     assert "picture not saved: " in said[-1].text and "Permission denied" in said[-1].text

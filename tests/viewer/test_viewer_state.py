@@ -170,10 +170,19 @@ def test_who_grows_is_lifted(state):
 
 def test_a_material_that_cannot_be_written_is_said_by_its_name(state, monkeypatch):
     def refused(*_, **__):
-        raise PermissionError(errno.EACCES, "Permission denied", ".brass.x1.json")
+        raise PermissionError(errno.EACCES, "Permission denied", ".lambent-x1.json")
 
-    monkeypatch.setattr("tempfile.mkstemp", refused)
+    monkeypatch.setattr("os.open", refused)
     state.materials.save("brass")
     said = state.screen.messages[-1].text
     assert said == f"not saved: {state.screen.folder / 'brass.json'}: cannot be written (Permission denied)"
     assert "brass" not in state.materials.edits.saved
+
+
+def test_a_material_replaces_a_file_of_others_at_the_second_try(state, tmp_path):
+    (tmp_path / "brass.json").write_text("mine")
+    state.materials.save("brass")
+    assert (tmp_path / "brass.json").read_text() == "mine"
+    assert state.screen.messages[-1].text == "brass.json exists: save again to replace it"
+    state.materials.save("brass")
+    assert load_material(tmp_path / "brass.json").lobes

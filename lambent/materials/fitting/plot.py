@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.directions import Floats, direction
-from lambent.core.files import atomic_path
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Material
 from lambent.materials.fitting.disks import (
@@ -32,6 +31,7 @@ from lambent.materials.plots import (
     draw_rim,
     draw_source,
     new_figure,
+    save_figure,
     white_of,
 )
 
@@ -49,18 +49,20 @@ def save_plots(samples: MeasuredSamples, material: Material, folder: Path, stem:
         A file cannot be written.
     """
     gathered = incidences(samples)
-    figures = {
-        "polar": polar_matrix(gathered, material, samples.info.transmits),
-        "in_plane": in_plane(gathered, material),
-        "albedo": albedo(gathered, material),
-    }
-    paths = []
-    for name, figure in figures.items():
-        path = Path(folder) / f"{stem}_{name}.png"
-        with atomic_path(path) as beside:
-            figure.savefig(beside, dpi=110)
-        paths.append(path)
+    figures = (
+        polar_matrix(gathered, material, samples.info.transmits),
+        in_plane(gathered, material),
+        albedo(gathered, material),
+    )
+    paths = plot_files(folder, stem)
+    for path, figure in zip(paths, figures, strict=True):
+        save_figure(figure, path, dpi=110)
     return paths
+
+
+def plot_files(folder: Path, stem: str) -> list[Path]:
+    """The files that `save_plots` writes."""
+    return [Path(folder) / f"{stem}_{name}.png" for name in ("polar", "in_plane", "albedo")]
 
 
 def polar_matrix(gathered: Sequence[Incidence], material: Material, transmits: bool) -> Any:

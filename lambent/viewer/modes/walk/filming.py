@@ -10,7 +10,16 @@ from pathlib import Path
 from lambent.core.camera import CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import check_place
-from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted, sequence_file
+from lambent.core.film import (
+    FILM,
+    SEQUENCES,
+    even_size,
+    pictures_there,
+    pictures_writer,
+    radiance_wanted,
+    sequence_file,
+)
+from lambent.core.outputs import is_marked
 from lambent.realtime.frame_state import QMC_N, FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.camera_paths import camera_at
@@ -44,6 +53,9 @@ def film_file(folder: Path, text: str) -> Path:
         raise UserError("not the name of a film", got=text, expected="a name like tour.mp4, tour-####.png or .exr")
     file = file_in(folder, name)
     check_place(file if file.suffix.lower() == FILM else sequence_file(file, 1))
+    others = [there for there in pictures_there(file) if not is_marked(there)]
+    if others:
+        raise UserError("exists already, and is not of Lambent", file=others[0], hint="choose another name")
     return file
 
 

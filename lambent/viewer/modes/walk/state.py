@@ -50,6 +50,7 @@ class Materials:
     linked_roughness: bool = True  # mx and my keep their ratio
     typed_measurement: str = ""  # path of a file to compare the selected material with
     editor: Editor | None = None
+    may_replace: set[Path] = field(default_factory=set)  # written from here, or asked for twice
 
     def file_name(self, material: str) -> str:
         """File that `material` will be saved as: the typed one, else its name."""
@@ -63,12 +64,15 @@ class Materials:
         file_name, material, folder = self.file_name(name), self.edits.current(name), self.screen.folder
         try:
             file = document_file(folder, file_name, bare=True)
+            if file.exists() and file not in self.may_replace:
+                self.may_replace.add(file)
+                self.screen.say(f"{file_name} exists: save again to replace it")
+                return
             with_account(material, self.edits.scene[name], None, {}).save(file)
         except UserError as error:
             self.screen.say(f"not saved: {error}")
-        except OSError as error:  # its own words name a file that was to become this one
-            self.screen.say(f"not saved: {folder / file_name}: cannot be written ({error.strerror})")
         else:
+            self.may_replace.add(file)
             self.edits.saved[name] = material
             self.screen.say(f"saved {file_name}")
 

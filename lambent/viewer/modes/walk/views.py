@@ -110,7 +110,4 @@ def _with(views: Views, kind: Kind, items: Iterable[Camera | CameraPath]) -> Vie
 
 def write_alone(file: Path, path: CameraPath) -> None:
     """A `views.json` of another name that holds one path, for a store that cannot take it."""
-    try:
-        write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")
-    except OSError as error:
-        raise UserError(f"cannot be written ({error.strerror})", file=file) from error
+    write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")

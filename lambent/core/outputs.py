@@ -1,0 +1,54 @@
+"""Which existing files a command may replace.
+
+What Lambent draws (pictures, films, plots, reports) carries a mark in its metadata, and the next run replaces it:
+nobody edits it by hand. Everything else that exists is replaced only where the user says so: documents and converted
+tables are edited, and other programs' files are not ours. A command's own input is never replaced unasked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.files import check_place
+
+MARK = "Lambent made this file and may replace it"
+_HEAD_BYTES, _TAIL_BYTES = 8 << 20, 1 << 16  # a film's mark stands behind the sizes of its frames, 8 bytes each
+
+
+def check_output(path: Path, suffixes: Iterable[str] = (), *, force: bool, inputs: Iterable[Path | str] = ()) -> None:
+    """`UserError` where a command cannot, or may not, write `path`; called before long work.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    suffixes : iterable of str
+        Endings that it may have; any where there are none.
+    force : bool
+        The user has said that it may be replaced, whatever it is.
+    inputs : iterable of path
+        Files that the command reads.
+    """
+    allowed = tuple(suffixes)
+    if allowed and path.suffix.lower() not in allowed:
+        raise UserError("unknown kind of file", file=path, got=path.suffix or None, expected=", ".join(allowed))
+    check_place(path)
+    if force or not path.exists():
+        return
+    if any(Path(other).exists() and path.samefile(other) for other in inputs):
+        raise UserError("output is the input", file=path, hint="write to another file, or add --force to replace it")
+    if not is_marked(path):
+        raise UserError("exists already", file=path, hint="write to another file, or add --force to replace it")
+
+
+def is_marked(path: Path) -> bool:
+    """Whether Lambent drew the file at `path`; False where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+            file.seek(max(file.tell(), path.stat().st_size - _TAIL_BYTES))
+            return MARK.encode("ascii") in head or MARK.encode("ascii") in file.read(_TAIL_BYTES)
+    except OSError:
+        return False

@@ -1,0 +1,125 @@
+"""Whether a store is what `store.contract` says: its arrays by name, and the names and numbers of its scene record.
+
+A bake writes no other; a damaged or foreign manifest may say anything. What is read is checked here, once, so that
+nothing that draws or traces has to ask.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.store.artefact import Array
+from lambent.store.store import MANIFEST, Store
+
+SceneRecord = Any  # of `store.contract`, which imports this module
+ANY = None
+CUBE = (6, ANY, ANY)
+_ARRAYS: tuple[tuple[str, tuple[int | None, ...], str], ...] = (  # name, shape, kinds of numbers
+    ("geometry/positions", (ANY, 3), "f"), ("geometry/normals", (ANY, 3), "f"), ("geometry/tangents", (ANY, 3), "f"),
+    ("geometry/uv", (ANY, 2), "f"), ("geometry/uv2", (ANY, 2), "f"), ("geometry/faces", (ANY, 3), "iu"),
+    ("light_map/irradiance", (ANY, ANY, 3), "f"), ("light_map/irradiance_back", (ANY, ANY, 3), "f"),
+    ("light_map/noise", (ANY, ANY), "f"), ("light_map/noise_back", (ANY, ANY), "f"),
+    ("light_map/lean", (ANY, ANY, 3), "f"), ("environment/radiance", (*CUBE, 3), "f"),
+    ("probe/*/radiance", (*CUBE, 3), "f"), ("probe/*/distance", CUBE, "f"), ("probe/*/planes", (ANY, 4), "f"),
+    ("texture/*", (ANY, ANY, ANY), "f"),
+)  # fmt: skip
+_PER_VERTEX = ("positions", "normals", "tangents", "uv", "uv2")
+
+
+def check_record(store: Store, record: SceneRecord) -> None:
+    """`UserError` where arrays have another shape than their names say, or the record contradicts itself."""
+    for artefact in store.artefacts():
+        for pattern, wanted, kinds in _ARRAYS:
+            if fnmatchcase(artefact.name, pattern):
+                shape = artefact.shape
+                fits = len(shape) == len(wanted) and all(w in (ANY, n) for w, n in zip(wanted, shape, strict=True))
+                cube = wanted[:3] != CUBE or (len(shape) > 2 and shape[1] == shape[2] > 0)
+                if not (fits and cube and np.dtype(artefact.dtype).kind in kinds):
+                    got, expected = f"{shape} {artefact.dtype}", " x ".join("n" if w is ANY else str(w) for w in wanted)
+                    raise _broken(store, artefact.name, "array of another shape", got, expected)
+    _check_names(store, record)
+    for field, camera in _cameras(record):
+        if not is_usable(camera):
+            raise _broken(store, field, "a camera is not finite, or sees no angle")
+    numbers = [record.exposure_ev, *_flat(record.bounds)]
+    numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds))]
+    numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
+    numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]
+    numbers += [x for t in record.textures.values() for x in (t.cutoff, *_flat(_flat(t.parts.values())))]
+    if not all(map(math.isfinite, numbers)):
+        raise _broken(store, "scene", "a number of the scene record is not finite")
+
+
+def _check_names(store: Store, record: SceneRecord) -> None:
+    """Whether what names something names what is there, and each range of faces lies within them."""
+    objects = {o.name: o for o in record.objects}
+    if len(objects) != len(record.objects):
+        raise _broken(store, "objects", "two objects have one name")
+    faces = store.artefact("geometry/faces").shape[0] if "geometry/faces" in store else math.inf
+    for o in record.objects:
+        if o.material not in record.materials:
+            raise _broken(store, f"objects.{o.name}", "no such material", o.material)
+        if o.first_face < 0 or o.face_count < 0 or o.first_face + o.face_count > faces:
+            got = f"{o.face_count} from {o.first_face}"
+            raise _broken(store, f"objects.{o.name}", "no such faces", got, f"within {faces}")
+    for material in record.textures:
+        if material not in record.materials:
+            raise _broken(store, "textures", "no such material", material)
+    for number, reflector in enumerate(record.reflectors):
+        for part in reflector.parts:
+            field = f"reflectors.{number}"
+            if part.object not in objects:
+                raise _broken(store, field, "no such object", part.object)
+            if part.faces and not 0 <= min(part.faces) <= max(part.faces) < objects[part.object].face_count:
+                raise _broken(store, field, "no such faces", max(part.faces))
+
+
+def read_geometry(store: Store) -> dict[str, Array]:
+    """The arrays geometry/* by their last name; `UserError` where they do not fit together."""
+    arrays = {name: store.read(f"geometry/{name}") for name in (*_PER_VERTEX, "faces")}
+    count = len(arrays["positions"])
+    if any(len(arrays[name]) != count for name in _PER_VERTEX):
+        got = ", ".join(f"{len(arrays[name])} {name}" for name in _PER_VERTEX)
+        raise _broken(store, "geometry", "lengths differ", got)
+    if arrays["faces"].size and not 0 <= int(arrays["faces"].min()) <= int(arrays["faces"].max()) < count:
+        raise _broken(store, "geometry/faces", "no such vertex", arrays["faces"].max(), f"below {count}")
+    if not np.isfinite(arrays["positions"]).all():
+        raise _broken(store, "geometry/positions", "not all are finite")
+    return arrays
+
+
+def numbers_of(store: Store, artefact: str, name: str, count: int) -> tuple[float, ...]:
+    """So many finite numbers from the notes of an array."""
+    found = store.artefact(artefact).meta.get(name)
+    listed = found if isinstance(found, list) else []
+    numbers = tuple(float(x) for x in listed if isinstance(x, int | float) and math.isfinite(x))
+    if not len(numbers) == len(listed) == count:
+        raise _broken(store, f"{artefact}: {name}", "not a list of numbers", found, f"{count} finite numbers")
+    return numbers
+
+
+def is_usable(camera: Camera) -> bool:
+    """Whether a camera is finite and sees something."""
+    numbers = (*camera.position, *camera.target, *camera.up, camera.fov_y_deg)
+    return all(map(math.isfinite, numbers)) and 0 < camera.fov_y_deg < 180
+
+
+def _cameras(record: SceneRecord) -> Iterable[tuple[str, Camera]]:
+    yield from ((f"cameras.{c.name}", c) for c in record.cameras)
+    yield from ((f"paths.{path.name}", c) for path in record.paths for c in path.keys)
+
+
+def _flat(rows: Iterable[Iterable[Any]]) -> list[Any]:
+    return [value for row in rows for value in row]
+
+
+def _broken(store: Store, field: str, fault: str, got: object = None, expected: object = None) -> UserError:
+    file = store.folder / MANIFEST
+    return UserError(f"broken store: {fault}", file=file, field=field, got=got, expected=expected, hint="bake again")

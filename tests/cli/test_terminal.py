@@ -1,0 +1,152 @@
+"""What reaches a terminal: no control characters, no endless lines, no traceback of an interruption; and --force."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.cli.console import progress_bar, table
+from lambent.core.errors import UserError
+from lambent.core.images import write_shown
+from lambent.core.plain import printable
+from lambent.materials.document import Lobe, Material
+from lambent.materials.measured.gonio_text import write_gonio
+from lambent.materials.measured.synthetic import Setup, synthesise
+
+ESCAPES = "\x1b]0;title\x07\x1b[31mred\u202e\r"
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and file names are of POSIX")
+
+
+@pytest.fixture
+def material(tmp_path: Path) -> Path:
+    Material(name="brass", kd=0.1, lobes=(Lobe(k=3.0, mx=0.1, my=0.2, r0=0.9),)).save(tmp_path / "brass.json")
+    return tmp_path / "brass.json"
+
+
+def test_printable():
+    assert printable("é 漢 \N{GRINNING FACE} a b") == "é 漢 \N{GRINNING FACE} a b"
+    assert printable("\x1b[31m\r\n\t\x9b\u202e\u2028\udcff\0") == r"\x1b[31m\r\n\t\x9b\u202e\u2028\udcff\x00"
+
+
+@posix
+def test_names_do_not_command_the_terminal(lambent, refused, tmp_path, caplog):
+    file = tmp_path / f"{ESCAPES}.json"
+    Material(name=ESCAPES, kd=0.1).save(file)
+    outcome = lambent("inspect", file)
+    assert outcome.code == 0 and r"\x1b]0;title\x07" in outcome.out
+    said = [
+        outcome.out,
+        refused("fit", file),
+        refused("inspect", f"{file}x"),
+        refused(f"a{ESCAPES}"),
+        table([(ESCAPES,)]),
+    ]
+    said.append(lambent("inspect", file, "--json").out)
+    assert json.loads(said[-1])["name"] == ESCAPES
+    lambent("convert", file, tmp_path / "a.mtlx")
+    logging.getLogger("lambent").warning("%s", ESCAPES)
+    with progress_bar() as progress:
+        progress(1, 2, "[/nothing] is markup")
+    assert not any(set(text) & set("\x1b\x07\r\u202e") for text in said)
+
+
+@posix
+def test_file_names_that_are_no_text(lambent, material, tmp_path):
+    file = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\x1b.json")
+    Path(file).write_bytes(material.read_bytes())
+    for arguments in (["inspect", file], ["check", file], ["convert", file, f"{file}.mtlx"], ["inspect", f"{file}x"]):
+        outcome = lambent(*arguments)
+        assert outcome.code in (0, 1, 2) and "\x1b" not in outcome.out + outcome.err
+    specimen = synthesise(Material(name="m", kd=0.3), Setup((0.0, 30.0), step_deg=30, fine_deg=30, noise=0, floor=0))
+    write_gonio(Path(f"{file}.txt"), specimen)
+    outcome = lambent("fit", f"{file}.txt", "-o", tmp_path / "fitted.json")
+    assert outcome.code in (0, 2) and "Traceback" not in outcome.err
+
+
+def test_long_errors_are_cut_and_their_hints_are_not():
+    long = "x" * 10**6
+    error = UserError(long, file=long + "end.txt", field=long, got=long, expected=long, hint="h" * 2000)
+    assert len(str(error)) < 6000 and str(error).endswith("h" * 2000)
+    assert "end.txt: " in str(error)
+    assert "more digits" in str(UserError("a", got=10**5000))
+
+
+def test_a_demo_takes_no_folder_of_others(refused, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    for place in (tmp_path, tmp_path / "notes.txt"):
+        assert "is no folder of a demo" in refused("demo", "--headless", "--out", place)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_what_exists_is_replaced_by_force_alone(lambent, refused, material, tmp_path):
+    before = material.read_bytes()
+    (tmp_path / "mine").write_text("mine")
+    write_shown(tmp_path / "a.png", np.zeros((8, 8, 3), np.uint8))
+    write_gonio(tmp_path / "m.txt", synthesise(Material(name="m", kd=0.3), Setup((0.0,), step_deg=30, fine_deg=30)))
+    for ending in ("mtlx", "json", "png", "html"):
+        (tmp_path / f"mine.{ending}").write_text("mine")
+    (tmp_path / "mine_albedo.png").write_text("mine")
+    for arguments in (
+        ["convert", material, tmp_path / "mine.mtlx"],
+        ["check", material, "--normalise", "-o", tmp_path / "mine.json"],
+        ["inspect", material, "--plot", tmp_path / "mine.png"],
+        ["compare", tmp_path / "a.png", tmp_path / "a.png", "-o", tmp_path / "mine.png"],
+        ["fit", tmp_path / "m.txt", "-o", tmp_path / "mine.json"],
+        ["fit", tmp_path / "m.txt", "--report", tmp_path / "mine.html"],
+        ["fit", tmp_path / "m.txt", "--plot", tmp_path / "mine.png"],
+        ["render", tmp_path / "a.store", "-o", tmp_path / "mine.png"],
+    ):
+        assert "exists already; write to another file, or add --force" in refused(*arguments)
+    assert all(path.read_text() == "mine" for path in tmp_path.glob("mine*"))
+    assert "output is the input" in refused("check", material, "--normalise", "-o", material)
+    assert "output is the input" in refused("compare", tmp_path / "a.png", tmp_path / "a.png", "-o", tmp_path / "a.png")
+    assert material.read_bytes() == before
+    assert lambent("check", material, "--normalise", "-o", material, "--force").code == 0
+    assert material.read_bytes() != before
+    assert [lambent("inspect", material, "--plot", tmp_path / "plot.png").code for _ in "12"] == [0, 0]
+
+
+INTERRUPTED_IMPORT = """
+import signal, sys
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r} and not done:
+            done.append(name)
+            signal.raise_signal(signal.SIGINT)
+done = []
+sys.meta_path.insert(0, Interrupt())
+{before}
+from lambent.cli.main import main
+sys.argv = ["lambent", "check", "lambert"]
+main()
+"""
+AT_THE_END_OF_AN_OBJECT = """
+class Late:
+    def __del__(self):
+        raise KeyboardInterrupt
+import time
+import lambent.materials.check as module
+was = module.check
+def check(*arguments, **options):
+    Late()
+    time.sleep(1)
+    return was(*arguments, **options)
+module.check = check
+"""
+
+
+@posix
+@pytest.mark.parametrize("name", ["typer", "lambent.cli.fit", "lambent.materials.check", "numpy", "scipy.special", ""])
+def test_ctrl_c_is_clean_while_libraries_are_imported(name):
+    """Among the modules: those of the command line itself, and those of a command that has begun."""
+    program = INTERRUPTED_IMPORT.format(name=name, before="" if name else AT_THE_END_OF_AN_OBJECT)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    said = "lambent: interrupted; what was finished is kept\n"
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", said)

@@ -1,0 +1,328 @@
+"""A small store, damaged in thousands of ways: whoever reads it gets what is there, or one `UserError`."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import random
+import shutil
+import signal
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numcodecs import Zstd
+
+from lambent.cli.inspect import inspect_store
+from lambent.core.camera import Camera, CameraPath
+from lambent.core.errors import UserError
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import read_baked
+from lambent.scenes.floor_plan import FloorPlan
+from lambent.scenes.scene import MaterialTextures, Texture
+from lambent.store.chunk_files import content_size
+from lambent.store.contract import (
+    ObjectRecord,
+    ReflectorPart,
+    ReflectorRecord,
+    SceneRecord,
+    baked_views,
+    scene_record,
+    view_artefact_name,
+    view_meta,
+    write_scene_record,
+)  # fmt: skip
+from lambent.store.plans import plan_of, plan_record
+from lambent.store.store import Store
+from lambent.store.textures import texture_records, write_textures
+from lambent.store.views import Views, change_views, read_views, with_views
+
+MUTATIONS = int(os.environ.get("LAMBENT_MUTATIONS", "40"))
+ALARM_S = 10
+FRONT = Camera("front", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
+HOSTILE = (
+    None, True, -1, 0, 1, 7, 2**31, 2**63, -(2**64), 10**400, 1.5, -0.0, 1e308, float("nan"), float("inf"), "", "x",
+    "../../x", "/etc/passwd", "\0", "a" * 5000, "\ud800", "\x1b[31m", [], {}, [[]], [0], {"x": 1}, [1e9, 1e9, 1e9],
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store with every kind of array and document, one of them unfinished, one rewritten."""
+    folder = tmp_path_factory.mktemp("sound") / "store"
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], np.float32)
+    cube = np.ones((6, 4, 4, 3), np.float16)
+    arrays: dict[str, tuple[Any, dict[str, Any]]] = {
+        "geometry/positions": (corners, {}),
+        "geometry/normals": (np.tile(np.float32([0, 1, 0]), (4, 1)), {}),
+        "geometry/tangents": (np.tile(np.float32([1, 0, 0]), (4, 1)), {}),
+        "geometry/uv": (corners[:, ::2], {}),
+        "geometry/uv2": (corners[:, ::2], {"light_map_size": [4, 4]}),
+        "geometry/faces": (np.array([[0, 1, 2], [0, 2, 3]], np.uint32), {}),
+        "light_map/irradiance": (np.ones((4, 4, 3), np.float16), {"noise": 0.1}),
+        "light_map/noise": (np.ones((4, 4), np.float16), {}),
+        "environment/radiance": (cube, {}),
+        "probe/floor/radiance": (cube, {"centre": [0.0, 1.0, 0.0], "seen_irradiance": [1.0] * 9}),
+        "probe/floor/distance": (cube[..., 0].astype(np.float32), {}),
+        "probe/floor/planes": (np.float32([[0, 1, 0, 0]]), {}),
+        view_artefact_name(FRONT, 0, 0, "vectors", "x"): (np.ones((2, 2), np.float32), view_meta(FRONT)),
+    }
+    textures = {"wood": MaterialTextures(diffuse=Texture(np.ones((2, 2, 3), np.float16)))}
+    plan = FloorPlan(*np.eye(3), 0.5, np.zeros((3, 4), np.int8))
+    floor = ObjectRecord(name="floor", material="wood", first_face=0, face_count=2, bounds=((0, 0, 0), (1, 0, 1)),
+                         probe=True)  # fmt: skip
+    reflector = ReflectorRecord(plane=(0, 1, 0, 0), outline=((0, 0, 0), (1, 0, 0), (1, 0, 1)), plan=plan_record(plan),
+                                parts=(ReflectorPart(object="floor", faces=(0, 1), area_m2=1.0),))  # fmt: skip
+    with Store.create(folder, {"room.toml": "0" * 64}) as store:
+        for name, (array, meta) in arrays.items():
+            store.put(name, name.split("/")[0], array, key="k", meta=meta)
+        write_textures(store, textures)
+        half = store.begin("light_map/raw", "raw", (4, 4), (2, 4), "float32", key="k")
+        half.write((0, 0), np.float32(1))
+        half.write((0, 0), np.float32(2))
+        store.set_document("timings", {"light_map": 1.5})
+        store.set_document("source", "builtin:box")
+        record = SceneRecord(
+            name="room", objects=(floor,), cameras=(FRONT,), paths=(CameraPath("walk", (FRONT, FRONT)),),
+            materials={"wood": Material(name="wood", kd=0.5, lobes=(Lobe(mx=0.1, my=0.2),))}, reflectors=(reflector,),
+            bounds=((0, 0, 0), (1, 0, 1)), textures=texture_records(textures),
+        )  # fmt: skip
+        write_scene_record(store, record)
+        half.write((1, 0), np.float32(3))  # in the journal alone
+    change_views(folder, lambda _: Views(cameras=(FRONT,), paths=(CameraPath("tour", (FRONT,) * 2, 2.0, (0.0, 2.0)),)))
+    read_all(folder)
+    return folder
+
+
+def read_all(folder: Path) -> None:
+    """Everything that the window, the renderer and `lambent inspect` read of a store."""
+    store = Store.open(folder)
+    for artefact in store.artefacts():
+        store.read_partial(artefact.name)
+    baked_views(store)
+    record = with_views(scene_record(store), read_views(folder))
+    for reflector in record.reflectors:
+        if reflector.plan is not None:
+            plan_of(reflector.plan)
+    read_baked(store)
+    json.dumps(inspect_store(str(folder)), default=str)
+
+
+@contextmanager
+def alarm() -> Iterator[None]:
+    """Fails a test that hangs, where the system has alarms."""
+
+    def ring(*_: object) -> None:
+        raise TimeoutError(f"no answer within {ALARM_S} s")
+
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.alarm(ALARM_S)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def refused_or_read(folder: Path, what: str) -> bool:
+    """Whether the store is refused; fails, and says by `what`, where something other than a `UserError` is raised."""
+    try:
+        with alarm():
+            read_all(folder)
+    except UserError as error:
+        assert len(str(error)) < 4000
+        return True
+    except Exception as error:
+        raise AssertionError(f"{what}: {type(error).__name__}: {str(error)[:300]}") from error
+    return False
+
+
+def flipped(content: bytes, chance: random.Random) -> bytes:
+    """Bits, bytes or a stretch of a file changed, or its end cut off."""
+    data, way = bytearray(content), chance.randrange(5)
+    at = chance.randrange(max(1, len(data)))
+    if way == 0:
+        return bytes(data[:at])
+    if way == 1:
+        data[at : at + chance.randrange(1, 40)] = chance.randbytes(chance.randrange(40))
+    for _ in range(1 if way < 4 else 5):
+        if data:
+            data[chance.randrange(len(data))] ^= 1 << chance.randrange(8) if way < 3 else chance.randrange(1, 256)
+    return bytes(data)
+
+
+def changed(value: Any, chance: random.Random) -> Any:
+    """A JSON value with one field of another kind, gone, doubled or renamed."""
+    root: Any = {"": copy.deepcopy(value)}
+    place, key = root, ""
+    while isinstance(place[key], dict | list) and len(place[key]) and chance.random() < 0.9:
+        place = place[key]
+        key = chance.choice(list(place) if isinstance(place, dict) else range(len(place)))
+    way = chance.randrange(8)
+    if way == 0 and isinstance(place, dict):
+        place[str(chance.choice(HOSTILE))] = place.pop(key)
+    elif way == 1:
+        del place[key]
+    elif way == 2 and isinstance(place, list):
+        place.append(copy.deepcopy(place[key]))
+    else:
+        place[key] = copy.deepcopy(chance.choice(HOSTILE))
+    return root.get("")
+
+
+def mutated(folder: Path, chance: random.Random) -> tuple[Path, bytes]:
+    """Change one file of a store; returns the file and its content before."""
+    file = chance.choice(sorted(path for path in folder.rglob("*") if path.is_file() and path.name != ".writer.lock"))
+    if chance.random() < 0.6:
+        file = folder / chance.choice(["manifest.json"] * 4 + ["views.json"])
+    content = file.read_bytes()
+    if file.suffix == ".json" and chance.random() < 0.7:
+        new = json.dumps(changed(json.loads(content), chance)).encode()
+    else:
+        new = flipped(content, chance)
+    file.write_bytes(new)
+    return file, content
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_only_user_errors(sound: Path, tmp_path: Path, seed: int) -> None:
+    """More of them: LAMBENT_MUTATIONS=5000, per seed."""
+    folder, chance, refused = tmp_path / "store", random.Random(seed), 0
+    shutil.copytree(sound, folder)
+    for number in range(MUTATIONS):
+        file, content = mutated(folder, chance)
+        refused += refused_or_read(folder, f"seed {seed}, mutation {number}, {file.relative_to(folder)}")
+        file.write_bytes(content)
+    assert refused > MUTATIONS / 4, "most damage is noticed"
+
+
+ARRAYS = ("artefacts",)
+SCENE = ("documents", "scene")
+BIG = 15 << 30
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "word"),
+    [
+        ((*ARRAYS, "light_map/raw", "done"), {"7.0": 1}, "there is no chunk 7.0"),
+        ((*ARRAYS, "light_map/raw", "done"), {"00.0": 1}, "there is no chunk 00.0"),
+        ((*ARRAYS, "light_map/raw", "done"), {"..": 1}, "there is no chunk"),
+        ((*ARRAYS, "light_map/raw", "done"), {"0.0": [1, -1]}, "not a count"),
+        ((*ARRAYS, "light_map/raw", "shape"), [4.0, 4], "not a count"),
+        ((*ARRAYS, "light_map/raw", "dtype"), "O", "no array of numbers"),
+        ((*ARRAYS, "light_map/raw", "dtype"), "S1000000000", "no array of numbers"),
+        ((*ARRAYS, "light_map/raw", "dtype"), [["a", "f4"]], "are texts"),
+        ((*ARRAYS, "light_map/raw", "chunks"), [BIG, BIG], "impossible chunks"),
+        ((*ARRAYS, "light_map/raw", "chunks"), [0, 4], "impossible chunks"),
+        ((*ARRAYS, "light_map/raw", "shape"), [1 << 22, 4], "too many chunks"),
+        ((*ARRAYS, "geometry/uv", "shape"), [3, 2], "chunk cannot be read|lengths differ|chunk"),
+        ((*ARRAYS, "geometry/faces", "dtype"), "float32", "array of another shape"),
+        ((*ARRAYS, "probe/floor/radiance", "meta"), {}, "centre"),
+        ((*ARRAYS, "probe/floor/radiance", "meta", "centre"), [0, float("nan"), 0], "3 finite numbers"),
+        ((*ARRAYS, "probe/floor/radiance", "meta", "seen_irradiance"), [1] * 8, "9 finite numbers"),
+        ((*SCENE, "objects", 0, "material"), "woof", "no such material; found woof"),
+        ((*SCENE, "objects", 0, "face_count"), 3, "no such faces"),
+        ((*SCENE, "objects", 0, "first_face"), -1, "no such faces"),
+        ((*SCENE, "reflectors", 0, "parts", 0, "object"), "flood", "no such object; found flood"),
+        ((*SCENE, "reflectors", 0, "parts", 0, "faces"), [2], "no such faces"),
+        ((*SCENE, "cameras", 0, "fov_y_deg"), float("nan"), "sees no angle"),
+        ((*SCENE, "textures"), {"woof": {"parts": {}}}, "no such material"),
+        ((*SCENE, "exposure_ev"), float("inf"), "not finite"),
+        ((*SCENE, "materials", "wood", "name"), "\ud800", "manifest"),
+        ((*SCENE, "materials", "wood", "kd"), [10**400] * 3, "manifest"),
+        ((*SCENE,), "a text", "manifest"),
+        (("documents",), [], "no scene record"),
+        (("documents",), 3, "manifest is damaged"),
+        (("inputs",), 3, "manifest is damaged"),
+    ],
+)
+def test_what_is_wrong_is_named(sound: Path, tmp_path: Path, place: tuple[Any, ...], value: Any, word: str) -> None:
+    folder = tmp_path / "store"
+    shutil.copytree(sound, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    parent = manifest
+    for key in place[:-1]:
+        parent = parent[key]
+    parent[place[-1]] = value
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(UserError, match=word) as caught:
+        read_all(folder)
+    assert str(folder) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["../../x", "/etc", "", ".", "a/../geometry/uv", "a/..", "\0", "x" * 5000])
+def test_names_that_are_paths(sound: Path, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "store"
+    shutil.copytree(sound, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["artefacts"][name] = manifest["artefacts"].pop("light_map/raw")
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(UserError):
+        read_all(folder)
+
+
+def test_a_number_of_5000_digits(sound: Path, tmp_path: Path) -> None:
+    for file in ("manifest.json", "views.json"):
+        folder = tmp_path / file / "store"
+        shutil.copytree(sound, folder)
+        text = (folder / file).read_text()
+        (folder / file).write_text(text.replace('"version": ', f'"version": {"9" * 5000}', 1))
+        with pytest.raises(UserError, match=file):
+            read_all(folder)
+
+
+@pytest.mark.parametrize("chunk", [[1 << 15, 1 << 15, 3], [1 << 10, 1 << 10, 3]])
+def test_an_array_of_15_gb_without_files_is_refused_before_it_is_made(tmp_path: Path, chunk: list[int]) -> None:
+    Store.create(tmp_path / "s", {}).close()
+    manifest = json.loads((tmp_path / "s/manifest.json").read_text())
+    shape = [1 << 15, (BIG >> 15) // 6, 3]
+    counts = [-(-size // step) for size, step in zip(shape, chunk, strict=True)]
+    done = {f"{i}.{j}.0": 0 for i in range(counts[0]) for j in range(counts[1])}
+    manifest["artefacts"]["light_map/irradiance"] = {
+        "kind": "light_map", "shape": shape, "chunks": chunk, "dtype": "float16", "key": "k", "meta": {}, "done": done,
+        "complete": True,
+    }  # fmt: skip
+    (tmp_path / "s/manifest.json").write_text(json.dumps(manifest))
+    store = Store.open(tmp_path / "s")
+    with alarm(), pytest.raises(UserError, match=r"next to nothing in its files|does not fit into memory"):
+        store.read("light_map/irradiance")
+
+
+def test_a_small_frame_that_claims_much_is_refused(tmp_path: Path) -> None:
+    """The size that a compressed chunk claims is compared before it is unpacked."""
+    with Store.create(tmp_path / "s", {}) as store:
+        store.put("a", "x", np.ones((4, 4), np.float32), key="k")
+    bomb = bytes(Zstd().encode(np.ones(1 << 22, np.uint8)))
+    assert content_size(bomb) == 1 << 22 and content_size(bytes(Zstd().encode(b"abc"))) == 3
+    assert (
+        content_size(bytes(Zstd().encode(bytes(300)))) == 300 and content_size(b"") == content_size(b"abcdefgh") == -1
+    )
+    (tmp_path / "s/a/c/0/0").write_bytes(bomb)
+    manifest = json.loads((tmp_path / "s/manifest.json").read_text())
+    manifest["artefacts"]["a"]["done"]["0.0"] = zlib.crc32(bomb)
+    (tmp_path / "s/manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(UserError, match=r"chunk cannot be read .it holds 4194304 bytes, not 64"):
+        Store.open(tmp_path / "s").read("a")
+
+
+@pytest.mark.skipif(not hasattr(os, "symlink"), reason="links are of POSIX")
+def test_a_chunk_that_is_a_link_out_of_the_store(sound: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "store"
+    shutil.copytree(sound, folder)
+    (tmp_path / "mine").write_text("mine")
+    for name in ("c/0/0.1", "journal"):
+        path = folder / "light_map/raw" / name
+        path.unlink(missing_ok=True)
+        path.symlink_to(tmp_path / "mine")
+        with pytest.raises(UserError, match="leaves its folder"), Store.create(folder, {}) as store:
+            store.begin("light_map/raw", "raw", (4, 4), (2, 4), "float32", key="k").write((0, 0), np.float32(1))
+        path.unlink()
+    assert (tmp_path / "mine").read_text() == "mine"
