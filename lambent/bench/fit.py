@@ -1,9 +1,10 @@
 """`fit`: accuracy and speed of fits to measured tables.
 
 Without inputs it fits tables synthesised from the thesis's fitted materials (tables 3.1 and 3.2), whose answers are
-known. With inputs it fits the caller's measured files, and each fit is judged by the metric it was fitted under, as a
-share of the best Lambertian surface's error; published parameters (`--against FILE.fit`) are judged on the same tuples.
-Files with readings below zero are made as well, and their fits compared with those of their clean versions.
+known, and retro-reflective tapes, with a retro lobe and without. With inputs it fits the caller's measured files, and
+each fit is judged by the metric it was fitted under, as a share of the best Lambertian surface's error; published
+parameters (`--against FILE.fit`) are judged on the same tuples. Files with readings below zero are made as well, and
+their fits compared with those of their clean versions.
 Both methods fit one lobe in turn, five times; the other rows are least squares alone.
 """
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from lambent.bench.below_zero import DARK, spoilt_tables
 from lambent.bench.known_answers import KNOWN, setup_of
+from lambent.bench.retro_tapes import TAPES, Tape
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled, Progress, silent
@@ -35,6 +37,7 @@ from lambent.materials.models.published import Published, read_fits
 NAME = "fit"
 ALBEDO_THETA_DEG = 30.0
 KNOWN_METRIC = "l1"  # the thesis's
+RETRO_METHODS = ("gradient, no retro lobe", "gradient, retro lobe")
 METRICS = ("cuberoot", "log", "l2_ngan")
 MODELS = (("beckmann", 1), ("beckmann", 2), ("beckmann", 3), ("ggx", 1), ("ggx", 2))
 
@@ -52,6 +55,7 @@ class Effort:
     runs: int = 5
     known: tuple[Material, ...] = tuple(KNOWN.values())
     below_zero: bool = True  # whether tables with such readings are fitted
+    tapes: tuple[Tape, ...] = TAPES
 
 
 FULL, QUICK = Effort(), Effort(6_000, 60_000, ("gradient",), 1)
@@ -81,9 +85,11 @@ def run(
         progress(done, len(sources), case.name)
         rows += _known_rows(case, effort) if case.truth is not None else _measured_rows(case, effort)
         rows += _published_rows(case, published)
-    if effort.below_zero and not inputs:
-        progress(len(sources), len(sources), "readings below zero")
-        rows += _below_zero_rows(effort)
+    if not inputs:
+        rows += [row for tape in effort.tapes for row in _tape_rows(tape, effort)]
+        if effort.below_zero:
+            progress(len(sources), len(sources), "readings below zero")
+            rows += _below_zero_rows(effort)
     progress(len(sources), len(sources), "done")
     return {"rows": rows, "summary": _summary(rows)}
 
@@ -103,6 +109,14 @@ def _known_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
         result = _fitted(case, method, KNOWN_METRIC, "beckmann", len(case.truth.reflection_lobes))
         compared = {"parameters": _compared(result.material, case.truth)}
         yield _row(case, method, [result]) | {"error_of_truth": truth[KNOWN_METRIC]} | compared
+
+
+def _tape_rows(tape: Tape, effort: Effort) -> Iterator[dict[str, Any]]:
+    """A retro-reflector fitted without a retro lobe, then with one."""
+    table = tape.measured()
+    case = Case(tape.name, table, table.samples(effort.known_tuples))
+    for retro, method in enumerate(RETRO_METHODS):
+        yield _row(case, method, [fit(case.samples, metric=METRICS[0], retro=bool(retro))])
 
 
 def _measured_rows(case: Case, effort: Effort) -> Iterator[dict[str, Any]]:
@@ -217,6 +231,9 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         parameters = [p for row in known for p in row["parameters"]]
         summary["largest_deviation"] = max(abs((p["found"] or 0.0) / p["true"] - 1) for p in parameters)
         summary["l1_over_truth"] = max(row["error"]["l1"] / row["error_of_truth"] for row in known)
+    without, with_it = ([row["share"] for row in rows if row["method"] == method] for method in RETRO_METHODS)
+    if without:
+        summary["retro_over_no_retro_max"] = max(a / b for a, b in zip(with_it, without, strict=True))
     for metric in METRICS:
         for distribution, lobes in MODELS:
             of_model = {"method": "gradient", "metric": metric, "distribution": distribution, "lobes": lobes}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, metric_errors, progress_bar, show, table, words
+from lambent.cli.console import Between, Force, Json, metric_errors, progress_bar, show, table, words
 from lambent.core.errors import UserError, did_you_mean
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def command(
         bool, typer.Option("--normalise", help="Write a document's energy-safe version instead: alpha lowered, then k.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", help="With --normalise: document to write (.json).")] = None,
+    reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -53,7 +54,7 @@ def command(
     if normalise or output is not None:
         _normalise(subject, values or [], normalise, output, seed, force, json)
         return
-    found = _subject(subject, values or [])
+    found = _subject(subject, values or [], reconstruction)
     with progress_bar() as progress:
         report: CheckReport | TableReport
         if isinstance(found, Material | Model):
@@ -92,7 +93,7 @@ def _normalise(
     show(facts, describe_normalisation(done, output), json)
 
 
-def _subject(name: str, values: list[str]) -> Material | MeasuredTable | Model:
+def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> Material | MeasuredTable | Model:
     """The material or table of a file, or the model of that name; a file goes before a model."""
     from lambent.cli.convert import subject_of
     from lambent.materials.models import models
@@ -100,7 +101,7 @@ def _subject(name: str, values: list[str]) -> Material | MeasuredTable | Model:
     if Path(name).exists():
         if values:
             raise UserError("only models take --set", file=name, got=values[0])
-        return subject_of(Path(name))
+        return subject_of(Path(name), reconstruction)
     found = models()
     if name not in found:
         expected = f"a file, or a model: {', '.join(found)}"

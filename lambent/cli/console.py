@@ -7,7 +7,7 @@ import logging
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -16,6 +16,10 @@ from lambent.core.errors import UserError
 from lambent.core.plain import plain, printable
 from lambent.core.progress import Progress
 
+Between = Annotated[
+    Literal["auto", "half_vector", "back_vector", "quadrilinear"],
+    typer.Option("--reconstruction", help="Between a gonio table's incident directions; auto measures which is best."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist, even the input.")]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, metric_errors, progress_bar, show
+from lambent.cli.console import Between, Force, Json, metric_errors, progress_bar, show
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ def command(
     file: Annotated[Path, typer.Argument(help="Measured table in any format, or material document (.json).")],
     output: Annotated[Path, typer.Argument(help="File to write; its ending says the format.")],
     as_: Annotated[str | None, typer.Option("--as", help="Format, where the ending does not say it.")] = None,
+    reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -32,7 +33,7 @@ def command(
 
     writer = writer_for(output, as_)
     check_output(output, force=force, inputs=[file])
-    subject = subject_of(file)
+    subject = subject_of(file, reconstruction)
     _check_kind(subject, writer, file)
     with progress_bar() as progress:
         cost = writer.write(subject, output, progress)
@@ -43,12 +44,16 @@ def command(
     show(facts, describe(output, writer, cost), json)
 
 
-def subject_of(file: Path) -> Subject:
+def subject_of(file: Path, reconstruction: Between = "auto") -> Subject:
     """The material of a JSON document, or the table of a measured file."""
     from lambent.materials import measured
     from lambent.materials.document import load_material
 
-    return load_material(file) if is_document(head_of(file, 64)) else measured.load(file)
+    if not is_document(head_of(file, 64)):
+        return measured.load(file, reconstruction)
+    if reconstruction != "auto":
+        raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
+    return load_material(file)
 
 
 def head_of(file: Path, size: int) -> bytes:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from lambent.cli.console import Force, Json, progress_bar, say, show, table, words
+from lambent.cli.console import Between, Force, Json, progress_bar, say, show, table, words
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -34,6 +34,10 @@ def command(
     keep_albedo: Annotated[
         bool, typer.Option("--keep-albedo", help="Hold the albedo over the angle of incidence to the table's.")
     ] = False,
+    retro: Annotated[
+        bool | None,
+        typer.Option("--retro/--no-retro", help="A lobe about the light; by default where the table shows one."),
+    ] = None,
     gain: Annotated[float, typer.Option(help="Share of the error that one more lobe has to take off (auto).")] = 0.05,
     grid_n: Annotated[int, typer.Option(min=3, max=30, help="Values per parameter and level of the grid.")] = 9,
     grid_levels: Annotated[int, typer.Option(min=1, max=12, help="Levels of the grid.")] = 5,
@@ -50,6 +54,7 @@ def command(
     environment: Annotated[
         Path | None, typer.Option(help="Lat-long image (.hdr, .exr) around the report's previews; else daylight.")
     ] = None,
+    reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -74,13 +79,13 @@ def command(
     if environment is not None:
         _check_environment(environment, report)
     count, fixed, ranges = _count(lobes), parse_fix(fix or ()), parse_ranges(range_ or ())
-    measurement = measured.load(file)
+    measurement = measured.load(file, reconstruction)
     samples = measurement.samples()
     with progress_bar() as progress:
         result = fit(
-            samples, lobes=count, method=method, metric=metric, distribution=distribution, coupled=coupled, gain=gain,
-            schedule=Schedule(grid_n, grid_levels), fix=fixed, ranges=ranges, seed=seed, source=file, progress=progress,
-            whole=measurement, keep_albedo=keep_albedo,
+            samples, lobes=count, method=method, metric=metric, distribution=distribution, coupled=coupled,
+            retro=retro, gain=gain, schedule=Schedule(grid_n, grid_levels), fix=fixed, ranges=ranges, seed=seed,
+            source=file, progress=progress, whole=measurement, keep_albedo=keep_albedo,
         )  # fmt: skip
     if output is not None:
         result.material.save(output)
@@ -94,7 +99,7 @@ def command(
         with progress_bar() as bar:
             page = fit_report.report(measurement, samples, result, source=file, environment=around, progress=bar)
         write_text(report, page)
-    for warning in (*samples.info.notes, *below_zero(samples, METRICS[metric]), *result.warnings):
+    for warning in (*samples.info.notes, *result.notes, *below_zero(samples, METRICS[metric]), *result.warnings):
         say(f"note: {warning}")
     figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
     facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}
@@ -156,7 +161,7 @@ def parameters(material: Material) -> str:
     """The material's numbers, one line each, with their units."""
     rows = [("kd", _rgb(material.kd), "RGB"), ("kt_d", _rgb(material.kt_d), "RGB")]
     for number, lobe in enumerate(material.lobes, 1):
-        rows.append((f"lobe {number}", lobe.side, lobe.distribution))
+        rows.append((f"lobe {number}", lobe.kind, lobe.distribution))
         rows.append(("  k", _rgb(lobe.k), "RGB"))
         for name, unit in UNITS.items():
             value = getattr(lobe, name)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lambent.cli.console import Force, Json, show, table, words
+from lambent.cli.console import Between, Force, Json, show, table, words
 from lambent.cli.convert import head_of, is_document
 from lambent.core.errors import UserError
 from lambent.core.plain import plain
@@ -22,6 +22,7 @@ Facts = dict[str, Any]
 def command(
     file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
     plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
+    reconstruction: Between = "auto",
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -34,9 +35,13 @@ def command(
 
         check_output(plot, (".png", ".pdf", ".svg"), force=force, inputs=[file])
     inspect = inspector_of(file)
-    if plot is None:
+    if reconstruction != "auto" and inspect is not inspect_table:
+        raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
+    if inspect is inspect_table:
+        facts = plain(inspect_table(file, plot, reconstruction))
+    elif plot is None:
         facts = plain(inspect(file))
-    elif inspect in (inspect_table, inspect_material):
+    elif inspect is inspect_material:
         facts = plain(inspect(file, plot))
     else:
         raise UserError("only tables and materials are plotted", file=file, field="--plot")
@@ -61,12 +66,12 @@ def inspector_of(file: str) -> Callable[..., Facts]:
     return inspect_material if is_document(head) else inspect_table
 
 
-def inspect_table(file: str, plot: Path | None = None) -> Facts:
+def inspect_table(file: str, plot: Path | None = None, reconstruction: Between = "auto") -> Facts:
     """A measured table: its description, how much of it is usable, its albedo, its faults."""
     from lambent.materials import measured
     from lambent.materials.measured import inspection
 
-    measurement = measured.load(Path(file))
+    measurement = measured.load(Path(file), reconstruction)
     if plot is not None:
         from lambent.materials.plots import plot_measurement
 

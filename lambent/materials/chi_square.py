@@ -7,7 +7,7 @@ cells, refined until they converge; rejected samples (density 0) form a cell of 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -76,6 +76,22 @@ def chi_square(
         e[-1] = max(e[-1], 1.0)
     statistic = float(((o - e) ** 2 / e).sum())
     degrees = len(o) - 1
+    p_value = float(chi2.sf(statistic, degrees))
+    return ChiSquare(statistic, degrees, p_value, integral, samples, cells, observed, expected)
+
+
+def combined(tests: Sequence[ChiSquare]) -> ChiSquare:
+    """One test of the parts of a mixture, each by its share of the samples; empty parts count for nothing."""
+    from scipy.stats import chi2
+
+    tests = [test for test in tests if test.samples]
+    samples, cells = sum(test.samples for test in tests), np.concatenate([test.cells for test in tests])
+    statistic, degrees = sum(test.statistic for test in tests), sum(test.degrees for test in tests)
+    integral = sum(test.pdf_integral * test.samples for test in tests) / samples
+    counts = [[getattr(test, name) for test in tests] for name in ("observed", "expected")]
+    observed, expected = (
+        np.concatenate([*(part[:-1] for part in parts), [sum(part[-1] for part in parts)]]) for parts in counts
+    )
     p_value = float(chi2.sf(statistic, degrees))
     return ChiSquare(statistic, degrees, p_value, integral, samples, cells, observed, expected)
 

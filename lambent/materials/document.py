@@ -2,6 +2,9 @@
 
 Units: kd, kt_d and k are dimensionless RGB coefficients (linear Rec.709); mx, my are slopes (dimensionless roughness
 along t and b); r0 is the Fresnel reflectance at normal incidence; alpha is the exponent of the cosine product.
+
+A lobe with `retro` stands about the direction to the light itself, not about its mirror image; its alpha may be
+negative, because retro-reflectors lose light towards grazing.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from lambent.core.errors import UserError, invalid
 from lambent.core.files import read_bytes, write_text
@@ -21,7 +24,9 @@ LIMIT_BYTES = 16 << 20
 SCATTERING = {"kd", "kt_d", "lobes"}  # a document names at least one of them
 Side = Literal["reflection", "transmission"]
 Distribution = Literal["beckmann", "ggx"]
+Kind = Literal["reflection", "transmission", "retro"]
 SIDES: tuple[Side, ...] = ("reflection", "transmission")
+KINDS: tuple[Kind, ...] = (*SIDES, "retro")
 
 
 def _spread(value: object) -> object:
@@ -33,6 +38,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 RGB = Annotated[tuple[Coefficient, Coefficient, Coefficient], BeforeValidator(_spread)]
 Roughness = Annotated[float, Field(ge=0.001, le=4, description="slope roughness, dimensionless")]
 BLACK = (0.0, 0.0, 0.0)
+LEAST_ALPHA = -4.0  # of a retro lobe; below it the power of the cosines overflows in float32
 
 
 class _Strict(BaseModel):
@@ -40,7 +46,7 @@ class _Strict(BaseModel):
 
 
 class Lobe(_Strict):
-    """One directional lobe (Kurt et al. 2010; thesis eqs 3.3-3.5)."""
+    """One directional lobe (Kurt et al. 2010; thesis eqs 3.3-3.5); `retro` mirrors wi about n before (Belcour 2014)."""
 
     side: Side = "reflection"
     distribution: Distribution = "beckmann"
@@ -48,7 +54,32 @@ class Lobe(_Strict):
     mx: Roughness
     my: Roughness
     r0: Annotated[tuple[Share, Share, Share], BeforeValidator(_spread)] = (0.04, 0.04, 0.04)
-    alpha: Share = 0.0
+    alpha: Annotated[float, Field(ge=LEAST_ALPHA, le=1)] = 0.0
+    retro: bool = Field(default=False, exclude_if=lambda retro: not retro)  # so that other documents stay as they are
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Lobe:
+        if self.retro and self.side == "transmission":
+            raise ValueError("a lobe of transmission cannot be retro")
+        if self.alpha < 0 and not self.retro:
+            raise ValueError("alpha: only a retro lobe has one below 0")
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """`retro`, or the side."""
+        return "retro" if self.retro else self.side
+
+    def of_kind(self, kind: Kind) -> Lobe:
+        """The lobe as one of another kind; an alpha that only retro lobes have becomes 0."""
+        side = "transmission" if kind == "transmission" else "reflection"
+        alpha = self.alpha if kind == "retro" else max(self.alpha, 0.0)
+        return self.model_copy(update={"side": side, "retro": kind == "retro", "alpha": alpha})
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether it reflects about the mirror direction."""
+        return self.kind == "reflection"
 
 
 class Provenance(_Strict):

@@ -5,6 +5,9 @@ with the same names, such as drjit.
 
 Sources: Kurt, Szirmay-Kalos & Krivanek 2010, "An anisotropic BRDF model for fitting and Monte Carlo rendering";
 thesis M ("Real-time rendering of measured materials"), equations in parentheses. GGX: Walter et al. 2007, eq. 33.
+Retro lobes: the same about the back vector, normalize(wi' + wo) with wi' the mirror image of wi about n (Belcour,
+Pacanowski, Delahaie, Laville-Geay & Eupherte 2014, JOSA A 31, 2561). They are reciprocal as well: swapped directions
+have the back vector turned by 180 degrees about n, where D is the same.
 
 Hazard: tan^2(theta_h) and 1 - cos^2(theta_h) cancel in float32 at low roughness; everything is built from hx^2, hy^2
 and hz of the half vector instead.
@@ -104,12 +107,14 @@ def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector
 def _same_side(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> tuple[Vector, Vector, Any]:
     """wi and wo on the upper side (wi mirrored at the surface for transmission), and whether the lobe scatters them.
 
-    The sheet is two-sided: a pair seen from below is the same pair seen from above.
+    The sheet is two-sided: a pair seen from below is the same pair seen from above. wi of a retro lobe is mirrored
+    about n, so that all else is as for the mirror direction.
     """
     across = lobe.side == "transmission"
     same = wi[2] * wo[2] > 0
     valid = (ops.abs(wi[2]) > COS_MIN) & (ops.abs(wo[2]) > COS_MIN) & (~same if across else same)
-    return (wi[0], wi[1], ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2])), valid
+    x, y = (-wi[0], -wi[1]) if lobe.retro else wi[:2]
+    return (x, y, ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2])), valid
 
 
 def _cosine_power(wi: Vector, wo: Vector, lobe: Lobe, ops: Any) -> Any:
@@ -139,12 +144,13 @@ def evaluate(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:
 
 
 def sample(wo: Vector, u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
-    """wi = 2 (wo.h) h - wo (4.8), mirrored to the far side for transmission.
+    """wi = 2 (wo.h) h - wo (4.8), mirrored to the far side for transmission, and about n for a retro lobe.
 
     A direction that ends on the wrong side of the surface is returned as it is; `pdf` and `evaluate` are 0 there.
     """
     x, y, z = reflect((wo[0], wo[1], ops.abs(wo[2])), sample_half_vector(u1, u2, lobe, ops))
     side = ops.select(wo[2] > 0, 1.0, -1.0) * (-1.0 if lobe.side == "transmission" else 1.0)
+    x, y = (-x, -y) if lobe.retro else (x, y)
     return x, y, z * side
 
 

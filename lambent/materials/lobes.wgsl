@@ -2,7 +2,8 @@
 //
 // Conventions (those of lobes.py): local shading frame (t, b, n), n = +z; unit directions away from the surface;
 // wi to the light, wo to the viewer. f is in 1/sr and without the cosine. The sheet is thin and two-sided: a pair of
-// directions seen from below is the same pair seen from above; for transmission wi is mirrored at the surface.
+// directions seen from below is the same pair seen from above; for transmission wi is mirrored at the surface, for a
+// retro lobe about n.
 // No bindings, no entry points: a pure include. Every name begins with lambent_ / Lambent / LAMBENT_.
 //
 // Sources: Kurt, Szirmay-Kalos & Krivanek 2010; thesis M, equations in parentheses; GGX: Walter et al. 2007, eq. 33.
@@ -28,7 +29,7 @@ struct LambentLobe {
     alpha: f32,         // exponent of the cosine product, 0..1
     side: u32,          // LAMBENT_REFLECTION or LAMBENT_TRANSMISSION
     distribution: u32,  // LAMBENT_BECKMANN or LAMBENT_GGX
-    unused: u32,
+    retro: u32,         // 1: about the direction to the light itself
 }
 
 // normalize(wi + wo); of opposite directions finite but without meaning.
@@ -95,6 +96,11 @@ fn lambent_up(w: vec3f) -> vec3f {
     return vec3f(w.xy, abs(w.z));
 }
 
+// wi on the upper side where the lobe is one about the mirror direction. Its own inverse on that side.
+fn lambent_unfolded(wi: vec3f, lobe: LambentLobe) -> vec3f {
+    return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), abs(wi.z));
+}
+
 fn lambent_cosine_power(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
     return pow(max(abs(wi.z * wo.z), 1e-12), lobe.alpha);
 }
@@ -108,7 +114,7 @@ fn lambent_tint(cos_d: f32, lobe: LambentLobe) -> vec3f {
 // x: the lobe without its Fresnel factor, D / (4 (wo.h) (cos_i cos_o)^alpha) in 1/sr; y: cos_d = wo.h.
 fn lambent_shape(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec2f {
     let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_up(wi), up);
+    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
     let cos_d = dot(up, h);
     let value = lambent_distribution(h, lobe) / (4.0 * max(cos_d, 1e-6) * lambent_cosine_power(wi, wo, lobe));
     return vec2f(select(0.0, value, lambent_sees(wi, wo, lobe)), cos_d);
@@ -124,7 +130,7 @@ fn lambent_evaluate(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
 fn lambent_scattered(wo: vec3f, h: vec3f, lobe: LambentLobe) -> vec3f {
     let wi = lambent_mirrored(lambent_up(wo), h);
     let below = (wo.z > 0.0) == (lobe.side == LAMBENT_TRANSMISSION);
-    return vec3f(wi.xy, select(wi.z, -wi.z, below));
+    return vec3f(select(wi.xy, -wi.xy, lobe.retro == 1u), select(wi.z, -wi.z, below));
 }
 
 // wi from u in [0, 1)^2. A direction on the wrong side of the surface comes back as it is: pdf, f and weight are 0.
@@ -135,7 +141,7 @@ fn lambent_sample(wo: vec3f, u: vec2f, lobe: LambentLobe) -> vec3f {
 // Density of lambent_sample in 1/sr: D h.z / (4 (wo.h)) (4.9).
 fn lambent_pdf(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
     let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_up(wi), up);
+    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
     let value = lambent_distribution(h, lobe) * h.z / (4.0 * max(dot(up, h), 1e-6));
     return select(0.0, value, lambent_sees(wi, wo, lobe));
 }
@@ -143,7 +149,7 @@ fn lambent_pdf(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
 // f |cos theta_i| / pdf of a direction made by lambent_sample, with D cancelled.
 fn lambent_weight(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> vec3f {
     let up = lambent_up(wo);
-    let h = lambent_half_vector(lambent_up(wi), up);
+    let h = lambent_half_vector(lambent_unfolded(wi, lobe), up);
     let value = lambent_tint(dot(up, h), lobe) * (abs(wi.z) / (max(h.z, 1e-6) * lambent_cosine_power(wi, wo, lobe)));
     return select(vec3f(0.0), value, lambent_sees(wi, wo, lobe));
 }

@@ -156,5 +156,7 @@ def _highest(material: Material, seed: int, samples: int = 1 << 14) -> Floats:
 
 
 def _flatter(material: Material, factor: float) -> Material:
-    lobes = tuple(lobe.model_copy(update={"alpha": lobe.alpha * factor}) for lobe in material.lobes)
-    return material.model_copy(update={"lobes": lobes})
+    """The material with all alpha scaled that make its lobes brighter towards grazing."""
+    alphas = (lobe.alpha * (factor if lobe.alpha > 0 else 1.0) for lobe in material.lobes)
+    flatter = (lobe.model_copy(update={"alpha": alpha}) for lobe, alpha in zip(material.lobes, alphas, strict=True))
+    return material.model_copy(update={"lobes": tuple(flatter)})

@@ -50,5 +50,5 @@ LOBE_DTYPE = wgsl_dtype("LambentLobe", lobe_shader())[0]
 
 def packed_lobes(lobes: Sequence[Lobe]) -> NDArray[Any]:
     """Structured array (N,) of `LOBE_DTYPE`, ready to be written to a storage buffer."""
-    rows = [(o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], 0) for o in lobes]
+    rows = [(o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], o.retro) for o in lobes]
     return np.array(rows, LOBE_DTYPE)

@@ -218,7 +218,7 @@ class Renderer:
             return []
         record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
         widest = {
-            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes), default=0.0)
+            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
             for o in record.objects
         }
         return planar_views(data, record.reflectors, state.width, state.height, MOST_REFLECTORS, widest)

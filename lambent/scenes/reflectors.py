@@ -108,7 +108,7 @@ def _with_walls(found: Reflector, meshes: Mapping[str, Mesh], corners: Floats) -
 
 def is_glossy(material: Material) -> bool:
     """Whether a lobe of the material reflects within the angle that a mirrored view covers."""
-    lobes = (lobe for lobe in material.lobes if lobe.side == "reflection" and max(lobe.k) > 0)
+    lobes = (lobe for lobe in material.lobes if lobe.mirrors and max(lobe.k) > 0)
     return any(math.sqrt(lobe.mx * lobe.my) <= ROUGHEST for lobe in lobes)
 
 
@@ -120,7 +120,7 @@ def _ruling(rules: Iterable[ReflectorRule], name: str) -> bool | None:
 
 def _is_candidate(scene: Scene, o: SceneObject) -> bool:
     ruling = _ruling(scene.reflector_rules, o.name)
-    shines = any(lobe.side == "reflection" for lobe in scene.materials[o.material].lobes)
+    shines = any(lobe.mirrors for lobe in scene.materials[o.material].lobes)
     return shines and (is_glossy(scene.materials[o.material]) if ruling is None else ruling)
 
 

@@ -78,6 +78,7 @@ LOBE: Answers = {
     "my": (0.02, LIT),
     "r0": ((0.04, 0.04, 0.05), LIT),
     "alpha": (0.5, LIT),
+    "retro": (True, LIT),
 }
 TEXTURES: Answers = {
     **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), LIT) for part in CHANNELS},

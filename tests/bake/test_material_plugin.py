@@ -18,6 +18,7 @@ MATERIALS = {
     "beckmann": Material(lobes=(BRUSHED,)),
     "ggx": Material(lobes=(BRUSHED.model_copy(update={"distribution": "ggx"}),)),
     "transmission": Material(lobes=(BRUSHED.model_copy(update={"side": "transmission"}),)),
+    "retro": Material(kd=0.1, lobes=(BRUSHED.model_copy(update={"retro": True, "alpha": -1.5}),)),
     "mixture": Material(
         kd=(0.1, 0.2, 0.3),
         kt_d=0.1,
@@ -63,7 +64,7 @@ def test_sample_agrees_with_eval_pdf_and_numpy(mi, name):
     assert same.mean() > 0.998  # float32 may choose another component where u_select lies on the border
 
 
-@pytest.mark.parametrize("name", ["beckmann", "ggx", "mixture"])
+@pytest.mark.parametrize("name", ["beckmann", "ggx", "retro", "mixture"])
 def test_chi_square(mi, name, tmp_path, monkeypatch):
     from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
@@ -115,6 +116,31 @@ def test_furnace_of_a_mirror_like_sphere_shows_the_models_albedo(mi):
     cosine = 1 - half_width**2 / 3  # its mean
     expected = MaterialBSDF(material).albedo(direction(np.arccos(cosine), 0.0), samples=200_000).mean()
     assert seen == pytest.approx(expected, rel=0.005)
+
+
+@pytest.mark.parametrize("apart_deg", [0.0, 1.0, 4.0, 60.0])
+def test_a_plane_of_retro_tape_shines_back_at_the_lamp(mi, apart_deg):
+    """Lit by a small lamp so many degrees from the camera, a plane shows f cos_i I/d^2."""
+    tape = Material(kd=0.1, lobes=(Lobe(retro=True, mx=0.02, my=0.02, k=0.4, r0=1.0, alpha=-1.0),))
+    tilted, d = np.radians(35), 10.0
+    eye, lamp = direction(tilted, 0.0), direction(tilted - np.radians(apart_deg), 0.0)
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 2},
+            "sensor": {
+                "type": "perspective",
+                "fov": 0.02,
+                "to_world": mi.ScalarTransform4f().look_at((d * eye).tolist(), [0, 0, 0], [0, 1, 0]),
+                "film": {"type": "hdrfilm", "width": 2, "height": 2, "rfilter": {"type": "box"}},
+            },
+            "lamp": {"type": "point", "position": (d * lamp).tolist(), "intensity": 3.0},
+            "plane": {"type": "rectangle", "bsdf": material_dict(tape)},
+        }
+    )
+    seen = np.array(mi.render(scene, spp=64)).mean()
+    expected = MaterialBSDF(tape).eval(lamp, eye).mean() * lamp[2] * 3.0 / d**2
+    assert seen == pytest.approx(expected, rel=0.01)
 
 
 def closed(bsdf, radiance, mi):

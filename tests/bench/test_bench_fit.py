@@ -8,6 +8,7 @@ import pytest
 from lambent.bench.below_zero import SIZE
 from lambent.bench.fit import METRICS, MODELS, QUICK, run
 from lambent.bench.known_answers import KNOWN
+from lambent.bench.retro_tapes import TAPES
 from lambent.core.errors import UserError
 from lambent.materials.measured.gonio_text import write_gonio
 from lambent.materials.measured.synthetic import synthesise
@@ -18,7 +19,7 @@ WARD = "paint = Aggregate(Lambertian(albedo = [.2, .2, .2]), NganWard(albedo = [
 
 @pytest.mark.slow
 def test_known_answers_are_found():
-    report = run(replace(QUICK, known=(KNOWN["white foil"],), below_zero=False))
+    report = run(replace(QUICK, known=(KNOWN["white foil"],), below_zero=False, tapes=()))
     names = [p["parameter"] for p in report["rows"][0]["parameters"]]
     assert names == ["kd", "ks", "mx", "my", "r0", "alpha", "kt (1 - r0)", "t_mx", "t_my", "t_alpha"]
     assert report["summary"]["largest_deviation"] < 0.05
@@ -58,3 +59,12 @@ def test_published_fits_need_a_measurement(tmp_path):
     published.write_text(WARD)
     with pytest.raises(UserError, match="held against a measurement"):
         run(QUICK, against=[published])
+
+
+def test_retro_reflectors_are_fitted_with_and_without_their_lobe():
+    report = run(replace(QUICK, known=(), tapes=TAPES[:1]))
+    without, with_it = report["rows"]
+    assert with_it["share"] < 0.2 * without["share"]
+    assert report["summary"] == {"retro_over_no_retro_max": with_it["share"] / without["share"]}
+    assert with_it["albedo_model"] == pytest.approx(with_it["albedo_measured"], rel=0.1)
+    json.dumps(report)

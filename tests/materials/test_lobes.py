@@ -20,13 +20,17 @@ SHAPES = {
     "brushed": {"mx": 0.0068, "my": 0.0297},
     "extreme": {"mx": 0.003, "my": 1.5},
 }
+RETRO = {
+    "beads": {"mx": 0.06, "my": 0.06, "alpha": -2.0, "distribution": "ggx"},
+    "prisms": {"mx": 0.005, "my": 0.01, "alpha": -4.0},
+}
 LOBES = {
     f"{name}-{distribution}-{side}": Lobe(side=side, distribution=distribution, r0=0.5, **shape)
     for name, shape in SHAPES.items()
     for distribution in ("beckmann", "ggx")
     for side in ("reflection", "transmission")
     if side == "reflection" or name in ("isotropic", "brushed")
-}
+} | {f"retro-{name}": Lobe(retro=True, r0=0.5, **shape) for name, shape in RETRO.items()}
 
 
 def pairs(count=2000, seed=0):
@@ -98,6 +102,27 @@ def test_brushed_along_t_is_sharp_along_t():
     lobe, n = Lobe(mx=0.05, my=0.3), (0.0, 0.0, 1.0)
     along, across = (direction(0.3, phi) for phi in (0.0, np.pi / 2))
     assert lobes.evaluate(tuple(along), n, lobe)[0] < 0.1 * lobes.evaluate(tuple(across), n, lobe)[0]
+
+
+def test_a_retro_lobe_by_hand():
+    """Towards the light f = k r0 / (4 pi mx my) at the normal and, with F = 1, (cos)^(-1 - 2 alpha) times it beside."""
+    lobe = Lobe(retro=True, mx=0.01, my=0.02, r0=1.0, k=0.5, alpha=-1.5)
+    peak = 0.5 / (4 * np.pi * 0.0002)
+    for theta in (0.0, 0.5, 1.2):
+        w = components(direction(theta, 0.7))
+        assert lobes.evaluate(w, w, lobe)[0] == pytest.approx(peak * np.cos(theta) ** 2)
+    beside = components(direction(0.5, 0.7 + np.pi))
+    assert lobes.evaluate(beside, components(direction(0.5, 0.7)), lobe)[0] < 1e-9 * peak
+
+
+def test_a_retro_lobe_is_the_mirrored_one_of_the_image_of_the_light():
+    wi, wo = pairs()
+    for name in RETRO:
+        lobe = LOBES[f"retro-{name}"]
+        mirrored = lobe.model_copy(update={"retro": False})
+        for function in (lobes.evaluate, lobes.pdf, lobes.weight):
+            expected = function(components(wi * (-1, -1, 1)), components(wo), mirrored)
+            np.testing.assert_array_equal(function(components(wi), components(wo), lobe), expected)
 
 
 def test_two_sided():

@@ -28,10 +28,14 @@ LOBES = [
     for distribution in ("beckmann", "ggx")
     for mx, my, alpha in ((0.3, 0.3, 0.0), (0.11, 0.5, 0.43), (1.4, 0.8, 1.0))
 ]
+LOBES += [
+    Lobe(retro=True, distribution=distribution, k=(0.9, 0.5, 0.2), r0=(0.9, 0.5, 0.03), mx=0.11, my=0.2, alpha=alpha)
+    for distribution, alpha in (("beckmann", -4.0), ("ggx", 0.5))
+]
 
 
 def name_of(lobe: Lobe) -> str:
-    return f"{lobe.side}-{lobe.distribution}-{lobe.mx}-{lobe.my}-{lobe.alpha}"
+    return f"{'retro' if lobe.retro else lobe.side}-{lobe.distribution}-{lobe.mx}-{lobe.my}-{lobe.alpha}"
 
 
 def declared(lobe: Lobe) -> str:
@@ -39,7 +43,7 @@ def declared(lobe: Lobe) -> str:
     row = packed_lobes([lobe])[0]
     return (
         f"const LOBE = LambentLobe({k}, {lobe.mx}, {r0}, {lobe.my}, {lobe.alpha}, "
-        f"{row['side']}u, {row['distribution']}u, 0u);"
+        f"{row['side']}u, {row['distribution']}u, {row['retro']}u);"
     )
 
 

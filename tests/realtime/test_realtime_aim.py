@@ -208,8 +208,9 @@ def lamp_light(cube: np.ndarray, face: int, lobe: Lobe, boxed: bool) -> np.ndarr
         ROUGH,
         Lobe(mx=0.3, my=0.1, r0=0.8, distribution="ggx"),
         Lobe(mx=0.35, my=0.3, r0=0.1, k=0.8, side="transmission"),
+        Lobe(mx=0.35, my=0.3, r0=1.0, k=0.8, retro=True, alpha=-0.5),
     ],
-    ids=["rough", "brushed ggx", "transmission"],
+    ids=["rough", "brushed ggx", "transmission", "retro"],
 )
 def test_one_small_lamp_in_the_dark(device, lobe: Lobe, boxed: bool) -> None:
     face = 5 if lobe.side == "transmission" else 4

@@ -28,6 +28,10 @@ MATERIALS = {
         Lobe(mx=0.12, my=0.14, r0=0.03, k=0.8, alpha=0.5),
         Lobe(mx=0.25, my=0.17, r0=0.2, k=0.7, alpha=0.6, side="transmission"),
     ),
+    "retro tape": (
+        Lobe(mx=0.1, my=0.1, r0=0.05),
+        Lobe(retro=True, mx=0.12, my=0.2, r0=1.0, k=(0.7, 0.5, 0.2), alpha=-1.5),
+    ),
 }
 
 
@@ -90,6 +94,19 @@ def test_few_samples_come_close_under_smooth_light(device, name: str, integrator
     truth = renderer.converged(STATE, 2048)
     image = renderer.image(replace(STATE, integrator=integrator, n=19))
     assert np.abs(image - truth).mean() < tolerance * truth.mean()
+
+
+def test_a_retro_reflector_shows_the_light_behind_the_viewer(device) -> None:
+    """A narrow lobe under a lamp that only one direction holds: every integrator looks back along the eye's ray."""
+    mirror = Lobe(mx=0.004, my=0.004, r0=1.0, alpha=0.5)
+    for lobe, seen in ((mirror.model_copy(update={"retro": True, "alpha": 0.5}), 1), (mirror, -1)):
+        renderer = Renderer(device, wall_scene(material((lobe,)), cube_of(smooth_light)))
+        wo = wo_of(OBLIQUE, 8, 8)
+        expected = smooth_light(wo * (seen, seen, 1))
+        for integrator in ("rings", "fis", "split-sum", "lobe-4.25"):
+            image = renderer.image(replace(STATE, integrator=integrator, n=7))
+            np.testing.assert_allclose(image, expected, rtol=0.03)
+        np.testing.assert_allclose(renderer.converged(STATE, 64), expected, rtol=0.03)
 
 
 def test_split_sum_table_is_the_albedo() -> None:

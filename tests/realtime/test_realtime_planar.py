@@ -102,6 +102,21 @@ def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(
     assert (wrong_hand < 0.1).mean() < 0.8
 
 
+@pytest.mark.parametrize(("integrator", "method"), METHODS)
+def test_a_retro_lobe_takes_nothing_from_the_mirrored_view(device: Any, integrator: str, method: str) -> None:
+    """Its light is the probe's, here dark: beside a mirroring lobe nothing changes, alone the floor is dark."""
+    both = mirror(0.02)
+    back = Lobe(retro=True, mx=0.05, my=0.05, r0=1.0)
+    asked = state(n=5, integrator=integrator, planar=method)
+    plain, with_it, alone = (
+        Renderer(device, scene_of(both.model_copy(update={"lobes": lobes}))).image(asked)
+        for lobes in (both.lobes, (*both.lobes, back), (back,))
+    )
+    np.testing.assert_allclose(with_it, plain, atol=0.02)
+    floor = Renderer(device, scene_of(both)).image(state(planar="off"))[..., 2] == 0
+    assert plain[floor].max() > 0.5 and alone[floor].max() < 0.01
+
+
 def test_what_stands_on_the_floor_meets_its_reflection(device: Any) -> None:
     """Where the box stands, both sides of the contact are red: no light leaks in between."""
     renderer = Renderer(device, scene_of(mirror(0.001)))

@@ -76,10 +76,15 @@ def test_the_diffuse_term_is_coupled(driver, state):
 
 
 def test_lobes(driver, state):
-    driver.click("add transmission lobe")
+    driver.click("add transmission")
     tick(driver)
-    assert [lobe.side for lobe in state.editor.subject.material.lobes] == ["reflection", "transmission"]
+    assert [lobe.kind for lobe in state.editor.subject.material.lobes] == ["reflection", "transmission"]
     driver.click("remove")  # the last one drawn
+    tick(driver)
+    driver.click("add retro")
+    tick(driver)
+    assert [lobe.kind for lobe in state.editor.subject.material.lobes] == ["reflection", "retro"]
+    driver.click("remove")
     tick(driver)
     assert state.editor.subject.material == BRASS
 

@@ -121,6 +121,19 @@ def test_lobes_come_and_go_and_restrictions_follow(editor):
     assert editor.subject.material == BRASS
 
 
+def test_a_lobe_becomes_retro_and_turns_back(editor):
+    editor.subject.add_lobe("retro")
+    assert editor.subject.material.lobes[-1].r0 == (1.0, 1.0, 1.0)
+    assert [names["mx"] for names in lobe_names(editor.subject.material)] == ["mx", "r_mx"]
+    lobes = list(editor.subject.material.lobes)
+    lobes[-1] = lobes[-1].model_copy(update={"alpha": -2.0})
+    editor.subject.step(editor.subject.material.model_copy(update={"lobes": tuple(lobes)}))
+    editor.subject.turn_lobe(1, "reflection")
+    after = editor.subject.material
+    assert [lobe.kind for lobe in after.lobes] == ["reflection", "reflection"] and after.lobes[1].alpha == 0
+    assert type(after).model_validate(after.model_dump()) == after
+
+
 def test_restrictions_of_a_fit():
     restrictions = Restrictions()
     material = Material(kd=(0.1, 0.2, 0.3), lobes=(Lobe(mx=0.1, my=0.2, r0=(0.2, 0.3, 0.4), k=0.5),))

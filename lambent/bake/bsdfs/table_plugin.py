@@ -3,7 +3,8 @@
     scene["ball"]["bsdf"] = table_dict(load("satin.bsdf"))
 
 A table of patch matrices (LBNL Klems) is looked up itself, by `patch_sheet`. Every other table is resampled once onto a
-`half_vector_grid`, whose docstring describes look-up and sampling; docs/performance.md has the error of resampling.
+`half_vector_grid`, whose docstring describes look-up and sampling, or, with peaks about the light, onto a `twin_grid`;
+docs/performance.md has the error of resampling.
 
 Conventions are those of material_plugin.py: Mitsuba's `si.wi` is the viewer (our wo), its `wo` the light (our wi), its
 eval includes the cosine; a thin two-sided sheet (unless the table has a back of its own) without refraction; the
@@ -16,6 +17,7 @@ reciprocal to a few per cent only; renderings differ by that where grazing light
 from __future__ import annotations
 
 import functools
+from operator import attrgetter
 from typing import Any
 
 import drjit as dr
@@ -29,9 +31,12 @@ from lambent.materials.lobes import ArrayOps
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import Lookup, PatchSheet, lookup_of
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.twin_grid import TwinGrid
 
 PLUGIN = "lambent_table"
-_LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet]] = {"grid": HalfVectorGrid, "patches": PatchSheet}
+_LOOKUPS: dict[str, type[HalfVectorGrid] | type[PatchSheet] | type[TwinGrid]] = {
+    "grid": HalfVectorGrid, "patches": PatchSheet, "twins": TwinGrid,
+}  # fmt: skip
 
 
 def table_dict(
@@ -47,10 +52,15 @@ def table_dict(
         Where no engine of Mitsuba works here.
     """
     register_table_plugin()
-    lookup = table if isinstance(table, HalfVectorGrid | PatchSheet) else lookup_of(table, shape, progress)
+    lookup = table if isinstance(table, Lookup) else lookup_of(table, shape, progress)
     kind = next(word for word, kind in _LOOKUPS.items() if isinstance(lookup, kind))
-    data = {name: mi.TensorXf(np.ascontiguousarray(getattr(lookup, name))) for name in lookup.ARRAYS}
+    data = {_key(name): mi.TensorXf(np.ascontiguousarray(attrgetter(name)(lookup))) for name in lookup.ARRAYS}
     return {"type": PLUGIN, "lookup": kind, "sizes": " ".join(map(str, lookup.sizes))} | data
+
+
+def _key(name: str) -> str:
+    """Mitsuba's name of an array; its own may not hold dots."""
+    return name.replace(".", "_")
 
 
 @once_per_variant
@@ -67,7 +77,7 @@ def register_table_plugin() -> None:
         def __init__(self, props: Any) -> None:
             mi.BSDF.__init__(self, props)
             kind = _LOOKUPS[str(props["lookup"])]
-            arrays = {name: mi.Float(mi.TensorXf(props[name]).array) for name in kind.ARRAYS}
+            arrays = {name: mi.Float(mi.TensorXf(props[_key(name)]).array) for name in kind.ARRAYS}
             self.lookup = kind.of_sizes(tuple(map(int, str(props["sizes"]).split())), arrays)
             self.anisotropic = self.lookup.anisotropic
             kinds = [mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission][: self.lookup.kinds]

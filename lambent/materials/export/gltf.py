@@ -136,6 +136,8 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 
 def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMaterial, Cost]:
     """The glTF material that looks most like `material`, rounded as in the file, and its cost."""
+    check, lost = pairs_of(material, CHECK_LOG2, seed=1), match.shape_losses(material)
+    material = match.without_retro(material)
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     space = _Space(material, pairs.samples.f.shape[1])
 
@@ -147,8 +149,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMater
         x, total = best(None, [np.where(np.arange(len(x)) == 0, 0.5, x) for x, _ in ends])
         ends.append((x, total / SIMPLER**2))
     fitted = space.read(min(ends, key=lambda end: end[1])[0], rounded=True)
-    check = pairs_of(material, CHECK_LOG2, seed=1)
-    return fitted, match.cost_of(check, fitted.eval(check), _lost(material, fitted))
+    return fitted, match.cost_of(check, fitted.eval(check), [*lost, *_lost(material, fitted)])
 
 
 class _Space:
@@ -224,7 +225,7 @@ def _near_ends(value: float) -> float:
 
 
 def _lost(material: Material, fitted: GltfMaterial) -> list[str]:
-    lost = match.shape_losses(material)
+    lost = []
     for side, several in (("reflection", material.reflection_lobes), ("transmission", material.transmission_lobes)):
         if len(several) > 1:
             lost.append(f"{len(several)} lobes of {side} became one")

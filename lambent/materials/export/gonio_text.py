@@ -29,6 +29,7 @@ THETA_I_DEG = {"isotropic": tuple(range(0, 81, 5)), "other": (0, 10, 20, 30, 40,
 PHI_STEP_DEG = 15
 TURN_DEG = {"isotropic": (0.0,), "quadrant": range(0, 91, PHI_STEP_DEG), "half": range(0, 180, PHI_STEP_DEG)}
 STEP_DEG, WIDEST_FINE_DEG, FINEST_DEG = 3.0, 1.0, 0.1
+WIDEST_RETURNED_DEG = 12.0  # a peak about the light is narrower: f falls to half within this
 FINE_STEPS = 10  # to either side of the mirror direction
 
 
@@ -42,9 +43,9 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     table = record(scatterer.eval, scatterer.name, setup, transmits=scatterer.transmits, progress=progress)
     write_gonio(Path(path), table, QUANTITY)
     what = "the formula: " if isinstance(subject, Material) else "the original directions: "
-    count = len(setup.theta_i_deg) * len(setup.phi_i_deg)
+    count, about = len(setup.theta_i_deg) * len(setup.phi_i_deg), " and of the light" if setup.about_lamp else ""
     lost = f"{what}sampled at {count} incident directions, outgoing ones {setup.step_deg:g} degrees apart" + (
-        f" and {setup.fine_deg:g} within {setup.fine_reach_deg:g} degrees of the mirror direction"
+        f" and {setup.fine_deg:g} within {setup.fine_reach_deg:g} degrees of the mirror direction{about}"
     )
     return read_back(subject, Path(path), (lost,))
 
@@ -53,18 +54,23 @@ def _setup(scatterer: Scatterer) -> Setup:
     symmetry = scatterer.symmetry
     theta_i = THETA_I_DEG["isotropic" if symmetry == "isotropic" else "other"]
     phi_i = TURN_DEG.get(symmetry, range(0, 360, PHI_STEP_DEG))
-    fine = float(np.clip(_lobe_width_deg(scatterer) / 4, FINEST_DEG, WIDEST_FINE_DEG))
+    mirrored, returned = (_lobe_widths_deg(scatterer, phi) for phi in (np.pi, 0.0))
+    returns = max(returned) < WIDEST_RETURNED_DEG
+    fine = float(np.clip(min(mirrored + returned * returns) / 4, FINEST_DEG, WIDEST_FINE_DEG))
     setup = Setup(tuple(map(float, theta_i)), tuple(map(float, phi_i)), symmetry, STEP_DEG, fine, FINE_STEPS * fine)
-    return replace(setup, noise=0.0, floor=0.0, sector_deg=0.0, grazing_deg=87.0)
+    return replace(setup, noise=0.0, floor=0.0, sector_deg=0.0, grazing_deg=87.0, about_lamp=returns)
 
 
-def _lobe_width_deg(scatterer: Scatterer) -> float:
-    """Angle from the mirror direction at which f falls to half, near theta_i = 30 degrees."""
+def _lobe_widths_deg(scatterer: Scatterer, phi: float) -> list[float]:
+    """Angles at which f falls to half near theta_i = 30 degrees, along the plane of incidence and across it.
+
+    From the mirror direction where phi is pi, from the light where it is 0; 30 where f does not fall so far.
+    """
     offset = np.geomspace(0.05, 30, 200)
     wi = np.broadcast_to(direction(np.radians(30), 0.0), (len(offset), 3))
     narrow = []
-    for wo in (direction(np.radians(30 + offset), np.pi), direction(np.radians(30), np.pi + np.radians(2 * offset))):
+    for wo in (direction(np.radians(30 + offset), phi), direction(np.radians(30), phi + np.radians(2 * offset))):
         f = scatterer.eval(wi, wo).mean(axis=1)
         below = np.flatnonzero(f < f[0] / 2)
         narrow.append(float(offset[below[0]]) if len(below) else 30.0)
-    return min(narrow)
+    return narrow

@@ -7,10 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
+from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Progress, tracked
-from lambent.materials.document import Lobe, Material
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import Pairs
 from lambent.materials.fitting.metrics import CUBEROOT, errors_and_shares, light_ratios
@@ -19,6 +21,7 @@ MOST_EVALUATIONS = 60  # of the Jacobian, per start
 ALBEDO_BINS = 8
 ALBEDO_WEIGHT = 0.3  # of relative differences of albedo, beside those of f
 ALBEDO_TOLERANCE = 0.02  # relative; larger differences are reported
+LOST_AT_DEG = 30  # where the light of retro lobes is stated
 ALPHA_MIN, ALPHA_MAX = 0.001, 1.0  # range of the other tools' roughness
 
 Model = Callable[[Floats], Floats]
@@ -30,6 +33,27 @@ def material_of(subject: Subject) -> Material:
     if isinstance(subject, Material):
         return subject
     raise UserError("is a measurement, not a material", file=subject.info.file, hint="lambent fit makes one of it")
+
+
+def without_retro(material: Material) -> Material:
+    """The material without retro lobes, which no other tool has."""
+    return material.model_copy(update={"lobes": tuple(lobe for lobe in material.lobes if not lobe.retro)})
+
+
+def _retro_losses(material: Material) -> list[str]:
+    """What leaving out the retro lobes costs."""
+    returned = tuple(lobe for lobe in material.lobes if lobe.retro)
+    if not returned:
+        return []
+    wi = direction(np.radians(LOST_AT_DEG), 0.0)
+    near = material.model_copy(update={"kt_d": BLACK, "lobes": material.reflection_lobes})
+    whole, lost = (MaterialBSDF(one).albedo(wi).mean() for one in (near, Material(lobes=returned)))
+    peaks = (MaterialBSDF(one).eval(wi, wi).mean() for one in (without_retro(near), near))
+    least, most = (float(peak) for peak in peaks)
+    return [
+        f"retro-reflection: the format has none; at {LOST_AT_DEG} degrees {lost / max(whole, 1e-9):.0%} of the "
+        f"reflected light is lost, and f towards the light is {least:.3g} in place of {most:.3g} /sr"
+    ]
 
 
 def match(
@@ -97,7 +121,11 @@ def _differences(pairs: Pairs) -> Callable[[Floats], Floats]:
 
 
 def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
-    """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's."""
+    """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's.
+
+    A grey model of a material whose retro lobes alone are coloured has C = 1.
+    """
+    f_written = np.broadcast_to(f_written, pairs.samples.f.shape)
     light = light_ratios(pairs.samples, f_written)
     mentioned = [
         f"the {'reflected' if side == 'reflection' else 'transmitted'} light is {ratio:.2f} times the material's"
@@ -109,7 +137,8 @@ def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
 
 def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str]:
     """Properties of the lobes that Smith-masked GGX facets with a Fresnel factor cannot express."""
-    lost = []
+    lost = _retro_losses(material)
+    material = without_retro(material)
     if material.kd_coupled and any(material.kd):
         lost.append("the diffuse term's coupling to Fresnel: the format has another one, or none")
     if not beckmann_kept and any(lobe.distribution == "beckmann" for lobe in material.lobes):

@@ -17,8 +17,10 @@ from lambent.materials.fitting.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.gonio import Symmetry, symmetry_of
 from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 from lambent.materials.measured.registry import load
+from lambent.materials.measured.retro import towards_light
 
 MOST_TUPLES = 200_000  # of a table, at which the written file is compared
+PEAK_RATIO, PEAK_DEG, PEAK_TOLERANCE = 1.25, 10.0, 0.1  # of a peak about the light, and what it may lose unsaid
 LOST_TRANSMISSION = "transmission: the format holds reflection alone"
 
 
@@ -77,4 +79,23 @@ def read_back(subject: Subject, path: Path, lost: tuple[str, ...]) -> Cost:
     f = written.eval(samples.wi, samples.wo)
     if f.shape[1] != samples.f.shape[1]:
         f = f.mean(axis=1, keepdims=True) if samples.f.shape[1] == 1 else np.repeat(f, 3, axis=1)
-    return Cost(lost, *errors_and_shares(samples, f), light_ratios(samples, f))
+    return Cost(
+        (*lost, *_of_the_peak_about_the_light(samples, f)), *errors_and_shares(samples, f), light_ratios(samples, f)
+    )
+
+
+def _of_the_peak_about_the_light(samples: MeasuredSamples, f: Floats) -> list[str]:
+    """How a file with f (N, C) at the tuples holds a retro-reflective peak, where there is one and it does not."""
+    if towards_light(samples) < PEAK_RATIO:
+        return []
+    apart = np.linalg.norm(samples.wi - samples.wo, axis=1)
+    near = (apart < np.radians(PEAK_DEG)) & ~samples.transmitted
+    light = (samples.weight * np.abs(samples.wo[:, 2]))[near]
+    given, held = (light @ values[near].mean(axis=1) for values in (samples.f, f))
+    misplaced = (light @ np.abs(f - samples.f)[near].mean(axis=1)) / max(given, 1e-30)
+    if misplaced < PEAK_TOLERANCE:
+        return []
+    return [
+        f"the peak about the light: within {PEAK_DEG:g} degrees of it the file returns {held / given:.2f} times as "
+        f"much light, and {misplaced:.0%} at another place"
+    ]

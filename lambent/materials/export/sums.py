@@ -11,7 +11,7 @@ from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost
-from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, rounded, slope_start
+from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, rounded, slope_start, without_retro
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, pairs_of
 
 
@@ -92,7 +92,11 @@ class Likeness:
 
 
 def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Progress) -> tuple[Likeness, Cost]:
-    """The closest material of the tool, rounded as in the file, and its cost; exact if there are no lobes."""
+    """The closest material of the tool, rounded as in the file, and its cost; exact if there are no lobes.
+
+    Retro lobes have no counterpart: the others are matched without them, and the cost counts them.
+    """
+    check, material = pairs_of(material, CHECK_LOG2, seed=1), without_retro(material)
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     kd, kt_d = (np.array(rgb[: pairs.samples.f.shape[1]]) for rgb in (material.kd, material.kt_d))
     found = Likeness(kd, kt_d)
@@ -105,7 +109,6 @@ def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Prog
 
         best = _read(match(pairs, model, [start], (low, high), progress, tool.name)[0], material, tool, pairs)
         found = Likeness(rounded(best.kd), rounded(best.kt_d), tuple(tool.rounded(part) for part in best.parts))
-    check = pairs_of(material, CHECK_LOG2, seed=1)
     return found, cost_of(check, found.eval(check, tool), lost)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from lambent.core.directions import Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
-from lambent.materials.document import Material, Side
+from lambent.materials.document import Kind, Material, Side
 from lambent.materials.fitting.least_squares import Bounds, minimise
 from lambent.materials.fitting.metrics import METRICS, Metric, light_ratios
-from lambent.materials.fitting.parameters import LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
+from lambent.materials.fitting.parameters import LEGAL, RETRO_LEGAL, SHAPE, Box, Fixed, Ranges, from_search, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of, replace_metric
 from lambent.materials.fitting.scale import weighted_median
 from lambent.materials.fresnel import schlick_weight
@@ -90,17 +90,20 @@ def restrictions(fix: Fixed, ranges: Ranges) -> list[str]:
 
 def _bounds(side: Side, lobes: Sequence[Candidate], boxes: Sequence[Box]) -> list[str]:
     lines = []
-    for index, (lobe, box) in enumerate(zip(lobes, boxes, strict=False)):
+    for place, (lobe, box) in enumerate(zip(lobes, boxes, strict=False)):
+        kind: Kind = "retro" if lobe.retro else side
+        index = 0 if lobe.retro else place - boxes[0].retro  # the retro lobe is the first
+        legal = RETRO_LEGAL if lobe.retro else LEGAL
         for axis, base in enumerate(SHAPE):
             extent = box.hi[axis] - box.lo[axis]
             if extent == 0 or (base == "my" and box.tied):
                 continue
             for bound, word in ((box.lo, "lower"), (box.hi, "upper")):
                 value = from_search(bound)[axis]
-                if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent and value not in LEGAL[base]:
-                    lines.append(f"{parameter(side, base, index)} is at its {word} bound {value:.3g}")
+                if abs(lobe.coordinates[axis] - bound[axis]) <= AT_BOUND * extent and value not in legal[base]:
+                    lines.append(f"{parameter(kind, base, index)} is at its {word} bound {value:.3g}")
         if not np.any(lobe.k > 0):
-            lines.append(f"{parameter(side, 'k', index)} is 0: the lobe explains nothing")
+            lines.append(f"{parameter(kind, 'k', index)} is 0: the lobe explains nothing")
     return lines
 
 

@@ -135,7 +135,7 @@ def _curve(table: MeasuredTable, samples: MeasuredSamples, side: Side, incident:
     albedo = measured(wi)
     if not albedo.any():  # a file with light from -z alone, which `samples` turns over
         albedo = measured(wi * FLIP_Z)
-    drawn = [quadrature(one, POINTS) for one in wi]
+    drawn = [quadrature(one, table.proposal, POINTS) for one in wi]
     which = np.repeat(np.arange(len(drawn)), [len(weight) for _, weight in drawn])
     wo = np.concatenate([wo for wo, _ in drawn]) * (FLIP_Z if side == "transmission" else 1)
     weight = np.concatenate([weight for _, weight in drawn])

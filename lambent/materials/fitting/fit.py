@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -16,16 +16,17 @@ from lambent.core.errors import UserError
 from lambent.core.files import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
-from lambent.materials.document import Distribution, Lobe, Material, Provenance, Side
+from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
 from lambent.materials.fitting import account, albedos, gradient, grid, parameters
 from lambent.materials.fitting.albedos import Comparison, Curve
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
 from lambent.materials.fitting.metrics import Metric, errors_of, metric_named
-from lambent.materials.fitting.parameters import SHAPE, Box, Fixed, Ranges, parameter
+from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, problem_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
+from lambent.materials.measured.retro import towards_light
 
 Method = Literal["grid", "gradient"]
 METHODS: tuple[Method, ...] = ("grid", "gradient")
@@ -36,6 +37,8 @@ DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
 }
 MAX_LOBES = 4
 GAIN = 0.05  # share of E that another lobe must remove, where the number of lobes is "auto"
+RETRO_RATIO = 2.0  # medians of f near the light over those beside it, from which a retro lobe is tried
+RETRO_GAIN = 0.1  # share of E that a retro lobe must remove to be taken
 DARK = 1e-5  # a smaller diffuse coefficient counts as 0
 
 
@@ -55,6 +58,8 @@ class FitResult:
         Reasons to doubt the numbers.
     partial : bool
         Whether the fit was cancelled and this is the best found so far.
+    notes : tuple of str
+        Choices that the fit made.
     albedos : tuple of Comparison
         Albedo of the material beside the whole table's, per side; empty where the fit was given tuples alone.
     """
@@ -65,6 +70,7 @@ class FitResult:
     seconds: float
     warnings: tuple[str, ...]
     partial: bool
+    notes: tuple[str, ...] = ()
     albedos: tuple[Comparison, ...] = ()
 
 
@@ -83,6 +89,7 @@ class Task:
     schedule: Schedule
     seed: int
     kept: dict[Side, Curve]  # albedos that the model has to follow
+    retro: bool | None = None
 
 
 def fit(
@@ -95,6 +102,7 @@ def fit(
     coupled: bool = False,
     fix: Fixed | None = None,
     ranges: Ranges | None = None,
+    retro: bool | None = None,
     gain: float = GAIN,
     whole: MeasuredTable | None = None,
     keep_albedo: bool = False,
@@ -103,7 +111,7 @@ def fit(
     source: Path | None = None,
     progress: Progress = silent,
 ) -> FitResult:
-    """Fit a diffuse term and `lobes` lobes per side (3.6).
+    """Fit a diffuse term and `lobes` lobes per side (3.6), and a retro-reflective lobe where the table shows one.
 
     mx, my, r0 and alpha are shared by the channels; every coefficient is solved per channel.
 
@@ -123,6 +131,10 @@ def fit(
         Whether the diffuse reflection falls as Fresnel reflection rises (`Material.kd_coupled`).
     fix, ranges : mapping, optional
         Parameter name -> value, or -> (lo, hi); names as in `parameters.known_parameters`.
+    retro : bool, optional
+        Whether to fit a retro-reflective lobe besides. By default it is tried where tuples near the light are
+        RETRO_RATIO times as bright as beside it, or a parameter of it is in `fix` or `ranges`, and taken where it
+        removes at least the share RETRO_GAIN of the error.
     gain : float
         Share of E in (0, 1), for "auto".
     whole : MeasuredTable, optional
@@ -156,15 +168,20 @@ def fit(
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
     curves = albedos.curves_of(whole, samples) if whole is not None else {}
     plan, kept = schedule or Schedule(), curves if keep_albedo else {}
-    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, plan, seed, kept)
+    task = Task(count, share, method, metric_named(metric), kinds, coupled, fix, ranges, plan, seed, kept, retro)
     far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
     found: dict[Side, Found] = {}
-    partial = False
+    partial, tried = False, list[str]()
     try:
         for side in samples.sides:
-            _fit_side(samples, side, task, progress, found)
+            returns = side == "reflection" and _may_return(samples, task)
+            _fit_side(samples, side, task, _part_of(progress, 0, 1 + returns), found)
+            if returns:
+                other: dict[Side, Found] = {}
+                _fit_side(samples, side, task, _part_of(progress, 1, 2), other, retro=True)
+                tried = [_choose(found, other, task)]
     except (Cancelled, KeyboardInterrupt):
         partial = True
     material = Material(
@@ -173,9 +190,9 @@ def fit(
         kt_d=_diffuse_rgb("transmission", samples, task, found),
         kd_coupled=coupled,
         lobes=tuple(
-            _lobe(side, i, lobe, one.problem.distribution, task.fix)
+            lobe
             for side, one in found.items()
-            for i, lobe in enumerate(one.models[-1].lobes if one.models else ())
+            for lobe in (_lobes(side, one.models[-1].lobes, one.problem.distribution, task.fix) if one.models else ())
         ),
     )
     model = account.evaluate(material, samples)
@@ -202,12 +219,14 @@ def fit(
             *account.below_zero(samples, task.metric),
             *account.restrictions(task.fix, task.ranges),
             *_by_lobes(found),
+            *tried,
             *warnings,
         ),
     )
     material = material.model_copy(update={"provenance": provenance})
     lambertian = account.lambertian_errors(samples)
-    return FitResult(material, errors, lambertian, time.perf_counter() - began, warnings, partial, compared)
+    seconds = time.perf_counter() - began
+    return FitResult(material, errors, lambertian, seconds, warnings, partial, tuple(tried), compared)
 
 
 def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
@@ -219,14 +238,47 @@ def _check(lobes: int, gain: float, method: str, distribution: str) -> None:
         raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}, or auto")
 
 
-def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progress, found: dict[Side, Found]) -> None:
-    """Put the side's models into `found`, including those finished when `progress` raises."""
+def _may_return(samples: MeasuredSamples, task: Task) -> bool:
+    """Whether a retro-reflective lobe is tried."""
+    if task.retro is not None:
+        return task.retro
+    asked = any(parameters.is_of_retro(name) for name in [*task.fix, *task.ranges])
+    return asked or towards_light(samples) > RETRO_RATIO
+
+
+def _choose(found: dict[Side, Found], other: dict[Side, Found], task: Task) -> str:
+    """Put the model with a retro lobe into `found` where it is clearly better, or asked for; the choice in words."""
+    without, with_it = found["reflection"].error, other["reflection"].error
+    share = 1 - with_it / without if without > 0 else 0.0
+    taken = task.retro is True or share >= RETRO_GAIN
+    if taken:
+        found["reflection"] = other["reflection"]
+    verdict = "taken" if taken else f"not taken: at least {RETRO_GAIN:.0%} are asked for"
+    return f"a retro-reflective lobe removes {share:.1%} of the {task.metric.name} error ({verdict})"
+
+
+def _part_of(progress: Progress, part: int, parts: int) -> Progress:
+    """Progress of one of several equal parts."""
+    return lambda done, total, what: progress(part + done / total, parts, what)
+
+
+def _fit_side(
+    samples: MeasuredSamples,
+    side: Side,
+    task: Task,
+    progress: Progress,
+    found: dict[Side, Found],
+    retro: bool = False,
+) -> None:
+    """Put the side's models into `found`, including those finished when `progress` raises; `retro`: one lobe more."""
     channels = samples.f.shape[1]
+    kinds: list[tuple[Kind, int]] = [("retro", 0)] if retro else []
+    kinds += [(side, i) for i in range(task.lobes)]
     boxes = tuple(
-        parameters.box_of(side, i, samples.info.isotropic, channels, task.fix, task.ranges) for i in range(task.lobes)
+        parameters.box_of(kind, i, samples.info.isotropic, channels, task.fix, task.ranges) for kind, i in kinds
     )
     diffuse = _diffuse(samples, side, task.fix)
-    problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled)
+    problem = problem_of(samples, side, task.metric, task.distributions[0], task.coupled, retro)
     for number, distribution in enumerate(task.distributions):
         own = replace(problem, distribution=distribution)
         one = Found(albedos.keep(task.kept[side], own, task.coupled) if task.kept else own, boxes, [])
@@ -254,10 +306,11 @@ def _fit_side(samples: MeasuredSamples, side: Side, task: Task, progress: Progre
 
 
 def _narrow_first(model: Mixture, boxes: Sequence[Box]) -> Mixture:
-    """The model with its lobes sorted by roughness, if the user's restrictions are the same for all."""
+    """The model with its lobes sorted by roughness, if the user's restrictions are the same for all; retro first."""
+    boxes = [box for box in boxes if not box.retro]
     alike = all(np.array_equal((box.lo, box.hi), (boxes[0].lo, boxes[0].hi)) for box in boxes)
     alike = alike and all(box.k_limits == boxes[0].k_limits for box in boxes)
-    by_area = sorted(model.lobes, key=lambda lobe: float(lobe.shape[0] * lobe.shape[1]))
+    by_area = sorted(model.lobes, key=lambda lobe: (not lobe.retro, float(lobe.shape[0] * lobe.shape[1])))
     return replace(model, lobes=tuple(by_area)) if alike else model
 
 
@@ -280,17 +333,28 @@ def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[S
     return _rgb(_diffuse(samples, side, task.fix))
 
 
-def _lobe(side: Side, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
+def _lobes(side: Side, candidates: Sequence[Candidate], distribution: Distribution, fix: Fixed) -> Iterator[Lobe]:
+    """The lobes of a side as a document holds them, the retro-reflective one last."""
+    mirroring = (one for one in candidates if not one.retro)
+    yield from (_lobe(side, i, one, distribution, fix) for i, one in enumerate(mirroring))
+    yield from (_lobe("retro", 0, one, distribution, fix) for one in candidates if one.retro)
+
+
+def _lobe(kind: Kind, index: int, candidate: Candidate, distribution: Distribution, fix: Fixed) -> Lobe:
     """The lobe as a document holds it."""
-    names = [parameter(side, base, index) for base in SHAPE]
+    names = [parameter(kind, base, index) for base in SHAPE]
     mx, my, r0, alpha = (
         parameters.scalar(fix[name], base) if name in fix else float(value)
         for name, base, value in zip(names, SHAPE, candidate.shape, strict=True)
     )
-    if side == "transmission" and r0 < 2e-6:
+    if kind == "transmission" and r0 < 2e-6:
         r0 = 0.0
-    k, alpha = _rgb(candidate.k), min(max(alpha, 0.0), 1.0)
-    return Lobe(side=side, distribution=distribution, k=k, mx=mx, my=my, r0=(r0, r0, r0), alpha=alpha)
+    least, most = (RETRO_BOUNDS if kind == "retro" else BOUNDS)["alpha"]
+    side: Side = "transmission" if kind == "transmission" else "reflection"
+    return Lobe(
+        side=side, retro=kind == "retro", distribution=distribution, k=_rgb(candidate.k), mx=mx, my=my,
+        r0=(r0, r0, r0), alpha=min(max(alpha, least), most),
+    )  # fmt: skip
 
 
 def _rgb(values: Floats) -> Triple:
@@ -311,7 +375,7 @@ def _by_lobes(found: dict[Side, Found]) -> list[str]:
 
 def _fewer(found: dict[Side, Found], lobes: int | Literal["auto"]) -> list[str]:
     return [
-        f"{side}: {len(one.models)} lobe(s); another one explains nothing more"
+        f"{side}: {count} lobe(s); another one explains nothing more"
         for side, one in found.items()
-        if lobes != "auto" and 0 < len(one.models) < lobes
+        if lobes != "auto" and 0 < (count := one.mirroring) < lobes
     ]

@@ -27,6 +27,8 @@ STEPS = (30, 15, 30)
 STOP_SHARE = (1e-3, 1e-4, 1e-6)
 WIDTHS = (0.008, 0.03, 0.1, 0.3, 0.9)
 MODES = ((0.015, 0.05), (0.9, 0.85))  # (r0, alpha) of the two kinds of optimum
+RETRO_WIDTHS = (0.0025, *WIDTHS[:4])
+RETRO_MODES = ((1.0, -1.5), (1.0, 0.3))
 STRETCHED = ((0.03, 3.0), (0.03, 1 / 3), (0.12, 3.0), (0.12, 1 / 3))  # mean width and my/mx of anisotropic starts
 SPLIT = 1.8  # a lobe is split into one narrower and one wider by this factor
 LEAST_START = 1e-6  # a coefficient of 0 has no logarithm
@@ -88,10 +90,13 @@ def _starts(problem: Problem, bounds: Bounds, model: Mixture) -> Iterator[Mixtur
     box = bounds.boxes[len(model.lobes)]
     for mx, my, (r0, alpha) in _shapes(box):
         coordinates = np.clip(to_search(np.array([mx, my, r0, alpha])), box.lo, box.hi)
-        basis = problem.basis(Candidate(coordinates, np.zeros(0)).shape)[None]
+        lobe = Candidate(coordinates, np.zeros(0), box.retro)
+        basis = problem.basis(lobe.shape, lobe.retro)[None]
         k = solve_coefficients(problem.metric, problem.channels(model), basis, box.k_limits)
-        yield _positive(bounds, model, Candidate(coordinates, _within(k, box)))
+        yield _positive(bounds, model, replace(lobe, k=_within(k, box)))
     for index, lobe in enumerate(model.lobes):
+        if lobe.retro != box.retro:
+            continue
         narrow, wide = (_widened(lobe, scale, b) for scale, b in ((1 / SPLIT, bounds.boxes[index]), (SPLIT, box)))
         others = list(model.lobes)
         others[index] = narrow
@@ -99,17 +104,18 @@ def _starts(problem: Problem, bounds: Bounds, model: Mixture) -> Iterator[Mixtur
 
 
 def _shapes(box: Box) -> Iterator[tuple[float, float, tuple[float, float]]]:
-    for m, mode in product(WIDTHS, MODES):
+    widths, modes = (RETRO_WIDTHS, RETRO_MODES) if box.retro else (WIDTHS, MODES)
+    for m, mode in product(widths, modes):
         yield m, m, mode
     if not box.tied:
-        for (m, ratio), mode in product(STRETCHED, MODES):
+        for (m, ratio), mode in product(STRETCHED, modes):
             yield m / np.sqrt(ratio), m * np.sqrt(ratio), mode
 
 
 def _widened(lobe: Candidate, scale: float, box: Box) -> Candidate:
     coordinates = lobe.coordinates.copy()
     coordinates[[MU, NU]] += np.log(scale)
-    return Candidate(np.clip(coordinates, box.lo, box.hi), _within(lobe.k / 2, box))
+    return Candidate(np.clip(coordinates, box.lo, box.hi), _within(lobe.k / 2, box), lobe.retro)
 
 
 def _within(k: Floats, box: Box) -> Floats:

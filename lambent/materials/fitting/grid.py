@@ -109,13 +109,13 @@ def _evaluate(
     """Every combination of the values (ln mx, ln my, ln r0, alpha), with its coefficient solved, and its remainder."""
     pairs = list(zip(axes[MU], axes[MU], strict=True) if box.tied else product(axes[MU], axes[NU]))
     combined = np.array(list(product(axes[R0], axes[ALPHA])))
-    fresnel = problem.fresnel(np.exp(combined[:, 0])).astype(problem.base.dtype)
+    fresnel = problem.fresnel(np.exp(combined[:, 0]), box.retro).astype(problem.base.dtype)
     rest = fresnel * np.exp(-combined[:, 1:].astype(problem.base.dtype) * problem.log_cosines)
     highest = rest.max(axis=0)
     unexplained = [_losses(problem, channel) for channel in channels]
     for number, (log_mx, log_my) in enumerate(pairs):
         report(number / len(pairs))
-        density = problem.density(np.exp(log_mx), np.exp(log_my))
+        density = problem.density(np.exp(log_mx), np.exp(log_my), box.retro)
         reached = density * highest > NEGLIGIBLE
         basis = density[reached] * rest[:, reached]
         ks, totals = [], []
@@ -126,7 +126,8 @@ def _evaluate(
         mean = np.mean(totals, axis=0)
         for row in range(len(combined)):
             coordinates = np.array([log_mx, log_my, *combined[row]])
-            yield Candidate(coordinates, np.array([k[row] for k in ks], dtype=float)), float(mean[row])
+            lobe = Candidate(coordinates, np.array([k[row] for k in ks], dtype=float), box.retro)
+            yield lobe, float(mean[row])
 
 
 def _losses(problem: Problem, channel: Channel) -> Floats:
@@ -138,6 +139,6 @@ def _losses(problem: Problem, channel: Channel) -> Floats:
 
 def _with_exact_scale(problem: Problem, others: Mixture, lobe: Candidate, box: Box) -> Candidate:
     """The lobe with its coefficients solved on all tuples in float64."""
-    basis = problem.basis(lobe.shape)[None]
+    basis = problem.basis(lobe.shape, lobe.retro)[None]
     k = solve_coefficients(problem.metric, problem.channels(others), basis, box.k_limits, FULL_STEPS)
-    return Candidate(lobe.coordinates, k)
+    return Candidate(lobe.coordinates, k, lobe.retro)

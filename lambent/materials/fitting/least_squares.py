@@ -137,7 +137,9 @@ def _add_albedos(
 
 def _terms(problem: Problem, mixture: Mixture, cosine: Floats | float) -> Floats:
     """(1 + L, N) f in 1/sr, times a cosine, of the diffuse term and of every lobe with coefficient 1."""
-    return np.stack([cosine * problem.diffuse, *(cosine * problem.basis(lobe.shape) for lobe in mixture.lobes)])
+    return np.stack(
+        [cosine * problem.diffuse, *(cosine * problem.basis(lobe.shape, lobe.retro) for lobe in mixture.lobes)]
+    )
 
 
 def _coefficients(mixture: Mixture, channel: int, dtype: np.dtype[Any]) -> Floats:
@@ -146,7 +148,7 @@ def _coefficients(mixture: Mixture, channel: int, dtype: np.dtype[Any]) -> Float
 
 def _slopes(problem: Problem, bounds: Bounds, mixture: Mixture) -> list[tuple[Floats, Floats, Floats, Floats]]:
     pairs = zip(bounds.boxes, mixture.lobes, strict=False)
-    return [problem.log_derivatives(lobe.shape, box.tied) for box, lobe in pairs]
+    return [problem.log_derivatives(lobe.shape, box.tied, lobe.retro) for box, lobe in pairs]
 
 
 def _rows(

@@ -1,7 +1,8 @@
 """Names and ranges of the fitted parameters, and the user's restrictions.
 
-Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha. From a side's second lobe on,
-the parameters carry the lobe's number: ks_2, mx_2, t_alpha_2. kd, kt_d, ks and kt may be one value or three.
+Reflection: kd, ks, mx, my, r0, alpha; transmission: kt_d, kt, t_mx, t_my, t_r0, t_alpha; the retro-reflective lobe:
+kr, r_mx, r_my, r_r0, r_alpha. From a side's second lobe on, the parameters carry the lobe's number: ks_2, mx_2,
+t_alpha_2. kd, kt_d, ks, kt and kr may be one value or three.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.plain import Triple
-from lambent.materials.document import SIDES, Side
+from lambent.materials.document import LEAST_ALPHA, SIDES, Kind
 
 Value = float | Triple
 Fixed = Mapping[str, Value]
@@ -23,7 +24,9 @@ Ranges = Mapping[str, tuple[float, float]]
 
 SHAPE = ("mx", "my", "r0", "alpha")  # the axes of the search, in this order
 BOUNDS = {"mx": (0.003, 1.5), "my": (0.003, 1.5), "r0": (0.004, 1.0), "alpha": (0.0, 1.0)}
+RETRO_BOUNDS = BOUNDS | {"mx": (0.001, 1.5), "my": (0.001, 1.5), "alpha": (LEAST_ALPHA, 1.0)}
 LEGAL = {"mx": (0.001, 4.0), "my": (0.001, 4.0), "r0": (0.0, 1.0), "alpha": (0.0, 1.0)}
+RETRO_LEGAL = LEGAL | {"alpha": (LEAST_ALPHA, 1.0)}
 LEGAL_COEFFICIENT = (0.0, 1e6)
 R0_FLOOR = 1e-6  # the search uses the logarithm of r0
 LOGARITHMIC = np.array([True, True, True, False])
@@ -39,18 +42,22 @@ def from_search(coordinates: Floats) -> Floats:
     return np.where(LOGARITHMIC, np.exp(np.where(LOGARITHMIC, coordinates, 0)), coordinates)
 
 
-def parameter(side: Side, base: str, index: int = 0) -> str:
-    """The user's name of a lobe's parameter; `base` is in `SHAPE` or "k", `index` counts lobes of the side from 0."""
-    reflects = side == "reflection"
-    coefficient = "ks" if reflects else "kt"
-    name = coefficient if base == "k" else base if reflects else f"t_{base}"
+def parameter(kind: Kind, base: str, index: int = 0) -> str:
+    """The user's name of a lobe's parameter; `base` is in `SHAPE` or "k", `index` counts lobes of the kind from 0."""
+    coefficient, prefix = {"reflection": ("ks", ""), "transmission": ("kt", "t_"), "retro": ("kr", "r_")}[kind]
+    name = coefficient if base == "k" else prefix + base
     return name if index == 0 else f"{name}_{index + 1}"
+
+
+def is_of_retro(name: str) -> bool:
+    """Whether a parameter is one of the retro-reflective lobe."""
+    return name.startswith(("kr", "r_"))
 
 
 def known_parameters(lobes: int) -> list[str]:
     """Every name that `fix` and `ranges` may hold for this many lobes per side."""
     names = [parameter(side, base, i) for side in SIDES for i in range(lobes) for base in ("k", *SHAPE)]
-    return ["kd", "kt_d", *names]
+    return ["kd", "kt_d", *names, *(parameter("retro", base) for base in ("k", *SHAPE))]
 
 
 @dataclass(frozen=True)
@@ -65,28 +72,32 @@ class Box:
         Whether my equals mx (isotropic).
     k_limits : tuple of (float, float)
         Interval of the coefficient per channel.
+    retro : bool
+        Whether the lobe stands about the direction to the light.
     """
 
     lo: Floats
     hi: Floats
     tied: bool
     k_limits: tuple[tuple[float, float], ...]
+    retro: bool = False
 
 
-def box_of(side: Side, index: int, isotropic: bool, channels: int, fix: Fixed, ranges: Ranges) -> Box:
+def box_of(side: Kind, index: int, isotropic: bool, channels: int, fix: Fixed, ranges: Ranges) -> Box:
     """The search box of a lobe under the user's restrictions.
 
     An isotropic table ties my to mx, unless the user restricts my. r0 of a transmission lobe is fixed at 0 unless the
     user restricts it: with Schlick's F the lobe (3.5) has kt (1 - F(u)) = kt (1 - r0) (1 - (1 - u)^5), so that only the
-    product kt (1 - r0) can be measured, and kt then is that product.
+    product kt (1 - r0) can be measured, and kt then is that product. r0 of a retro lobe is fixed at 1 likewise: prisms
+    reflect totally, and alpha alone says how the lobe falls towards grazing.
     """
-    restrictions = dict(fix)
-    if side == "transmission" and parameter(side, "r0", index) not in {**fix, **ranges}:
-        restrictions[parameter(side, "r0", index)] = 0.0
+    restrictions, bounds = dict(fix), RETRO_BOUNDS if side == "retro" else BOUNDS
+    if side != "reflection" and parameter(side, "r0", index) not in {**fix, **ranges}:
+        restrictions[parameter(side, "r0", index)] = 0.0 if side == "transmission" else 1.0
     lo, hi = np.zeros(4), np.zeros(4)
     for axis, base in enumerate(SHAPE):
         name = parameter(side, base, index)
-        lo[axis], hi[axis] = ranges.get(name, BOUNDS[base])
+        lo[axis], hi[axis] = ranges.get(name, bounds[base])
         if name in restrictions:
             lo[axis] = hi[axis] = scalar(restrictions[name], name)
     tied = isotropic and parameter(side, "my", index) not in {**fix, **ranges}
@@ -95,7 +106,7 @@ def box_of(side: Side, index: int, isotropic: bool, channels: int, fix: Fixed, r
         k_limits = tuple((value, value) for value in per_channel(fix[name], channels))
     else:
         k_limits = (ranges.get(name, (0.0, np.inf)),) * channels
-    return Box(to_search(lo), to_search(hi), tied, k_limits)
+    return Box(to_search(lo), to_search(hi), tied, k_limits, side == "retro")
 
 
 def scalar(value: Value, name: str) -> float:
@@ -136,8 +147,8 @@ def check(fix: Fixed, ranges: Ranges, lobes: int) -> None:
 
 
 def _check_value(name: str, value: float) -> None:
-    base = re.sub(r"(^t_)|(_\d+$)", "", name)
-    lo, hi = LEGAL.get(base, LEGAL_COEFFICIENT)
+    base = re.sub(r"(^[tr]_)|(_\d+$)", "", name)
+    lo, hi = (RETRO_LEGAL if is_of_retro(name) else LEGAL).get(base, LEGAL_COEFFICIENT)
     if not lo <= value <= hi:  # False for NaN as well
         raise UserError("value out of bounds", field=name, got=value, expected=f"{lo} to {hi:g}")
 

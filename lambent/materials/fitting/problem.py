@@ -1,7 +1,8 @@
 """One side of a table, prepared so that a lobe of any shape takes a few multiplications per tuple.
 
 ln f_lobe / k = ln F + base + ln D' - alpha ln(cos_i cos_o)   (3.3-3.5), with base = -ln(4 pi hz^4 cos_d) and
-D' = exp(-q) / (mx my) of Beckmann, 1 / (mx my (1 + q)^2) of GGX, q = hx^2/hz^2/mx^2 + hy^2/hz^2/my^2.
+D' = exp(-q) / (mx my) of Beckmann, 1 / (mx my (1 + q)^2) of GGX, q = hx^2/hz^2/mx^2 + hy^2/hz^2/my^2. For retro lobes h
+and cos_d are those of the back vector.
 """
 
 from __future__ import annotations
@@ -28,10 +29,11 @@ PER_TUPLE = ("slope_x2", "slope_y2", "base", "log_cosines", "schlick", "diffuse"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A lobe: its search coordinates (4,) and its coefficient per channel (C,)."""
+    """A lobe: its search coordinates (4,), its coefficient per channel (C,), and whether it is retro-reflective."""
 
     coordinates: Floats
     k: Floats
+    retro: bool = False
 
     @property
     def shape(self) -> Floats:
@@ -53,8 +55,11 @@ class Problem:
 
     Attributes
     ----------
-    slope_x2, slope_y2, base, log_cosines, schlick : (N,)
-        (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d), ln(cos_i cos_o) and (1 - cos_d)^5 of every tuple.
+    slope_x2, slope_y2, base, schlick : (1 or 2, N)
+        (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d) and (1 - cos_d)^5 of every tuple's half vector, then of its back
+        vector where there may be a retro lobe.
+    log_cosines : (N,)
+        ln(cos_i cos_o).
     diffuse : (N,)
         f in 1/sr of the diffuse term with coefficient 1.
     measured : (C, N)
@@ -82,39 +87,40 @@ class Problem:
     def __len__(self) -> int:
         return len(self.w)
 
-    def fresnel(self, r0: Floats) -> Floats:
+    def fresnel(self, r0: Floats, retro: bool = False) -> Floats:
         """(..., N) F, or 1 - F for transmission, of r0 (...)."""
-        f = r0[..., None] + (1 - r0[..., None]) * self.schlick
-        return f if self.side == "reflection" else 1 - f
+        f = r0[..., None] + (1 - r0[..., None]) * self.schlick[int(retro)]
+        return np.asarray(f if self.side == "reflection" else 1 - f)
 
-    def density(self, mx: float, my: float) -> Floats:
+    def density(self, mx: float, my: float, retro: bool = False) -> Floats:
         """(N,) the factor of a lobe that mx and my determine."""
-        q = self.slope_x2 / (mx * mx) + self.slope_y2 / (my * my)  # squared slope in units of the roughness
+        x2, y2, base = (array[int(retro)] for array in (self.slope_x2, self.slope_y2, self.base))
+        q = x2 / (mx * mx) + y2 / (my * my)  # squared slope in units of the roughness
         logarithm = -2 * np.log1p(q) if self.distribution == "ggx" else -q
-        return np.asarray(np.exp(self.base - np.log(mx * my) + logarithm))
+        return np.asarray(np.exp(base - np.log(mx * my) + logarithm))
 
-    def basis(self, shape: Floats) -> Floats:
+    def basis(self, shape: Floats, retro: bool = False) -> Floats:
         """(N,) f in 1/sr of the lobe (mx, my, r0, alpha) with coefficient 1."""
         mx, my, r0, alpha = (float(v) for v in shape)
-        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype))
-        return np.asarray(self.density(mx, my) * fresnel * np.exp(-alpha * self.log_cosines))
+        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype), retro)
+        return np.asarray(self.density(mx, my, retro) * fresnel * np.exp(-alpha * self.log_cosines))
 
-    def log_derivatives(self, shape: Floats, tied: bool) -> tuple[Floats, Floats, Floats, Floats]:
+    def log_derivatives(self, shape: Floats, tied: bool, retro: bool = False) -> tuple[Floats, Floats, Floats, Floats]:
         """(N,) each: derivatives of ln basis by ln mx (and ln my at once if `tied`), ln my, ln r0 and alpha."""
         mx, my, r0, _ = (float(v) for v in shape)
-        x, y = self.slope_x2 * (2 / (mx * mx)), self.slope_y2 * (2 / (my * my))
+        x, y = self.slope_x2[int(retro)] * (2 / (mx * mx)), self.slope_y2[int(retro)] * (2 / (my * my))
         if self.distribution == "ggx":
             fall = 2 / (1 + (x + y) / 2)
             x, y = x * fall, y * fall
         sign = 1 if self.side == "reflection" else -1
-        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype))
-        by_r0 = sign * r0 * (1 - self.schlick) / np.maximum(fresnel, 1e-30)
+        fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype), retro)
+        by_r0 = sign * r0 * (1 - self.schlick[int(retro)]) / np.maximum(fresnel, 1e-30)
         return (x + y - 2 if tied else x - 1), y - 1, by_r0, -self.log_cosines
 
     def evaluate(self, mixture: Mixture) -> Floats:
         """(C, N) f in 1/sr."""
         k = np.stack([mixture.diffuse, *(lobe.k for lobe in mixture.lobes)], axis=1).astype(self.diffuse.dtype)
-        return np.asarray(k @ np.stack([self.diffuse, *(self.basis(lobe.shape) for lobe in mixture.lobes)]))
+        return np.asarray(k @ np.stack([self.diffuse, *(self.basis(lobe.shape, lobe.retro) for lobe in mixture.lobes)]))
 
     @cached_property
     def blocks(self) -> tuple[Problem, ...]:
@@ -215,39 +221,57 @@ class KeptAlbedo:
 
 @dataclass(frozen=True)
 class Found:
-    """The finished models of one side with one lobe, two, ..., and the boxes of their lobes."""
+    """The finished models of one side with one lobe, two, ..., and the boxes of their lobes, a retro lobe first."""
 
     problem: Problem
     boxes: tuple[Box, ...]
     models: list[Mixture]
 
+    @property
+    def mirroring(self) -> int:
+        """Number of lobes of the last model that are not retro-reflective."""
+        return sum(not lobe.retro for lobe in self.models[-1].lobes) if self.models else 0
+
+    @property
+    def error(self) -> float:
+        """E of the last model, on this side alone."""
+        return float(self.problem.remaining(self.models[-1]) ** (1 / self.problem.metric.power))
+
 
 def problem_of(
-    samples: MeasuredSamples, side: Side, metric: Metric, distribution: Distribution, coupled: bool
+    samples: MeasuredSamples, side: Side, metric: Metric, distribution: Distribution, coupled: bool, retro: bool = False
 ) -> Problem:
-    """The tuples of one side; `coupled` selects the diffuse term of `bsdf.coupling`."""
+    """The tuples of one side; `coupled` selects the diffuse term of `bsdf.coupling`, `retro` allows retro lobes."""
     here = np.flatnonzero(samples.on(side))
     wi, wo = (w[here].T.astype(np.float64) for w in (samples.wi, samples.wo))
     cos_i, cos_o = np.abs(wi[2]), np.abs(wo[2])
-    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
-    length2 = hx * hx + hy * hy + hz * hz
-    cos_d = np.clip((hx * wo[0] + hy * wo[1] + hz * cos_o) / np.sqrt(length2), 1e-6, 1)
-    hz2 = np.maximum(hz * hz, 1e-12)
+    kinds = [_half_vector_terms(sign * wi[:2], wo[:2], cos_i, cos_o) for sign in ((1.0, -1.0) if retro else (1.0,))]
+    slope_x2, slope_y2, base, schlick = (np.stack(arrays) for arrays in zip(*kinds, strict=True))
     w, c = metric.terms(samples)
     return Problem(
         side,
         metric,
         distribution,
-        hx * hx / hz2,
-        hy * hy / hz2,
-        -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d),
+        slope_x2,
+        slope_y2,
+        base,
         np.log(np.maximum(cos_i * cos_o, 1e-12)),
-        schlick_weight(cos_d),
+        schlick,
         np.full_like(cos_o, 1 / np.pi) * (coupling(cos_i, cos_o) if coupled and side == "reflection" else 1.0),
         np.ascontiguousarray(samples.f[here].T.astype(np.float64)),
         w[here],
         c[here],
     )
+
+
+def _half_vector_terms(wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """slope_x2, slope_y2, base and schlick (N,) of `Problem`, of tangential components (2, N) and cosines (N,)."""
+    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
+    length2 = hx * hx + hy * hy + hz * hz
+    cos_d = np.clip((hx * wo[0] + hy * wo[1] + hz * cos_o) / np.sqrt(length2), 1e-6, 1)
+    hz2 = np.maximum(hz * hz, 1e-12)
+    base = -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d)
+    return hx * hx / hz2, hy * hy / hz2, base, schlick_weight(cos_d)
 
 
 def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -> Problem:

@@ -14,7 +14,7 @@ from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.metrics import Metric
-from lambent.materials.fitting.parameters import BOUNDS
+from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS
 from lambent.materials.fitting.problem import Problem, problem_of
 from lambent.materials.fitting.scale import Channel, solve_scale
 from lambent.materials.measured.protocol import MeasuredSamples
@@ -61,7 +61,7 @@ def slices(
     """The slices of lobe `index` of `material`: over (mx, my) and (r0, alpha).
 
     An isotropic table holds one azimuth of wi, which cannot distinguish mx from my: both move as one, and (m, alpha)
-    replaces (mx, my). For a lobe of transmission r0 cannot be separated from kt, so a roughness replaces r0.
+    replaces (mx, my). For other lobes than mirroring ones r0 cannot be separated from k, so a roughness replaces r0.
     """
     lobe = material.lobes[index]
     problem, rest = _prepared(samples, material, index, metric)
@@ -73,12 +73,12 @@ def _planes(lobe: Lobe, tied: bool) -> list[tuple[str, str]]:
     """Pairs of parameters; m is mx and my at once."""
     roughness = "m" if tied else "mx"
     planes = [("m", "alpha") if tied else ("mx", "my")]
-    last = ("r0" if lobe.side == "reflection" else roughness, "alpha")
+    last = ("r0" if lobe.mirrors else roughness, "alpha")
     return planes if last in planes else [*planes, last]
 
 
-def _axis(name: str, best: float, steps: int) -> Floats:
-    low, high = BOUNDS["mx" if name == "m" else name]
+def _axis(name: str, best: float, steps: int, retro: bool) -> Floats:
+    low, high = (RETRO_BOUNDS if retro else BOUNDS)["mx" if name == "m" else name]
     if name == "alpha":
         return np.linspace(low, high, steps)
     if name.startswith("m"):
@@ -89,7 +89,8 @@ def _axis(name: str, best: float, steps: int) -> Floats:
 def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: Metric) -> tuple[Problem, Floats]:
     """Some tuples of the lobe's side, and f (C, N) of everything but the lobe at those."""
     lobe = material.lobes[index]
-    problem = problem_of(samples, lobe.side, metric, lobe.distribution, material.kd_coupled)
+    retro = any(other.retro for other in material.lobes) and lobe.side == "reflection"
+    problem = problem_of(samples, lobe.side, metric, lobe.distribution, material.kd_coupled, retro)
     problem = problem.thinned([TUPLES], 0, [np.float64])[0]
     channels = len(problem.measured)
     diffuse = np.array(material.kd if lobe.side == "reflection" else material.kt_d)[:channels]
@@ -97,7 +98,7 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
     for number, other in enumerate(material.lobes):
         if number != index and other.side == lobe.side:
             shape = np.array([other.mx, other.my, float(np.mean(other.r0)), other.alpha])
-            basis = replace(problem, distribution=other.distribution).basis(shape)
+            basis = replace(problem, distribution=other.distribution).basis(shape, other.retro)
             rest = rest + np.array(other.k)[:channels, None] * basis
     return problem, rest
 
@@ -105,11 +106,13 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
 def _slice(problem: Problem, rest: Floats, lobe: Lobe, plane: tuple[str, str], steps: int, progress: Progress) -> Slice:
     across, down = plane
     own = {"mx": lobe.mx, "my": lobe.my, "r0": float(np.mean(lobe.r0)), "alpha": lobe.alpha, "m": lobe.mx}
-    x, y = (_axis(name, own[name], steps) for name in plane)
+    x, y = (_axis(name, own[name], steps, lobe.retro) for name in plane)
     error = np.empty((len(y), len(x)))
     for row in tracked(range(len(y)), progress, f"error over {across} and {down}"):
         value = y[row]
-        basis = np.stack([problem.basis(_shape(own | {down: float(value), across: float(v)}, plane)) for v in x])
+        basis = np.stack(
+            [problem.basis(_shape(own | {down: float(value), across: float(v)}, plane), lobe.retro) for v in x]
+        )
         totals = np.zeros(len(x))
         for measured, background in zip(problem.measured, rest, strict=True):
             channel = Channel(measured, background, problem.w, problem.c)

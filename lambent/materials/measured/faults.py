@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.directions import HALF_TURN, Floats, angles, direction, normalize
+from lambent.core.directions import HALF_TURN, Floats, angles, direction
 from lambent.core.sequences import r2, radical_inverse
 from lambent.materials.bsdf import more_than_arrives
-from lambent.materials.measured.gonio import GonioTable, Symmetry, groups
+from lambent.materials.measured.gonio import Symmetry, groups
 from lambent.materials.measured.protocol import (
     GRAZING_DEG,
     MeasuredSamples,
@@ -23,11 +23,8 @@ _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 
 NON_RECIPROCAL = 0.05  # shares of the mean from which a difference is reported
 ASYMMETRIC = 0.05
-RETRO_RATIO = 1.5  # f around the light over f beside it, from which it is a peak
 EXTRAPOLATED = 0.005  # share of the pairs of directions from which it is reported
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
-_RINGS_DEG = np.array([3.0, 7.0, 12.0, 18.0, 24.0])  # about the light; the last two are beside it
-_NEAR_DEG, _BESIDE_DEG, _LEAST_NEAR = (0, 10), (18, 30), 3
 _MOST_INCIDENT = 400  # a table with more incident directions than this has no grid of them
 _LEAST_TUPLES = 12
 _BY_LIGHT_DEG = 20  # where the lamp is in the way of most devices
@@ -76,30 +73,6 @@ def asymmetry(table: MeasuredTable, symmetry: Symmetry) -> tuple[float, list[str
     off = max((_difference(table.eval(wi, wo), table.eval(wi, wo * flip)) for wi, flip in pairs), default=0.0)
     said = f"is taken as {symmetry}, but mirrored directions differ by {percentage(100 * off)} of the mean"
     return off, [said] if off > ASYMMETRIC else []
-
-
-def retro(table: MeasuredTable, samples: MeasuredSamples) -> tuple[float, list[str]]:
-    """f in the light's direction over f 18 to 24 degrees beside it; 1 unless f falls from ring to ring about the light.
-
-    A table with a grid of incident directions is tested at those, so that interpolation neither makes nor hides a peak.
-    A ring counts by its median over azimuth, so that neither a lobe elsewhere nor one wrong reading counts. The peak
-    must stand at most incident directions, and measured tuples near the light must show it too: the lamp often hides
-    them, and `eval` then guesses.
-    """
-    found = []
-    for theta_deg, phi_deg in _asked(table) if _brighter_near_light(samples) else []:
-        rings = _rings(table, direction(np.radians(theta_deg), np.radians(phi_deg)))
-        falling = bool((np.diff(rings[:-1]) <= 0).all()) and rings[1] > rings[-2]
-        beside = max(float(rings[-2:].mean()), 1e-9)
-        found.append((float(rings[0]) / beside if falling else 1.0, theta_deg))
-    if not found or np.median([ratio for ratio, _ in found]) < RETRO_RATIO:
-        return 1.0, []
-    ratio, theta_i = max(found)
-    return ratio, [
-        f"is retro-reflective: at theta_i = {theta_i:.3g} degrees f towards the light is {ratio:.3g} times what it is "
-        '20 degrees beside it; look it up with reconstruction="quadrilinear", as aligning on the half vector moves '
-        "that peak"
-    ]
 
 
 def extrapolation(table: MeasuredTable) -> tuple[float, list[str]]:
@@ -184,35 +157,3 @@ def _mirrored(wi: Floats, u: Floats) -> tuple[Floats, Floats]:
     theta = np.arccos(wi[:, 2]) + np.radians(20) * (u[:, 0] - 0.5)
     phi = np.arctan2(wi[:, 1], wi[:, 0]) + np.pi + np.radians(20) * (u[:, 1] - 0.5)
     return theta.clip(0, np.radians(_REACH_DEG)), phi
-
-
-def _asked(table: MeasuredTable) -> list[tuple[float, float]]:
-    """Incident directions in degrees at which the light and the mirror direction are well apart."""
-    if not isinstance(table, GonioTable):
-        return [(theta, 0.0) for theta in (30.0, 45.0, 60.0)]
-    theta_i = [float(theta) for theta in table.theta_i_deg if 25 <= theta <= 65]
-    return [(theta, float(phi)) for theta in theta_i for phi in table.phi_i_deg[:: max(1, len(table.phi_i_deg) // 4)]]
-
-
-def _brighter_near_light(samples: MeasuredSamples) -> bool:
-    """Whether the tuples themselves are brighter near the light than beside it."""
-    theta_i = np.degrees(angles(samples.wi)[0])
-    apart = np.degrees(np.arccos(np.sum(samples.wi * samples.wo, axis=1).clip(-1, 1)))
-    apart_from_lobe = (theta_i > 20) & (theta_i < 70)
-    near, beside = (apart_from_lobe & (low <= apart) & (apart < high) for low, high in (_NEAR_DEG, _BESIDE_DEG))
-    if near.sum() < _LEAST_NEAR or beside.sum() < _LEAST_NEAR:
-        return False
-    medians = [float(np.median(samples.f[part].mean(axis=1))) for part in (near, beside)]
-    return medians[0] > (1 + RETRO_RATIO) / 2 * medians[1]
-
-
-def _rings(table: MeasuredTable, wi: Floats) -> Floats:
-    """(R,) median of f, mean over channels, on rings about wi."""
-    x = normalize(np.cross(wi, np.array([0.0, 1.0, 0.0])))
-    y = np.cross(wi, x)
-    around = np.arange(24) * (2 * np.pi / 24)
-    offset = np.cos(around)[:, None] * x + np.sin(around)[:, None] * y
-    r = np.radians(_RINGS_DEG)[:, None, None]
-    wo = np.cos(r) * wi + np.sin(r) * offset
-    f = table.eval(np.broadcast_to(wi, wo.shape), wo).mean(axis=-1)
-    return np.asarray(np.median(f, axis=1))

@@ -1,23 +1,30 @@
 """Gonio-photometer tables: a grid of incident directions, and for each a sheet of outgoing ones on either side.
 
-Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o|. `half_vector` aligns the lobes first
-(Rusinkiewicz 1998): each neighbouring incident direction w_k is looked up at w_k mirrored about h(wi, wo).
-`quadrilinear` blends the values at wo itself, and suits retro-reflectors. Transmission is looked up as the reflection
-of the pair mirrored at the surface.
+Look-ups between the incident directions (thesis M, 3.2) blend p = f |cos theta_o|, where reconstruction.py says.
+Transmission is looked up as the reflection of the pair mirrored at the surface.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.directions import FLIP_Z, angles, direction, half_vector, raised, reflect
-from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, Quantity, TableInfo, collect
+from lambent.core.directions import FLIP_Z, angles, direction, raised
+from lambent.materials.document import Material
+from lambent.materials.measured.protocol import (
+    RETRO_PROPOSAL,
+    MeasuredSamples,
+    MeasuredTable,
+    Quantity,
+    TableInfo,
+    collect,
+)
+from lambent.materials.measured.reconstruction import AUTO, Choice, Fold, Reconstruction, choice_of, looked_up
 from lambent.materials.measured.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.table import (
     bracket,
@@ -33,8 +40,8 @@ Sheets = tuple[tuple[AnySheet, ...], ...]
 FORMAT = "gonio text"
 Symmetry = Literal["isotropic", "quadrant", "half", "none"]
 PHI_I_RANGE_DEG: dict[Symmetry, float] = {"isotropic": 0.0, "quadrant": 90.0, "half": 180.0, "none": 360.0}
-Reconstruction = Literal["half_vector", "quadrilinear"]
 _COS_MIN = 1e-4
+_MOST_FOLDS, _MOST_LEFT_OUT = 16, 400_000  # incident directions and tuples that choose the reconstruction
 _STEEPEST = 4.0  # times f of a neighbour: limit where wo is at the horizon and the direction looked up is above it
 
 
@@ -54,7 +61,7 @@ class GonioTable(MeasuredTable):
         isotropic; quadrant: mirrored at x = 0 and y = 0, phi_i from 0 to 90; half: f(-x, -y) = f(x, y), phi_i from 0
         to 180; none.
     reconstruction : str
-        How `eval` looks up between incident directions.
+        How `eval` looks up between incident directions; by default as `choice_of` finds best.
     stored, file, notes, format
         As in `TableInfo`.
     """
@@ -66,7 +73,7 @@ class GonioTable(MeasuredTable):
     transmitted: Sheets = ()
     symmetry: Symmetry = "isotropic"
     stored: Quantity = "f"
-    reconstruction: Reconstruction = "half_vector"
+    reconstruction: Reconstruction | Literal["auto"] = AUTO
     file: str | None = None
     notes: tuple[str, ...] = ()
     format: str = FORMAT
@@ -74,6 +81,34 @@ class GonioTable(MeasuredTable):
     def __post_init__(self) -> None:
         values = np.concatenate([sheet.values.ravel() for _, _, sheet, _ in self.entries()])
         require_values(values, usable_values(values[:, None]), self.file or self.name)
+
+    @cached_property
+    def choice(self) -> Choice:
+        """The reconstruction in use; for `auto`, with the errors that chose it."""
+        return choice_of(self._folds()) if self.reconstruction == AUTO else Choice(self.reconstruction)
+
+    def _folds(self) -> Iterator[Fold]:
+        """Inner theta_i, evenly at most _MOST_FOLDS, or both of two, with predictions from their neighbours."""
+        count = len(self.theta_i_deg)
+        left_out = np.arange(1, count - 1) if count > 2 else np.arange(count if count == 2 else 0)
+        if len(left_out) == 0:
+            return
+        samples = self.samples(_MOST_LEFT_OUT)
+        for k in left_out[:: -(-len(left_out) // _MOST_FOLDS)]:
+            beside = [i for i in (k - 1, k + 1) if 0 <= i < count]
+            near, far = (tuple(rows[i] for i in beside) if rows else () for rows in (self.reflected, self.transmitted))
+            rest = replace(self, theta_i_deg=self.theta_i_deg[beside], reflected=near, transmitted=far)
+
+            def predicted(way: Reconstruction, asked: MeasuredSamples, rest: GonioTable = rest) -> Floats:
+                return replace(rest, reconstruction=way).eval(asked.wi, asked.wo)
+
+            here = np.flatnonzero(np.isclose(samples.wi[:, 2], np.cos(np.radians(self.theta_i_deg[k])), atol=1e-9))
+            if len(here):
+                yield samples.take(here), predicted
+
+    @property
+    def proposal(self) -> Material:
+        return RETRO_PROPOSAL if self.choice.way == "back_vector" else super().proposal
 
     @cached_property
     def info(self) -> TableInfo:  # type: ignore[override]
@@ -115,7 +150,7 @@ class GonioTable(MeasuredTable):
         theta, phi = angles(wi)
         i, i1, u = bracket(self.theta_i_deg, np.degrees(theta))
         j, j1, v, turned, turned1 = self._phi_bracket(np.degrees(phi))
-        h = half_vector(wi, wo)
+        asked_of = looked_up(self.choice.way, wi, wo)
         f = np.zeros((len(wi), self.info.channels))
         for a, b, turn, weight in (
             (i, j, turned, (1 - u) * (1 - v)), (i, j1, turned1, (1 - u) * v),
@@ -123,13 +158,15 @@ class GonioTable(MeasuredTable):
         ):  # fmt: skip
             half_turn = np.where(turn[:, None], (-1.0, -1.0, 1.0), 1.0)
             neighbour = direction(np.radians(self.theta_i_deg[a]), np.radians(self.phi_i_deg[b])) * half_turn
-            asked = (reflect(neighbour, h) if self.reconstruction == "half_vector" else wo) * half_turn
-            # Interpolate p, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon. At the
-            # horizon itself f = p / cos would diverge and make single pixels too bright.
-            weight = weight * np.minimum(np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN), _STEEPEST)
-            for k, rows in groups(a * len(self.phi_i_deg) + b, np.flatnonzero(weight > 0)):
-                sheet = sheets[k // len(self.phi_i_deg)][k % len(self.phi_i_deg)]
-                f[rows] += sheet.at(asked[rows]) * weight[rows, None]
+            for unturned, share, about_light in asked_of(neighbour):
+                asked = unturned * half_turn
+                # Interpolate p, not f: f of a lobe bends steeply over theta_i, and p falls to 0 at the horizon. At the
+                # horizon itself f = p / cos would diverge and make single pixels too bright.
+                p_over_f = np.minimum(np.maximum(asked[:, 2], 0) / np.maximum(wo[:, 2], _COS_MIN), _STEEPEST)
+                part = weight * p_over_f * share
+                for k, rows in groups(a * len(self.phi_i_deg) + b, np.flatnonzero(part > 0)):
+                    sheet = sheets[k // len(self.phi_i_deg)][k % len(self.phi_i_deg)]
+                    f[rows] += sheet.at(asked[rows], about_light=about_light) * part[rows, None]
         return f
 
     def _phi_bracket(self, phi_deg: Floats) -> tuple[Indices, Indices, Floats, Flags, Flags]:

@@ -60,7 +60,7 @@ class _Viewers:
 
     nodes: list[tuple[Any, Any]]  # numbers and blending weights
     up: Vector  # wo on the upper side, turned to phi = 0 of an isotropic grid
-    turn: tuple[Any, Any]  # cosine and sine of that turn
+    turn: tuple[Any, Any]  # cosine and sine of that turn, a further half turn where the peaks are about the light
     face: Any  # number of the face, 0 or 1
 
     def blend(self, table: Any, first: Any, ops: ArrayOps) -> Any:
@@ -99,6 +99,8 @@ class HalfVectorGrid:
         Probability of a transmitted sample.
     albedo, peak : (faces, kinds, viewers) flat float32
         Integral of f cos(theta_i) over the side, and its largest value in 1/sr; means over the channels.
+    about_light : bool
+        Whether the cells are those of back vectors: of half vectors with wi mirrored about n (Belcour et al. 2014).
     """
 
     ARRAYS: ClassVar[tuple[str, ...]] = ("values", "marginal", "conditional", "density", "across")
@@ -113,6 +115,7 @@ class HalfVectorGrid:
     across: Any
     albedo: Any = None
     peak: Any = None
+    about_light: bool = False
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -195,8 +198,12 @@ class HalfVectorGrid:
 
     def share_across(self, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
         """Probability of a transmitted sample; `viewers` are those around wo, where they are known."""
+        return self.of_viewer(self.across, wo, ops, viewers)
+
+    def of_viewer(self, table: Any, wo: Vector, ops: ArrayOps = NUMPY, viewers: _Viewers | None = None) -> Any:
+        """Entries of a table (faces, viewers), between the viewer nodes."""
         viewers = viewers or self._viewers(wo, ops)
-        return viewers.blend(self.across, viewers.face * self.shape.viewers, ops)
+        return viewers.blend(table, viewers.face * self.shape.viewers, ops)
 
     def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
         """Share of the light that is reflected or transmitted, mean over the channels, between the viewer nodes."""
@@ -223,7 +230,7 @@ class HalfVectorGrid:
         return np.array(mirrored + rows)
 
     def _viewers(self, wo: Vector, ops: ArrayOps) -> _Viewers:
-        shape = self.shape
+        shape, half_turn = self.shape, -1.0 if self.about_light else 1.0
         face = ops.whole(ops.select((wo[2] < 0) & (self.faces == 2), 1.0, 0.0))
         x, y, z = wo[0], wo[1], ops.abs(wo[2])
         sin_theta = ops.sqrt(x * x + y * y)
@@ -234,7 +241,7 @@ class HalfVectorGrid:
         if shape.viewer_phi == 1:
             off = sin_theta > 1e-7
             length = ops.maximum(sin_theta, 1e-7)
-            turn = ops.select(off, x / length, 1.0), ops.select(off, y / length, 0.0)
+            turn = half_turn * ops.select(off, x / length, 1.0), half_turn * ops.select(off, y / length, 0.0)
             return _Viewers([(row, 1 - share), (row + 1, share)], (sin_theta, 0 * z, z), turn, face)
         around = turns(y, x, ops) * shape.viewer_phi
         left = ops.minimum(ops.floor(around), shape.viewer_phi - 1.0)
@@ -245,7 +252,7 @@ class HalfVectorGrid:
             for step, along in ((0, 1 - share), (1, share))
             for column, across in ((first, 1 - beside), (second, beside))
         ]
-        return _Viewers(nodes, (x, y, z), (1.0 + 0 * z, 0.0 * z), face)
+        return _Viewers(nodes, (x, y, z), (half_turn + 0 * z, 0.0 * z), face)
 
     def _page(self, viewers: _Viewers, across: Any, ops: ArrayOps) -> Any:
         """Number of the first viewer of a face and kind."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
-from lambent.core.directions import FLIP_Z, Floats, direction, normalize, reflect
+from lambent.core.directions import FLIP_Z, HALF_TURN, Floats, direction, normalize, reflect
 from lambent.core.progress import Progress, silent
+from lambent.materials.bsdf import components
+from lambent.materials.measured.back_vector import back_share
 from lambent.materials.measured.half_vector_grid import (
     ANISOTROPIC,
     ISOTROPIC,
@@ -18,16 +21,23 @@ from lambent.materials.measured.half_vector_grid import (
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.two_sided import TwoSided
 
+_FLAT = (*HalfVectorGrid.ARRAYS, "albedo", "peak")
 _LOWEST_COSINE = 0.02  # cells whose wi is lower take f at this height, so that blending meets no edge at the horizon
 
 
 def grid_of(
-    table: MeasuredTable | TwoSided, shape: GridShape | None = None, progress: Progress = silent
+    table: MeasuredTable | TwoSided,
+    shape: GridShape | None = None,
+    progress: Progress = silent,
+    part: Literal["whole", "mirror", "light"] = "whole",
 ) -> HalfVectorGrid:
-    """A table on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table declares itself."""
+    """A table on the grid; `shape` is by default ISOTROPIC or ANISOTROPIC, as the table declares itself.
+
+    Parts are for `TwinGrid`: what `back_share` counts to the mirror direction, and what it counts to the light.
+    """
     shape = shape or (ISOTROPIC if table.info.isotropic else ANISOTROPIC)
     sheet = table if isinstance(table, TwoSided) else TwoSided(table)
-    faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits else 1
+    faces, kinds = 2 if sheet.has_a_back else 1, 2 if table.info.transmits and part != "light" else 1
     values = np.zeros((faces, kinds, shape.viewer_theta, shape.viewer_phi, shape.cells, 3), np.float32)
     weights, peak = np.zeros(values.shape[:-1]), np.zeros(values.shape[:-2], np.float32)
     viewers, h = _viewer_nodes(shape), _cell_centres(shape)
@@ -46,17 +56,27 @@ def grid_of(
             cos_i = np.maximum(wi[:, 2], 0)
             gain = 4 * np.maximum(np.sum(wo * h, axis=-1), 0)  # d_wi/d_h
             wi[:, 2] = np.maximum(wi[:, 2], _LOWEST_COSINE)
-            wi = normalize(wi)
+            wi = normalize(wi) * (HALF_TURN if part == "light" else 1.0)
+            share = _share_of(part, wi, wo)
             for face, kind in np.ndindex(faces, kinds):
                 wo_there, wi_there = (w * FLIP_Z if below else w for w, below in ((wo, face), (wi, face != kind)))
-                f = sheet.eval(wi_there, wo_there)
+                f = sheet.eval(wi_there, wo_there) * (share if kind == 0 else 1.0)
                 values[face, kind, a, b] = f
                 p = f.mean(axis=-1) * cos_i
                 weights[face, kind, a, b] = p * gain
                 peak[face, kind, a, b] = p.max()
     progress(len(viewers), len(viewers), f"resampled {table.info.file}")
     sizes = (faces, kinds, shape.viewers, shape.cells)
-    return _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes), peak)
+    found = _with_distributions(shape, values.reshape(*sizes, 3), weights.reshape(sizes), peak)
+    return replace(found, about_light=part == "light")
+
+
+def _share_of(part: str, wi: Floats, wo: Floats) -> Any:
+    """Share (N, 1) of f that belongs to a part of the table."""
+    if part == "whole":
+        return 1.0
+    back = back_share(components(wi), components(wo))[:, None]
+    return back if part == "light" else 1 - back
 
 
 def _twins(table: TwoSided, shape: GridShape) -> list[tuple[int, Any]]:
@@ -126,7 +146,8 @@ def _with_distributions(shape: GridShape, values: Floats, weights: Floats, peak:
     share = np.diff(marginal.astype(float), axis=-1, prepend=0.0)[..., None]
     density = share * np.diff(conditional.astype(float), axis=-1, prepend=0.0) / omega
     flat = (a.astype(np.float32).ravel() for a in (values, marginal, conditional, density, across, total, peak))
-    return HalfVectorGrid(shape, faces, kinds, *flat)
+    arrays: dict[str, Any] = dict(zip(_FLAT, flat, strict=True))
+    return HalfVectorGrid(shape, faces, kinds, **arrays)
 
 
 def _cdf(mass: Floats) -> Floats:

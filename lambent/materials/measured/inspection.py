@@ -9,8 +9,9 @@ import numpy as np
 from lambent.core.directions import direction
 from lambent.materials.bsdf import more_than_arrives
 from lambent.materials.measured import faults
-from lambent.materials.measured.gonio import symmetry_of
+from lambent.materials.measured.gonio import GonioTable, symmetry_of
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.retro import retro
 
 _THETA_I_DEG = (0, 15, 30, 45, 60, 75)
 
@@ -22,6 +23,8 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     -------
     dict
         `file`, `format`, `stored`, `channels`, `symmetry`, `transmits`, `sizes`, `notes` as in `TableInfo`;
+        `reconstruction`: of a gonio table, the way in use between incident directions, and E of each way in percent
+        of E against black, see reconstruction.py;
         `albedo`: `theta_i_deg` and, per angle and channel, `reflectivity` and `transmissivity`;
         `tuples`: used, how many of these are below zero in a channel, and left out by reason;
         `faults`: `not_measured_percent`, `not_finite_percent` of the tuples, `negative_percent` of those used,
@@ -39,7 +42,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
     negative = faults.negative(samples)
     non_reciprocal, not_mutual = faults.non_reciprocity(table)
     off, asymmetric = faults.asymmetry(table, symmetry)
-    retro_ratio, towards_light = faults.retro(table, samples)
+    retro_ratio, towards_light = retro(table, samples)
     isolated, under_sampled = faults.under_sampled(samples)
     extrapolated, beyond = faults.extrapolation(table)
     too_bright = faults.too_bright(np.array(_THETA_I_DEG), r + t)
@@ -52,6 +55,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
         "transmits": info.transmits,
         "sizes": dict(info.sizes),
         "notes": list(info.notes),
+        "reconstruction": _reconstruction(table),
         "albedo": {
             "theta_i_deg": list(_THETA_I_DEG),
             "reflectivity": r.round(5).tolist(),
@@ -81,3 +85,10 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             *beyond,
         ],
     }
+
+
+def _reconstruction(table: MeasuredTable) -> dict[str, Any]:
+    if not isinstance(table, GonioTable):
+        return {}
+    percent = {f"{way}_percent": 100 * error for way, error in table.choice.errors.items()}
+    return {"way": table.choice.way, **percent}

@@ -23,12 +23,14 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import COS_MIN, NUMPY, ArrayOps, Vector
+from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid, chosen_side, first_above, turns
 from lambent.materials.measured.half_vector_resampling import grid_of
 from lambent.materials.measured.klems import BEYOND, WHOLE_DEG, AngleBasis, PatchMatrix
 from lambent.materials.measured.lbnl_parts import Side, Way
 from lambent.materials.measured.lbnl_xml import LbnlTable, Use
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.twin_grid import TwinGrid, twin_grid_of
 from lambent.materials.measured.two_sided import Reversed
 
 _WAYS: tuple[Way, ...] = ("reflection", "transmission")
@@ -182,14 +184,14 @@ class PatchSheet:
         return ops.whole(ops.gather(self.starts, ring) + place), count > 0.5
 
 
-Lookup = HalfVectorGrid | PatchSheet
+Lookup = HalfVectorGrid | PatchSheet | TwinGrid
 _TREE = GridShape(180, 1, 256, 64)  # isotropic trees: their steps do not follow the mirror direction between viewers
 
 
 def lookup_of(
     table: MeasuredTable, shape: GridShape | None = None, progress: Progress = silent, *, reverse: bool = False
 ) -> Lookup:
-    """The patches of a table made of patch matrices, else its dense grid of the given `shape`.
+    """The patches of a table made of patch matrices, else its dense grid of the given `shape`, or two of them.
 
     `reverse`: the light's direction is given and the viewer's is sampled; all methods exchange `wi` and `wo`.
     """
@@ -198,7 +200,8 @@ def lookup_of(
         return sheet
     if shape is None and isinstance(table, LbnlTable) and table.info.isotropic:
         shape = _TREE
-    return grid_of(Reversed(table) if reverse else table, shape, progress)
+    returns = isinstance(table, GonioTable) and table.choice.way == "back_vector"
+    return (twin_grid_of if returns else grid_of)(Reversed(table) if reverse else table, shape, progress)
 
 
 def patch_sheet_of(table: MeasuredTable, *, reverse: bool = False) -> PatchSheet | None:

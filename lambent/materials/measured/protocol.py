@@ -9,7 +9,7 @@ RGB with Rec.709 primaries.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from typing import Literal
 
@@ -30,6 +30,8 @@ _WHITE, _HALF = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 _PROPOSAL = Material(
     kd=_WHITE, lobes=tuple(Lobe(distribution="ggx", mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.02, 0.08, 0.3))
 )
+_RETRO = tuple(Lobe(retro=True, mx=m, my=m, r0=_WHITE, k=_HALF) for m in (0.004, 0.02, 0.1))
+RETRO_PROPOSAL = _PROPOSAL.model_copy(update={"lobes": (*_PROPOSAL.lobes, *_RETRO)})  # for peaks about the light
 _QUADRATURE_POINTS = 4096
 
 
@@ -108,6 +110,10 @@ class MeasuredSamples:
     def __len__(self) -> int:
         return len(self.wi)
 
+    def take(self, index: Indices) -> MeasuredSamples:
+        """The tuples `index`."""
+        return replace(self, **{name: getattr(self, name)[index] for name in ("wi", "wo", "f", "weight")})
+
     @property
     def p(self) -> Floats:
         """(N, C) transfer probability f |cos theta_o| in 1/sr (2.4)."""
@@ -143,6 +149,11 @@ class MeasuredTable(ABC):
 
     info: TableInfo
 
+    @property
+    def proposal(self) -> Material:
+        """A material with lobes where the table may have peaks, whose samples integrate it."""
+        return _PROPOSAL
+
     @abstractmethod
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr without the cosine, of wi, wo (..., 3); >= 0; holes are filled from their neighbours."""
@@ -171,14 +182,14 @@ class MeasuredTable(ABC):
         return np.array(value).reshape(*wi.shape[:-1], self.info.channels)
 
     def _integral_of_one(self, wi: Floats, side: float) -> Floats:
-        wo, weight = quadrature(wi)
+        wo, weight = quadrature(wi, self.proposal)
         f = self.eval(np.broadcast_to(wi, wo.shape), wo * (1, 1, side))
         return np.asarray((f * weight[:, None]).sum(axis=0))
 
 
-def quadrature(wi: Floats, points: int = _QUADRATURE_POINTS) -> tuple[Floats, Floats]:
-    """wo (N, 3) on the side of wi (3,), closer about the mirror direction, and weights (N,) whose sum over f is r."""
-    proposal, u = MaterialBSDF(_PROPOSAL), _low_discrepancy(points)
+def quadrature(wi: Floats, toward: Material = _PROPOSAL, points: int = _QUADRATURE_POINTS) -> tuple[Floats, Floats]:
+    """wo (N, 3) on the side of wi (3,), where `toward` scatters to, and weights (N,) whose sum over f is r."""
+    proposal, u = MaterialBSDF(toward), _low_discrepancy(points)
     all_wi = np.broadcast_to(wi, u.shape)
     wo = proposal.sample(all_wi, u)
     pdf = proposal.pdf(wo, all_wi)

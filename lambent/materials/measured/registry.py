@@ -6,16 +6,19 @@ A reader is a module of this package that has `NAME` (str), `recognise(head: byt
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
+from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.reconstruction import AUTO, Reconstruction
 from lambent.materials.measured.text_numbers import UTF16, is_utf16
 from lambent.materials.measured.unread import kind_of
 
@@ -45,20 +48,27 @@ def readers() -> tuple[Reader, ...]:
     return tuple(sorted(modules_in(package, having="recognise").values(), key=lambda reader: reader.NAME))
 
 
-def load(path: Path | str) -> MeasuredTable:
+def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AUTO) -> MeasuredTable:
     """Read a measured material of any known format.
+
+    `reconstruction` says how a gonio table is looked up between its incident directions, see reconstruction.py.
 
     Raises
     ------
     UserError
-        The file is missing, of no known format, or broken.
+        The file is missing, of no known format, or broken; or a reconstruction was given and it is no gonio table.
     """
     path = Path(path)
     head, size = _head(path)
     reader = _reader_of(head, size, path)
     if reader is not None:
         with _foreign_bytes(reader, path):
-            return reader.read(path)
+            table = reader.read(path)
+        if reconstruction == AUTO:
+            return table
+        if not isinstance(table, GonioTable):
+            raise UserError(f"{reader.NAME} has its own way between directions", file=path, field="reconstruction")
+        return dataclasses.replace(table, reconstruction=reconstruction)
     if head.startswith(UTF16):
         raise is_utf16(path)
     if (kind := kind_of(head)) is not None:

@@ -20,15 +20,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.directions import Floats, angles, direction, half_vector, raised, reflect
+from lambent.core.directions import HALF_TURN, Floats, angles, direction, half_vector, raised, reflect
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import components
-from lambent.materials.chi_square import ChiSquare, chi_square
+from lambent.materials.chi_square import ChiSquare, chi_square, combined
 from lambent.materials.lobes import COS_MIN
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
-from lambent.materials.measured.patch_sheet import lookup_of, patch_sheet_of
+from lambent.materials.measured.patch_sheet import Lookup, lookup_of, patch_sheet_of
 from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.twin_grid import TwinGrid
 from lambent.materials.measured.two_sided import TwoSided
 
 ABSORBED, REFLECTED, TRANSMITTED = 0, 1, 2
@@ -80,12 +81,11 @@ class TableBSDF:
 
     def pdf(self, wi: Floats, wo: Floats) -> Floats:
         """Density (...) in 1/sr of `sample` given wo."""
-        return np.asarray(self.lookup.pdf(components(wi), components(wo)))
+        return _Part(self.lookup).pdf(wi, wo)
 
     def sample(self, wo: Floats, u: Floats) -> Floats:
         """wi (..., 3) from wo (..., 3) and u (..., 3) uniform in [0, 1)."""
-        u_select, u1, u2 = components(u)
-        return np.stack(self.lookup.sample(components(wo), u_select, u1, u2), axis=-1)
+        return _Part(self.lookup).sample(wo, u)
 
     def looked_up(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., 3) in 1/sr as the path tracer looks it up; on a grid it deviates a little from `eval`."""
@@ -102,7 +102,13 @@ class TableBSDF:
     def chi_square(self, wo: Floats, *, samples: int = 1_000_000, seed: int = 0) -> ChiSquare:
         """Test of `sample` against `pdf` for one wo (3,), in cells along the steps of the density."""
         if isinstance(self.lookup, HalfVectorGrid):
-            return self._chi_square_in_half_vectors(wo, self.lookup, samples, seed)
+            return _chi_square_in_half_vectors(self, self.lookup, wo, samples, seed)
+        if isinstance(self.lookup, TwinGrid):
+            share = float(self.lookup.share_returned(components(wo)))
+            parts = ((self.lookup.mirror, 1 - share), (self.lookup.light, share))
+            return combined(
+                [_chi_square_in_half_vectors(_Part(grid), grid, wo, round(samples * p), seed) for grid, p in parts]
+            )
         return chi_square(
             lambda u: self.sample(np.broadcast_to(wo, u.shape), u),
             lambda wi: self.pdf(wi, np.broadcast_to(wo, wi.shape)),
@@ -111,26 +117,45 @@ class TableBSDF:
             cells=self.lookup.cell_borders(wo),
         )
 
-    def _chi_square_in_half_vectors(self, wo: Floats, grid: HalfVectorGrid, samples: int, seed: int) -> ChiSquare:
-        """Test in half vectors; a transmitted direction counts by that of its mirror image, below the surface."""
-        theta, phi = (float(a) for a in angles(wo))
-        wo = direction(theta, phi if grid.anisotropic else 0.0)
-        up, side = raised(wo), np.sign(wo[2])
 
-        def half_vectors(u: Floats) -> Floats:
-            wi = self.sample(np.broadcast_to(wo, u.shape), u)
-            h = half_vector(raised(wi), up)
-            h[:, 2] *= np.sign(wi[:, 2] * side)
-            return h
+@dataclass(frozen=True)
+class _Part:
+    """The sampler and the density of a look-up, on arrays."""
 
-        def density(h: Floats) -> Floats:
-            cos_d = raised(h) @ up
-            wi = reflect(up, raised(h))
-            possible = (wi[:, 2] > 0) & (cos_d > 0)
-            wi[:, 2] *= side * np.sign(h[:, 2])
-            return np.where(possible, self.pdf(wi, np.broadcast_to(wo, wi.shape)) * 4 * cos_d, 0.0)
+    lookup: Lookup
 
-        return chi_square(half_vectors, density, samples=samples, seed=seed, cells=grid.cell_borders())
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        return np.asarray(self.lookup.pdf(components(wi), components(wo)))
+
+    def sample(self, wo: Floats, u: Floats) -> Floats:
+        return np.stack(self.lookup.sample(components(wo), *components(u)), axis=-1)
+
+
+def _chi_square_in_half_vectors(
+    bsdf: TableBSDF | _Part, grid: HalfVectorGrid, wo: Floats, samples: int, seed: int
+) -> ChiSquare:
+    """Test of a sampler on a grid against its density for one wo (3,), in the cells of half or back vectors.
+
+    A transmitted direction counts by that of its mirror image, below the surface.
+    """
+    theta, phi = (float(a) for a in angles(wo))
+    wo = direction(theta, phi if grid.anisotropic else 0.0)
+    up, side, turn = raised(wo), np.sign(wo[2]), HALF_TURN if grid.about_light else 1.0
+
+    def half_vectors(u: Floats) -> Floats:
+        wi = bsdf.sample(np.broadcast_to(wo, u.shape), u)
+        h = half_vector(raised(wi) * turn, up)
+        h[:, 2] *= np.sign(wi[:, 2] * side)
+        return h
+
+    def density(h: Floats) -> Floats:
+        cos_d = raised(h) @ up
+        wi = reflect(up, raised(h)) * turn
+        possible = (wi[:, 2] > 0) & (cos_d > 0)
+        wi[:, 2] *= side * np.sign(h[:, 2])
+        return np.where(possible, bsdf.pdf(wi, np.broadcast_to(wo, wi.shape)) * 4 * cos_d, 0.0)
+
+    return chi_square(half_vectors, density, samples=samples, seed=seed, cells=grid.cell_borders())
 
 
 class _Photons:

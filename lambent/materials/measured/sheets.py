@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
-from lambent.core.directions import angles, direction
+from lambent.core.directions import HALF_TURN, angles, direction
 from lambent.core.sequences import r2
 from lambent.materials.measured.table import bracket, fill_holes, sensible
 
@@ -74,7 +74,7 @@ class Sheet:
         filled = np.maximum(fill_holes(f, usable, periodic_axis=1), 0) if usable.any() else np.zeros_like(f)
         return np.concatenate([filled, filled[:, :1]], axis=1)
 
-    def at(self, w: Floats) -> Floats:
+    def at(self, w: Floats, *, about_light: bool = False) -> Floats:
         """f (N, C) of directions (N, 3), bilinear; beyond the grid's theta, that of its last ring."""
         theta, phi = angles(w if self.frame is None else w @ self.frame.T)
         t, t1, u = bracket(self.theta_deg, np.degrees(theta))
@@ -132,22 +132,29 @@ class ScatteredSheet:
 
     @cached_property
     def _lookup(self) -> LookUp:
+        return self._lookup_about(self.specular)
+
+    @cached_property
+    def _lookup_about_light(self) -> LookUp:
+        return self._lookup_about(self.specular * HALF_TURN)
+
+    def _lookup_about(self, frame: Floats) -> LookUp:
         usable = sensible(self.values)
         w, f = self.directions[usable], np.maximum(self.values[usable], 0)
         if len(w) == 0:
             return lambda asked: np.zeros((len(asked), f.shape[1]))
         if np.abs(w @ self.specular[1]).max() < _IN_PLANE:
-            return _plane_scan(w, f, self.specular)
+            return _plane_scan(w, f, frame)
         return _triangulated(w, f)
 
-    def at(self, w: Floats) -> Floats:
+    def at(self, w: Floats, *, about_light: bool = False) -> Floats:
         """f (N, C) of directions (N, 3).
 
-        A scan in the plane of incidence is looked up by the angle from the mirror direction; the lobe is taken as
-        turned about it from one half of the plane to the other. Other sets are interpolated linearly over the triangles
-        of their directions, beyond them by the nearest.
+        A scan in the plane of incidence is looked up by the angle from the mirror direction, or from the light; the
+        lobe is taken as turned about it from one half of the plane to the other. Other sets are interpolated linearly
+        over the triangles of their directions, beyond them by the nearest.
         """
-        return self._lookup(w)
+        return (self._lookup_about_light if about_light else self._lookup)(w)
 
     def weights(self) -> Floats:
         """(N,) the part of the hemisphere nearest to each direction, in sr; one with a mirror image stands for both."""

@@ -44,6 +44,8 @@ class Setup:
         Reflected directions closer to the lamp than this are hidden by its arm and not measured.
     grazing_deg : float
         Largest theta_o.
+    about_lamp : bool
+        Whether the finer spacing is about the lamp as well, for retro-reflectors.
     seed : int
         Of the noise; each incident direction has its own stream.
     """
@@ -58,6 +60,7 @@ class Setup:
     floor: float = 1e-4
     sector_deg: float = 4.0
     grazing_deg: float = 85.0
+    about_lamp: bool = False
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -107,7 +110,7 @@ def synthesise(material: Material, setup: Setup | None = None, progress: Progres
 
 
 def outgoing_grid(theta_i_deg: float, phi_i_deg: float, setup: Setup) -> tuple[Floats, Floats]:
-    """(theta_o, phi_o) in degrees for one incident direction: regular, and finer around the mirror direction."""
+    """(theta_o, phi_o) in degrees for one incident direction: regular, and finer around its peaks."""
     step, fine, reach = setup.step_deg, setup.fine_deg, setup.fine_reach_deg
     theta = np.arange(0, setup.grazing_deg + 1e-9, step)
     near = theta_i_deg + np.arange(-reach, reach + 1e-9, fine)
@@ -115,8 +118,9 @@ def outgoing_grid(theta_i_deg: float, phi_i_deg: float, setup: Setup) -> tuple[F
     phi = np.arange(0, 360, step)
     across = max(np.sin(np.radians(theta_i_deg)), 1e-3)  # factor by which a step in phi is shorter on the sphere
     if fine / across < step:
-        near = phi_i_deg + 180 + np.arange(-reach, reach + 1e-9, fine) / across
-        phi = np.union1d(phi, (near % 360).round(4) % 360)
+        for middle in (180, 0) if setup.about_lamp else (180,):
+            near = phi_i_deg + middle + np.arange(-reach, reach + 1e-9, fine) / across
+            phi = np.union1d(phi, (near % 360).round(4) % 360)
     return theta, phi
 
 

@@ -146,7 +146,8 @@ def _with_tis(table: GonioTable, tis: Floats) -> GonioTable:
     with np.errstate(over="ignore", invalid="ignore"):
         stated = tis[:_MOST_CHECKED].mean(axis=-1)
     wi = direction(np.radians(table.theta_i_deg[:_MOST_CHECKED]), np.radians(table.phi_i_deg[0]))
-    ours = (table.transmissivity(wi) if table.transmitted else table.reflectivity(wi)).mean(axis=-1)
+    measured = replace(table, reconstruction="quadrilinear")  # at measured directions all ways are one
+    ours = (measured.transmissivity(wi) if table.transmitted else measured.reflectivity(wi)).mean(axis=-1)
     pairs = ", ".join(
         f"{s:.4f} ({o:.4f}) at {theta:g}" for s, o, theta in zip(stated, ours, table.theta_i_deg, strict=False)
     )

@@ -9,7 +9,7 @@ import numpy as np
 from lambent.core.plain import triple
 from lambent.materials import lobes
 from lambent.materials.bsdf import components
-from lambent.materials.document import Distribution, Lobe, Side
+from lambent.materials.document import LEAST_ALPHA, Distribution, Lobe, Side
 from lambent.materials.models.model import Floats, Model, Parameter
 
 
@@ -32,14 +32,17 @@ class Kurt(Model):
         "lossless": "no masking term returns the part of the lobe below the horizon",
     }
     side: ClassVar[Side] = "reflection"
+    retro: ClassVar[bool] = False
     distribution: ClassVar[Distribution] = "beckmann"
 
     @property
     def lobe(self) -> Lobe:
         """The lobe with these values, as a material document holds it."""
-        shape = {name: self.number(name) for name in ("mx", "my", "alpha")}
+        mx, my, alpha = (self.number(name) for name in ("mx", "my", "alpha"))
         k, r0 = (triple(self.rgb(name)) for name in ("k", "r0"))
-        return Lobe(side=self.side, distribution=self.distribution, k=k, r0=r0, **shape)
+        return Lobe(
+            side=self.side, distribution=self.distribution, k=k, r0=r0, mx=mx, my=my, alpha=alpha, retro=self.retro
+        )
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         return np.stack(lobes.evaluate(components(wi), components(wo), self.lobe), axis=-1)
@@ -67,3 +70,19 @@ class KurtTransmission(Kurt):
     title = "Kurt et al., transmission"
     white: ClassVar = {"k": 1.0, "r0": 0.0, "alpha": 0.5}
     side = "transmission"
+
+
+class KurtRetro(Kurt):
+    """The lobe about the direction to the light, with the light mirrored about the normal."""
+
+    name = "kurt-retro"
+    title = "Kurt et al., retro-reflection"
+    source = (
+        f"{Kurt.source}; Belcour, Pacanowski, Delahaie, Laville-Geay, Eupherte 2014, Bidirectional reflectance "
+        "distribution function measurements and analysis of retroreflective materials"
+    )
+    parameters = (
+        *Kurt.parameters[:-1],
+        Parameter("alpha", LEAST_ALPHA, 1.0, 0.0, "exponent of the cosine product: below 0 grazing light is lost"),
+    )
+    retro = True

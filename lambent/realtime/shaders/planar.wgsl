@@ -200,9 +200,9 @@ struct PlanarLight {
     var interleaved = 0u;
     for (var i = 0u; i < LOBES; i++) {
         let found = integrate_planar(i, wo, s, place);
-        let through = lobes[i].lobe.side == LAMBENT_TRANSMISSION; // light from behind the plane: left to the probe
-        let light = select(clamp(found.rgb, vec3f(0.0), vec3f(HALF_MAX)), vec3f(0.0), through);
-        let rough = found.a > 0.0 && !through;
+        let elsewhere = !lobe_mirrors(lobes[i].lobe); // light from behind the plane or from the viewer: left to the probe
+        let light = select(clamp(found.rgb, vec3f(0.0), vec3f(HALF_MAX)), vec3f(0.0), elsewhere);
+        let rough = found.a > 0.0 && !elsewhere;
         result.rough += select(vec4f(0.0), vec4f(light, 0.0), rough);
         result.sharp += select(vec4f(light, 0.0), vec4f(0.0), rough);
         interleaved |= select(0u, 1u << i, rough);

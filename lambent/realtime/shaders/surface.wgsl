@@ -122,7 +122,13 @@ fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -
     return painted.diffuse * (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
 }
 
-// A direction of the upper side on the lobe's side: transmission is reflection mirrored at the surface.
+// A direction about the mirror direction where the lobe has it, and back: transmission is reflection mirrored at the
+// surface, retro-reflection is reflection mirrored about n.
 fn on_side(lobe: LambentLobe, w: vec3f) -> vec3f {
-    return vec3f(w.xy, select(w.z, -w.z, lobe.side == LAMBENT_TRANSMISSION));
+    return vec3f(select(w.xy, -w.xy, lobe.retro == 1u), select(w.z, -w.z, lobe.side == LAMBENT_TRANSMISSION));
+}
+
+// Whether what a planar reflector shows is what the lobe reflects; other lobes have the probe's light.
+fn lobe_mirrors(lobe: LambentLobe) -> bool {
+    return lobe.side == LAMBENT_REFLECTION && lobe.retro == 0u;
 }

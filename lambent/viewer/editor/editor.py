@@ -75,7 +75,7 @@ class Fit:
         if result.partial and not self._keep:
             say("fit cancelled: the material is as it was")
             return
-        self.warnings = result.warnings
+        self.warnings = (*result.notes, *result.warnings)
         self._subject.adopt(result.material.model_copy(update={"name": self._subject.material.name}))
         error, flat = result.errors[metric], result.lambertian_errors[metric]
         say(f"fitted in {result.seconds:.1f} s: {metric} {error:.4g}, {100 * error / flat:.0f} % of Lambertian")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from lambent.core.plain import Triple
-from lambent.materials.document import Material, Side
+from lambent.materials.document import KINDS, Kind, Material
 from lambent.materials.fitting.parameters import SHAPE, parameter
 
 Value = float | Triple
@@ -14,13 +14,13 @@ DIFFUSE = ("kd", "kt_d")
 
 
 def lobe_names(material: Material) -> list[dict[str, str]]:
-    """Per lobe, attribute -> name of its parameter in a fit: lobes are counted per side."""
-    counts: dict[Side, int] = {"reflection": 0, "transmission": 0}
+    """Per lobe, attribute -> name of its parameter in a fit: lobes are counted per kind."""
+    counts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
     names = []
     for lobe in material.lobes:
-        index = counts[lobe.side]
-        counts[lobe.side] += 1
-        names.append({base: parameter(lobe.side, base, index) for base in ("k", *SHAPE)})
+        index = counts[lobe.kind]
+        counts[lobe.kind] += 1
+        names.append({base: parameter(lobe.kind, base, index) for base in ("k", *SHAPE)})
     return names
 
 

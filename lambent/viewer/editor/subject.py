@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from lambent.materials.document import Lobe, Material, Side
+from lambent.materials.document import Kind, Lobe, Material
 from lambent.viewer.editor.restrictions import Restrictions
 from lambent.viewer.edits import MaterialEdits
 
@@ -74,9 +74,9 @@ class Subject:
         self.document, self.reference = document, "a document"
         self._origins.append(document)
 
-    def add_lobe(self, side: Side) -> None:
-        r0 = (0.04,) * 3 if side == "reflection" else (0.0,) * 3
-        lobe = Lobe(side=side, k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=r0)
+    def add_lobe(self, kind: Kind) -> None:
+        r0 = {"reflection": 0.04, "transmission": 0.0, "retro": 1.0}[kind]
+        lobe = Lobe(k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=(r0,) * 3).of_kind(kind)
         self.step(self.material.model_copy(update={"lobes": (*self.material.lobes, lobe)}))
 
     def remove_lobe(self, index: int) -> None:
@@ -84,10 +84,10 @@ class Subject:
         kept = [i for i in range(len(lobes)) if i != index]
         self._with_lobes(tuple(lobes[i] for i in kept), kept)
 
-    def turn_lobe(self, index: int, side: Side) -> None:
-        """Put a lobe on the other side; its restrictions are dropped."""
+    def turn_lobe(self, index: int, kind: Kind) -> None:
+        """Make a lobe one of another kind; its restrictions are dropped."""
         lobes = list(self.material.lobes)
-        lobes[index] = lobes[index].model_copy(update={"side": side})
+        lobes[index] = lobes[index].of_kind(kind)
         self._with_lobes(tuple(lobes), [i if i != index else -1 for i in range(len(lobes))])
 
     def _with_lobes(self, lobes: tuple[Lobe, ...], kept: list[int]) -> None:

@@ -9,15 +9,15 @@ from typing import get_args
 
 from imgui_bundle import imgui
 
-from lambent.materials.document import Lobe, Material, Side
+from lambent.materials.document import KINDS, Lobe, Material
 from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.models.model import Parameter
 from lambent.viewer.editor.editor import DISTRIBUTIONS, LOBES, METHODS, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
 from lambent.viewer.editor.subject import REFERENCES
 from lambent.viewer.panels import parameters
 from lambent.viewer.panels.widgets import DIM, buttons, choice, coloured, explain, path_field, typed_field, wrapped
 
-SIDES: tuple[Side, ...] = ("reflection", "transmission")
 OF_LOBES: tuple[str, ...] = get_args(Lobe.model_fields["distribution"].annotation)
 LABEL_PX = 52
 RANGE_PX = 26
@@ -128,16 +128,16 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
         imgui.pop_item_width()
         if parameter not in DIFFUSE:
             imgui.same_line(right - RANGE_PX)
-            _interval(editor, parameter, attribute)
+            retro = lobe is not None and editor.subject.material.lobes[lobe].retro
+            _interval(editor, parameter, (parameters.RETRO if retro else parameters.LOBE)[attribute])
 
     heading = partial(_heading, editor)
     return parameters.edited(renamed, editor.linked_roughness, line=line, all_terms=True, heading=heading)
 
 
-def _interval(editor: Editor, parameter: str, attribute: str) -> None:
+def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
     """The button that narrows a parameter's interval, and the interval where there is one."""
     restrictions = editor.subject.restrictions
-    model = parameters.LOBE[attribute]
     interval = restrictions.ranges.get(parameter)
     if imgui.small_button(f"{'x' if interval else '<>'}##narrow {parameter}"):
         interval = None if interval else (model.low, model.high)
@@ -162,9 +162,10 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted(f"lobe {index + 1}")
     imgui.same_line()
-    side = choice("##side", lobe.side, SIDES, 112)
-    if side != lobe.side:
-        editor.queue(lambda: subject.turn_lobe(index, side))
+    turned = choice("##kind", lobe.kind, KINDS, 112)
+    explain("retro: about the direction to the light, not about its mirror image")
+    if turned != lobe.kind:
+        editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
     kind = choice("##distribution", lobe.distribution, OF_LOBES, 96)
     explain("of the microfacets: beckmann falls off as a bell, ggx has long tails")
@@ -176,9 +177,9 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
 
 def _new_lobes(editor: Editor) -> None:
     imgui.separator()
-    width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
-    add = editor.subject.add_lobe
-    buttons([(f"add {side} lobe", True, partial(editor.queue, partial(add, side)), "") for side in SIDES], width)
+    gaps = (len(KINDS) - 1) * imgui.get_style().item_spacing.x
+    width, add = (imgui.get_content_region_avail().x - gaps) / len(KINDS), editor.subject.add_lobe
+    buttons([(f"add {kind}", True, partial(editor.queue, partial(add, kind)), "a lobe") for kind in KINDS], width)
 
 
 def _compare(editor: Editor) -> None:

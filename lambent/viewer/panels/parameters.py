@@ -11,11 +11,12 @@ from contextlib import AbstractContextManager, nullcontext
 from imgui_bundle import imgui
 
 from lambent.materials.document import Lobe, Material
-from lambent.materials.models.kurt import Kurt
+from lambent.materials.models.kurt import Kurt, KurtRetro
 from lambent.materials.models.model import Parameter, Value
 from lambent.viewer.panels.widgets import check, explain, rgb, slider
 
 LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
+RETRO = {parameter.name: parameter for parameter in KurtRetro.parameters}
 DIFFUSE = {"kd": "diffuse reflectance", "kt_d": "diffuse transmittance"}
 # Surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
 Line = Callable[[int | None, str], AbstractContextManager[object]]
@@ -47,11 +48,11 @@ def edited(
 def _lobe(index: int, lobe: Lobe, linked: bool, line: Line, heading: Callable[[int, Lobe], Lobe] | None) -> Lobe:
     imgui.push_id(index)
     if heading is None:
-        imgui.separator_text(f"lobe {index + 1}: {lobe.side}, {lobe.distribution}")
+        imgui.separator_text(f"lobe {index + 1}: {lobe.kind}, {lobe.distribution}")
     else:
         lobe = heading(index, lobe)
     values = {}
-    for name, parameter in LOBE.items():
+    for name, parameter in (RETRO if lobe.retro else LOBE).items():
         with line(index, name):
             values[name] = _parameter(parameter, lobe)
     after = lobe.model_copy(update=values)

@@ -1,0 +1,104 @@
+"""Two half-vector grids for a table with peaks about the light: one holds what mirrors, the other what returns.
+
+f is the sum of both, divided by `back_share`, which is smooth, so that either part lies in the same cells for every
+viewer. A sample comes from one of them, with a probability by their albedos; the density is that mixture's. Light that
+is transmitted is in the first alone. Conventions and array libraries are those of half_vector_grid.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lambent.core.progress import Progress, silent
+from lambent.materials.lobes import NUMPY, ArrayOps, Vector
+from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
+from lambent.materials.measured.half_vector_resampling import grid_of
+from lambent.materials.measured.protocol import MeasuredTable
+from lambent.materials.measured.two_sided import TwoSided
+
+
+@dataclass(frozen=True)
+class TwinGrid:
+    """The two parts; `returned` (faces, viewers) flat float32 is the probability that a sample is one of `light`."""
+
+    ARRAYS: ClassVar[tuple[str, ...]] = (
+        *(f"{part}.{name}" for part in ("mirror", "light") for name in HalfVectorGrid.ARRAYS), "returned",
+    )  # fmt: skip
+
+    mirror: HalfVectorGrid
+    light: HalfVectorGrid
+    returned: Any
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return self.mirror.sizes
+
+    @classmethod
+    def of_sizes(cls, sizes: tuple[int, ...], arrays: dict[str, Any]) -> TwinGrid:
+        """The inverse of `sizes` and `ARRAYS`."""
+        mirror, light = (
+            {name: arrays[f"{part}.{name}"] for name in HalfVectorGrid.ARRAYS} for part in ("mirror", "light")
+        )
+        *rest, _ = sizes
+        about_light = HalfVectorGrid.of_sizes((*rest, 1), light | {"about_light": True})
+        return cls(HalfVectorGrid.of_sizes(sizes, mirror), about_light, arrays["returned"])
+
+    @property
+    def anisotropic(self) -> bool:
+        return self.mirror.anisotropic
+
+    @property
+    def kinds(self) -> int:
+        return self.mirror.kinds
+
+    def evaluate(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Vector:
+        """f in 1/sr per RGB channel, without the cosine."""
+        parts = (grid.evaluate(wi, wo, ops) for grid in (self.mirror, self.light))
+        red, green, blue = (one + other for one, other in zip(*parts, strict=True))
+        return red, green, blue
+
+    def pdf(self, wi: Vector, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
+        """Density of `sample` in 1/sr."""
+        share = self.share_returned(wo, ops)
+        return share * self.light.pdf(wi, wo, ops) + (1 - share) * self.mirror.pdf(wi, wo, ops)
+
+    def sample(self, wo: Vector, u_select: Any, u1: Any, u2: Any, ops: ArrayOps = NUMPY) -> Vector:
+        """wi; u_* uniform in [0, 1): transmitted, then towards the light, then mirrored."""
+        share, across = self.share_returned(wo, ops), self.share_across(wo, ops)
+        back = (u_select >= across) & (u_select < across + share)
+        returned = self.light.sample(wo, (u_select - across) / ops.maximum(share, 1e-9), u1, u2, ops)
+        rest = ops.select(u_select < across, u_select, u_select - share) / ops.maximum(1 - share, 1e-9)
+        mirrored = self.mirror.sample(wo, rest, u1, u2, ops)
+        x, y, z = (ops.select(back, one, other) for one, other in zip(returned, mirrored, strict=True))
+        return x, y, z
+
+    def share_returned(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
+        """Probability of a sample of `light`."""
+        return self.mirror.of_viewer(self.returned, wo, ops)
+
+    def share_across(self, wo: Vector, ops: ArrayOps = NUMPY) -> Any:
+        """Probability of a transmitted sample."""
+        return (1 - self.share_returned(wo, ops)) * self.mirror.share_across(wo, ops)
+
+    def albedo_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
+        """Share of the light that is reflected or transmitted, mean over the channels."""
+        return self.mirror.albedo_of(wo, across, ops) + self.light.albedo_of(wo, across, ops)
+
+    def peak_of(self, wo: Vector, across: Any, ops: ArrayOps = NUMPY) -> Any:
+        """Upper bound of f cos(theta_i), mean over the channels, in 1/sr."""
+        return self.mirror.peak_of(wo, across, ops) + self.light.peak_of(wo, across, ops)
+
+
+def twin_grid_of(
+    table: MeasuredTable | TwoSided, shape: GridShape | None = None, progress: Progress = silent
+) -> TwinGrid:
+    """A table on two grids; `shape` as in `grid_of`, for each."""
+    mirror, light = (grid_of(table, shape, progress, part=part) for part in ("mirror", "light"))
+    nodes = (mirror.faces, mirror.kinds, mirror.shape.viewers)
+    whole = mirror.albedo.reshape(nodes).sum(axis=1)
+    returned = light.albedo.reshape(mirror.faces, -1)
+    share = returned / np.maximum(whole + returned, 1e-30)
+    return TwinGrid(mirror, light, share.astype(np.float32).ravel())

@@ -1,0 +1,94 @@
+"""Retro-reflection in other formats: kept where it fits, stated with figures where it does not."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bench.retro_tapes import TAPES
+from lambent.core.directions import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Lobe, Material, load_material, material_from
+from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
+from lambent.materials.export.match import without_retro
+from lambent.materials.export.resampled import read_back
+from lambent.materials.measured import load
+
+RETRO = Lobe(retro=True, mx=0.03, my=0.03, r0=(1.0,) * 3, k=(0.4, 0.3, 0.2), alpha=-1.0)
+TAPE = Material(name="tape", kd=(0.3,) * 3, lobes=(Lobe(mx=0.2, my=0.2, r0=(0.05,) * 3), RETRO))
+ONLY = Material(name="only", lobes=(RETRO,))
+
+
+@pytest.mark.parametrize("writer", [materialx, mitsuba, gltf], ids=lambda writer: writer.NAME)
+@pytest.mark.parametrize("material", [TAPE, ONLY], ids=lambda material: material.name)
+def test_tools_without_it_say_so(writer, material, tmp_path: Path):
+    """The other terms are matched as if it were not there, and the errors count it."""
+    path = tmp_path / f"tape{writer.ENDINGS[0]}"
+    cost = writer.write(material, path)
+    (line,) = (line for line in cost.lost if line.startswith("retro-reflection"))
+    wi = direction(np.radians(30), 0.0)
+    whole, lost = (MaterialBSDF(one).albedo(wi).mean() for one in (material, ONLY))
+    assert f"{lost / whole:.0%} of the reflected light is lost" in line
+    assert f"in place of {MaterialBSDF(material).eval(wi, wi).mean():.3g} /sr" in line
+    rest = writer.write(without_retro(material), tmp_path / f"rest{writer.ENDINGS[0]}")
+    assert cost.share["l2_ngan"] > 0.5 > rest.share["l2_ngan"]
+
+
+def test_exact_documents_are_kept_beside(tmp_path: Path):
+    gltf.write(TAPE, tmp_path / "tape.gltf")
+    extras = json.loads((tmp_path / "tape.gltf").read_text())["materials"][0]["extras"]
+    assert material_from(extras["lambent_material"], "tape").lobes[1].retro
+    mitsuba.write(TAPE, tmp_path / "tape.xml")
+    assert "retro&quot;:true" in (tmp_path / "tape.xml").read_text()
+
+
+def test_gonio_text_keeps_the_peak(tmp_path: Path):
+    cost = gonio_text.write(TAPE, tmp_path / "tape.txt")
+    assert any("of the light" in line for line in cost.lost)
+    assert not any(line.startswith("the peak about the light") for line in cost.lost)
+    table = load(tmp_path / "tape.txt")
+    assert table.choice.way == "back_vector"
+    for theta in (30.0, 42.5):
+        wi = direction(np.radians(theta), 0.0)
+        np.testing.assert_allclose(table.eval(wi, wi), MaterialBSDF(TAPE).eval(wi, wi), rtol=0.05)
+
+
+def test_gonio_text_of_a_table_is_the_table(tmp_path: Path):
+    table = TAPES[0].measured(10.0)
+    cost = gonio_text.write(table, tmp_path / "tape.txt")
+    assert cost.lost == () and cost.share["l1"] < 1e-3
+
+
+def test_a_file_with_a_wider_peak_is_described(tmp_path: Path):
+    """A quarter as high, twice as wide: as much light, .94 of it elsewhere (both are equal at r^2 = 4/3 ln 4)."""
+    tape = TAPES[1]
+    table, path = tape.measured(10.0), tmp_path / "wide.txt"
+    gonio_text.write(replace(tape, width_deg=2 * tape.width_deg).measured(10.0), path)
+    (line,) = read_back(table, path, ()).lost
+    returned, misplaced = (float(number) for number in re.findall(r"returns ([0-9.]+) times.* and (\d+)%", line)[0])
+    assert returned == pytest.approx(1, abs=0.15) and misplaced == pytest.approx(88, abs=6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("writer", [merl, lbnl_xml], ids=lambda writer: writer.NAME)
+def test_coarser_formats_say_what_becomes_of_the_peak(writer, tmp_path: Path):
+    table, path = TAPES[0].measured(10.0), tmp_path / f"tape{writer.ENDINGS[0]}"
+    cost = writer.write(table, path)
+    if not cost.errors:
+        cost = read_back(table, path, cost.lost)
+    (line,) = (line for line in cost.lost if line.startswith("the peak about the light"))
+    assert "at another place" in line and "times as much" in line
+
+
+def test_documents_without_it_do_not_mention_it(tmp_path: Path):
+    plain = without_retro(TAPE)
+    plain.save(tmp_path / "plain.json")
+    assert "retro" not in (tmp_path / "plain.json").read_text()
+    TAPE.save(tmp_path / "tape.json")
+    assert load_material(tmp_path / "tape.json") == TAPE
+    assert load_material(tmp_path / "plain.json") == plain
