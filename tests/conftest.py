@@ -8,6 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# A loaded machine is slow at making examples as well as at running them, which says nothing of the code; fixtures of
+# these tests hold nothing that an example changes.
+UNHURRIED = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture]
+settings.register_profile("unhurried", deadline=None, suppress_health_check=UNHURRIED)
+settings.load_profile("unhurried")
 
 SHARED = Path(os.environ.get("LAMBENT_SHARED", Path(__file__).parents[2] / "shared" / "data"))
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core import exr, rgbe
@@ -88,7 +88,7 @@ def test_every_truncation_is_refused(tmp_path: Path, suffix: str, capfd: pytest.
     assert capfd.readouterr() == ("", "")
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60)
 @given(at=st.integers(0, 400), value=st.integers(0, 255), suffix=st.sampled_from([".exr", ".hdr", ".png"]))
 def test_a_wrong_byte_is_read_or_refused(tmp_path: Path, at: int, value: int, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import OBLIQUE, wall_scene
 from scipy.stats import chi2
 
 from lambent.core.camera import pixel_rays
@@ -21,6 +20,7 @@ from lambent.realtime.incident import look_ups, shader_of
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import pixels
+from tests.realtime.lit_wall import OBLIQUE, wall_scene
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
 N = 8  # texels of the table that the shader's functions are tried with

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import wgpu
-from conftest import wall_scene
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
@@ -18,6 +17,7 @@ from lambent.realtime.resources import device_needs
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.targets import PassTimer, Targets
 from lambent.realtime.unbaked import CAMERA
+from tests.realtime.lit_wall import wall_scene
 
 GLOSS = Material(name="m", kd=0.5, lobes=(Lobe(mx=0.1, my=0.1), Lobe(mx=0.2, my=0.2, side="transmission")))
 

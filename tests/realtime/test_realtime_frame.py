@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import cube_of, smooth_light, wall_scene
 
 from lambent.bench.specular_scene import sphere_and_torus
 from lambent.core.camera import Camera, clip_from_world, pixel_rays
@@ -21,6 +20,7 @@ from lambent.realtime.unbaked import CAMERA
 from lambent.realtime.unbaked import unbaked_scene as baked_scene
 from lambent.scenes.environments import studio
 from lambent.scenes.geometry import patch, sphere
+from tests.realtime.lit_wall import cube_of, smooth_light, wall_scene
 
 FORWARD = Camera(name="forward", position=(0.0, 0.0, 2.0), target=(0.0, 0.0, 0.0), fov_y_deg=60.0)
 PAPER = Material(name="m", kd=0.5)

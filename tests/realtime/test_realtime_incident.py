@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import OBLIQUE, cube_of, smooth_light, wall_scene
 
 from lambent.core import probe_lookups
 from lambent.core.directions import normalize
@@ -21,6 +20,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.incident import look_up_of, look_ups, shader_of
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.shader_source import assemble
+from tests.realtime.lit_wall import OBLIQUE, cube_of, smooth_light, wall_scene
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
 MIRROR = Material(name="m", lobes=(Lobe(mx=0.001, my=0.001, r0=1.0, alpha=0.5),))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import OBLIQUE, cube_of, smooth_light, wall_scene
 
 from lambent.core.camera import Camera, pixel_rays
 from lambent.core.cubemap import sample as sample_cube
@@ -15,6 +14,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.albedo import albedo_table
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from tests.realtime.lit_wall import OBLIQUE, cube_of, smooth_light, wall_scene
 
 STATE = FrameState(OBLIQUE, 8, 8, antialias=False, show="specular", lookup="plain")
 # m -> mean white-furnace error of rings, n = 7, relative

@@ -285,3 +285,25 @@ def test_a_still_takes_all_turns_of_interleaved_samples(device: Any) -> None:
         return float(np.median(np.abs(np.diff(image[HEIGHT * 3 // 4 :], n=2, axis=1))))
 
     assert pattern(renderer.still_radiance(wanted)) < 0.7 * pattern(renderer.image(wanted))
+
+
+def test_two_half_lobes_are_one(device: Any) -> None:
+    """Each lobe has a table of its own, one after the other."""
+    whole = mirror(0.15)
+    half = whole.lobes[0].model_copy(update={"k": (0.5, 0.5, 0.5)})
+    halves = whole.model_copy(update={"lobes": (half, half)})
+    for integrator, method in METHODS:
+        drawn = state(n=7, integrator=integrator, planar=method, show="specular")
+        one, two = (Renderer(device, scene_of(material)).image(drawn) for material in (whole, halves))
+        np.testing.assert_allclose(two, one, atol=2e-3, rtol=5e-3)
+
+
+def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None:
+    plan = PlanRecord(
+        corner=(-3, 0.5, -3), across=(1, 0, 0), along=(0, 0, -1), cell_m=0.1, rows=2, columns=2, packed=""
+    )
+    raised = FLOOR.model_copy(update={"plane": (0, 1, 0, -0.5), "plan": plan})
+    (view,) = planar_views(frame_of(CAMERA), [raised], WIDTH, HEIGHT, 4)
+    assert view.plan is not None
+    assert float(view.plan["below"]) == pytest.approx(1.3 - 0.5)
+    np.testing.assert_allclose(view.frame["eye"][:3], (0.4, 2 * 0.5 - 1.3, 3.0), atol=1e-6)

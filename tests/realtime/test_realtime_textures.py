@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import cube_of, smooth_light, wall_scene
 
 from lambent.core.camera import Camera
 from lambent.core.colour import srgb_decode
@@ -19,6 +18,7 @@ from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
 from lambent.scenes.textures import doubled_angle, halved, slopes
+from tests.realtime.lit_wall import cube_of, smooth_light, wall_scene
 
 LETTER = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], np.float16)  # an F
 FRONT = Camera(

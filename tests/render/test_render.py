@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from lambent.core.camera import CameraPath
+from lambent.core.colour import srgb_encode
 from lambent.core.errors import UserError
+from lambent.core.false_colour import fitting_range
 from lambent.core.images import read_encoded, read_image, to_bytes
+from lambent.core.photometry import photometric
+from lambent.realtime.device import open_device
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, film, images, still, write_frames
+from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store
 from tests.viewer.small_store import FRONT, SIDE, write_small_store
 
@@ -60,11 +67,15 @@ def test_a_film_along_any_path(store: Path, tmp_path: Path) -> None:
 
 def test_a_fitted_scale_is_kept(store: Path) -> None:
     """The second camera of a film sees another range of luminances: its colours have to mean the same."""
-    drawn = images(Store.open(store), Settings(96, 64, view="false-colour"))
+    opened, settings = Store.open(store), Settings(96, 64, view="false-colour")
+    drawn = images(opened, settings)
+    scales = [fitting_range(photometric(drawn.radiance(camera), drawn.quantity)) for camera in (FRONT, SIDE)]
+    assert scales[0] != scales[1]
     drawn.displayed(FRONT)
     kept = drawn.displayed(SIDE)
-    own = images(Store.open(store), Settings(96, 64, view="false-colour", scale=drawn._scale)).displayed(SIDE)
-    np.testing.assert_array_equal(kept, own)
+    for scale, same in zip(scales, (True, False), strict=True):
+        own = images(opened, replace(settings, scale=scale)).displayed(SIDE)
+        assert np.array_equal(kept, own) is same
 
 
 def test_notes_say_what_is_wrong_with_a_store(tmp_path: Path) -> None:
@@ -111,3 +122,44 @@ def test_frames_are_written_as_they_are_drawn(tmp_path: Path) -> None:
     write_frames(tmp_path / "a.png", [FRONT, SIDE, FRONT], draw, (16, 16), 30)
     means = [round(255 * float(read_encoded(tmp_path / f"a-000{k}.png").mean())) for k in (1, 2, 3)]
     assert means == [100, 200, 100]
+
+
+def test_exposure_in_stops_is_the_scenes_unless_told(tmp_path: Path) -> None:
+    """Linear light, encoded: one stop doubles it. Without an exposure that of the scene counts."""
+    opened = Store.open(write_small_store(tmp_path / "s"))
+    record = scene_record(opened)
+    write_scene_record(opened, record.model_copy(update={"exposure_ev": -2.0}))
+    settings = replace(SMALL, view="linear", integrator="qmc", samples=2)
+    for told, stops in ((None, -2.0), (0.0, 0.0), (1.0, 1.0)):
+        drawn = images(opened, replace(settings, exposure_ev=told))
+        light = np.clip(2.0**stops * drawn.radiance(FRONT).astype(float), 0, 1)
+        shown = drawn.displayed(FRONT).astype(int)
+        assert np.abs(shown - to_bytes(srgb_encode(light))).max() <= 1
+    single = images(opened, replace(SMALL, view="linear", exposure_ev=1.0), moving=True).displayed(FRONT)
+    light = images(opened, replace(SMALL, view="linear", exposure_ev=0.0), moving=True).displayed(FRONT)
+    assert single.astype(int).sum() > 1.2 * light.astype(int).sum()
+
+
+def test_so_many_samples_are_taken(store: Path) -> None:
+    opened = Store.open(store)
+    renderer = Renderer(open_device(), opened)
+    frame = FrameState(FRONT, 48, 32, integrator="qmc", exposure_ev=0.0, view_transform="filmic")
+    for samples in (1, 8):
+        drawn = images(opened, replace(SMALL, integrator="qmc", samples=samples, exposure_ev=0.0))
+        np.testing.assert_array_equal(drawn.radiance(FRONT), renderer.converged(frame, samples))
+
+
+def test_a_film_shows_single_frames_and_a_still_the_mean_of_many(store: Path) -> None:
+    opened = Store.open(store)
+    renderer = Renderer(open_device(), opened)
+    frame = FrameState(FRONT, 48, 32, view_transform="filmic")
+    settings = replace(SMALL, exposure_ev=0.0)
+    moving, still_ = (images(opened, settings, moving=m).displayed(FRONT) for m in (True, False))
+    np.testing.assert_array_equal(moving, renderer.display_image(frame))
+    np.testing.assert_array_equal(still_, renderer.still(frame))
+
+
+def test_films_have_even_sizes_of_their_own(store: Path, tmp_path: Path) -> None:
+    path = CameraPath("mine", (FRONT, SIDE), 1.0)
+    done = film(store, tmp_path / "a.mp4", path, replace(SMALL, width=51, height=33), fps=2)
+    assert (done.width, done.height) == (50, 32)

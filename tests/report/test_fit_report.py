@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lambent.bake import engine as engine_module
@@ -64,8 +65,16 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
     source.write_text("what was measured")
     read = check(report(table, samples, result, source=source))
     text = " ".join(read.text)
-    assert "No previews" in text and "too old" in text
+    assert "No previews" in text and "too old" in text and "transmission" not in text
+    total, lobe = len(samples) + samples.left_out.total, result.material.lobes[0]
+    shares = {name: result.errors[name] / result.lambertian_errors[name] for name in result.errors}
+    tilt = np.degrees(np.arctan(lobe.mx))
     for expected in (
+        f"{len(samples):,} of {total:,} ({100 * len(samples) / total:.1f} %)",
+        f"{samples.left_out.grazing:,}",
+        f"metric is {shares['cuberoot']:.2f} of that of the best Lambertian surface",
+        *(f"{share:.3f}" for share in shares.values()),
+        f"lobe 1: {tilt:.1f}° x {tilt:.1f}°",
         "<paint>",
         f"{len(samples):,} of",
         "grazing",

@@ -85,3 +85,23 @@ def test_the_pace_is_even():
 def test_a_path_of_one_key_or_of_no_time_stands_still():
     assert camera_at(CameraPath(name="still", keys=TOUR.keys[:1], seconds=3), 1.0) == TOUR.keys[0]
     assert camera_at(replace(TOUR, seconds=0.0), 1.0) == TOUR.keys[0]
+
+
+def test_a_recorded_walk_is_smooth_through_its_keys_and_times() -> None:
+    """Quadratic motion is met exactly between inner keys: slopes at keys are those between their neighbours."""
+
+    def at(t: float) -> Camera:
+        position, target = (t * t, 1.6, -2 * t), (t * t + 1, 1.6 + t, -2 * t - t * t)
+        return Camera("walk", position, target, (0, 1, 0), fov_y_deg=40 + 10 * t)
+
+    times = (0.0, 1.0, 2.0, 3.0, 4.0)
+    path = CameraPath("walk", tuple(map(at, times)), 4.0, times_s=times)
+    for t in (1.0, 1.25, 1.5, 2.0, 2.75):
+        seen, expected = camera_at(path, t), at(t)
+        assert seen.position == pytest.approx(expected.position) and seen.target == pytest.approx(expected.target)
+        assert seen.fov_y_deg == pytest.approx(expected.fov_y_deg)
+    for t, end in ((-1.0, 0.0), (9.0, 4.0)):
+        assert camera_at(path, t).position == pytest.approx(at(end).position)
+    jumping = CameraPath("walk", (at(0), at(1), at(2)), 3.0, times_s=(0.0, 1.0, 3.0))
+    assert camera_at(jumping, 1.0).position == pytest.approx(at(1).position), "keys need not be even in time"
+    assert camera_at(jumping, 3.0).position == pytest.approx(at(2).position)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
@@ -436,7 +436,7 @@ def test_every_truncation_of_a_glb_is_one_line(tmp_path: Path) -> None:
             load_scene(path)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150)
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
 def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
     data = bytearray(_good_glb())

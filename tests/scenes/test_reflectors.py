@@ -103,3 +103,13 @@ def test_the_room_shows_its_floor_its_tables_and_its_plate() -> None:
     assert all(any(wanted in n for n in names) for wanted in ("table_top", "brushed_plate", "screen_pane"))
     scene = load_scene("builtin:room")
     assert find_reflectors(replace(scene, reflector_rules=(ReflectorRule("*", use=False),))) == ()
+
+
+def test_a_part_of_something_that_transmits_is_seen_from_both_sides() -> None:
+    """Of an object that goes on elsewhere one side is outside, unless light passes it."""
+    bent = merge([patch((0, 0, 0), (0, 0, 1), (1, 0, 0)), patch((0, 0, 0), (1, 0, 0), (0, 0.2, 0))])
+    glossy = MATERIALS["varnish"]
+    through = Lobe(side="transmission", mx=0.05, my=0.05, k=0.5)
+    for material, both in ((glossy, False), (glossy.model_copy(update={"lobes": (*glossy.lobes, through)}), True)):
+        scene = Scene("test", (SceneObject("bent", bent, "m"),), {"m": material})
+        assert next(r for r in find_reflectors(scene) if abs(r.plane[1]) > 0.9).two_sided is both

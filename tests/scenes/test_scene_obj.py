@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
@@ -162,6 +162,14 @@ map_Kd gone.png
         assert MaterialBSDF(material).albedo(wo).max() < 1.03, material.name
 
 
+@pytest.mark.parametrize("said", ["d 0.25", "Tr 0.75"])
+def test_transparency_is_what_covers_or_what_passes(tmp_path: Path, said: str) -> None:
+    library = f"newmtl pane\nKd 1 1 1\n{said}\nTf 0.5 1 1\n"
+    parts = parts_of(tmp_path, QUAD + "mtllib thing.mtl\nusemtl pane\nf 1/1 2/2 3/3\n", library)
+    (through,) = parts.materials["pane"].transmission_lobes
+    assert through.k == pytest.approx((0.375, 0.75, 0.75)) and parts.materials["pane"].kd == pytest.approx((0.25,) * 3)
+
+
 def test_names_from_another_machine(tmp_path: Path) -> None:
     """A picture named by a path that leads elsewhere is taken from beside the library, and only from there."""
     _png(tmp_path / "wood.png", [[[255, 0, 0], [0, 0, 0]]])
@@ -238,7 +246,7 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     assert whole.words == cut.words and whole.lines[:3].tolist() == [11, 13, 15]
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80)
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), min_size=1, max_size=6))
 def test_damaged_bytes_are_one_line_or_a_scene(tmp_path: Path, damage: list[tuple[int, int]]) -> None:
     data = bytearray((QUAD + "mtllib thing.mtl\no a\nusemtl w\ns 1\nf 1/1 2/2 3/3\nf 1//1 -2//1 4//1 2//1\n").encode())

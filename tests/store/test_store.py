@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
@@ -251,7 +251,7 @@ def test_missing_store_and_missing_array(tmp_path: Path) -> None:
         Store.create(tmp_path / "s", {}).read("probe/vase/radiance")
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25)
 @given(data=st.data())
 def test_any_order_any_interruption_same_array(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     """Shapes, chunkings, the order of chunks and the point of interruption do not show in what is read."""

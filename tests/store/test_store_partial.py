@@ -112,3 +112,12 @@ def test_too_large_is_said_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="impossible shape"):
         store.begin("a", "a", (1 << 20, 1 << 20), (1, 1 << 20), "float32", key="k")
     assert not (tmp_path / "s/a").exists() and Store.open(tmp_path / "s").artefacts() == []
+
+
+def test_an_array_of_another_type_begins_anew(tmp_path: Path) -> None:
+    """Chunks of one type are not read as another's, though key, shape and chunks agree."""
+    store = Store.create(tmp_path / "s", {})
+    store.begin("a", "kind", (4,), (2,), "float32", key="k").write((0,), np.ones(2, np.float32))
+    assert len(store.begin("a", "kind", (4,), (2,), "float32", key="k").missing) == 1
+    again = store.begin("a", "kind", (4,), (2,), "float16", key="k")
+    assert len(again.missing) == 2 and again.artefact.dtype == "float16"

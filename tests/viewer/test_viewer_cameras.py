@@ -91,6 +91,21 @@ def test_walking_speed_and_direction():
     assert walked(EYE, {"p"}, 1, 10) == EYE
 
 
+@pytest.mark.parametrize(
+    ("keys", "way"),
+    [
+        (("w", "ArrowUp"), (0, 0, -1)), (("s", "ArrowDown"), (0, 0, 1)), (("d", "ArrowRight"), (1, 0, 0)),
+        (("a", "ArrowLeft"), (-1, 0, 0)), (("e", " "), (0, 1, 0)), (("q", "c"), (0, -1, 0)),
+    ],
+)  # fmt: skip
+def test_where_each_key_leads(keys, way):
+    """Flying and looking along -z."""
+    for key in keys:
+        moved = np.subtract(walked(EYE, {key}, 0.2, 4, flying=True).position, EYE.position)
+        assert moved == pytest.approx(0.2 * cameras.WALK_M_S * np.array(way), abs=1e-9), key
+    assert {key for key in cameras.KEYS if cameras.KEYS[key] == (way[0], way[1], -way[2])} == set(keys)
+
+
 def test_the_eye_follows_the_floor_on_foot_only():
     stairs = walked(EYE, {"w"}, 1, 10, floor_y=0.3)
     assert stairs.position[1] == pytest.approx(1.9, abs=1e-3)
@@ -109,6 +124,9 @@ def test_who_starts_outside_may_come_in_but_not_go_farther_out():
     outside = replace(EYE, position=(0, 1.6, 9))
     assert walked(outside, {"s"}, 3, 10).position[2] == pytest.approx(9)
     assert walked(outside, {"w"}, 3, 10).position[2] == pytest.approx(9 - 2.5 * cameras.WALK_M_S)
+    beyond = replace(EYE, position=(-7, 1.6, 0), target=(-7, 1.6, -3))
+    assert walked(beyond, {"a"}, 2, 10).position[0] == pytest.approx(-7)
+    assert walked(beyond, {"d"}, 1, 10).position[0] == pytest.approx(-7 + cameras.WALK_M_S)
 
 
 def test_a_low_model_is_walked_at_its_own_scale():

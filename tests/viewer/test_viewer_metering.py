@@ -35,6 +35,7 @@ def test_black_and_broken_pictures():
     picture[0, 0] = np.nan
     picture[1, 1] = 0
     assert read(picture).log_mean == pytest.approx(2 * LM_PER_W)
+    assert read(picture).mean == pytest.approx(2 * LM_PER_W * 62 / 63), "black counts in the mean, nothing else does"
     assert abs(read(np.full((8, 8, 3), 1e-9)).exposure_ev) == 12
 
 

@@ -82,6 +82,16 @@ def test_the_noise_of_few_samples_is_not_shown(samples):
     assert all(a > b for a, b in itertools.pairwise(shares)) and shares[-1] == 0
     shown = [(1 - share) ** 2 / (samples * n) for n, share in enumerate(shares, 1)]
     assert max(shown) < 1.5 / 64
+    assert prior_share(16 // samples, 10**9, samples) == pytest.approx(0.5), "the last picture counts for 16 samples"
+
+
+@pytest.mark.parametrize(("share", "mirrors"), [(0.2, True), (0.5, False)])
+def test_mirrors_come_back_where_four_frames_fit_one(share, mirrors):
+    """A frame with mirrored views costs four without; of a frame that takes half the budget, they are left out."""
+    p = pacer(slow_adapter=True)
+    for _ in range(6):
+        p.cost(Plan(1.0, None, mirrors=False), share * BUDGET_S)
+    assert p.moving.mirrors is mirrors
 
 
 def test_without_refinement_a_slow_adapter_sharpens_once():

@@ -39,6 +39,18 @@ def test_waiting_before_the_first_step_is_left_out_and_standing_still_is_kept():
     assert camera_at(path, 5.0).position[0] == pytest.approx(2.0, abs=1e-3)
 
 
+def test_sight_and_angle_of_view_are_recorded():
+    """Turning in place while the angle of view grows from 40 to 80 degrees."""
+    recording = Recording()
+    for k in range(61):
+        target = (np.sin(k / 60), 1.6 + k / 60, -np.cos(k / 60))
+        recording.take(Camera("free", (0.0, 1.6, 0.0), target, fov_y_deg=40 + k * 40 / 60), k / 30)
+    middle = camera_at(recording.path("w", smooth_s=0.0), 1.0)
+    assert middle.fov_y_deg == pytest.approx(60, abs=0.1)
+    assert middle.target == pytest.approx((np.sin(0.5), 2.1, -np.cos(0.5)), abs=1e-3)
+    assert middle.position == pytest.approx((0, 1.6, 0))
+
+
 def test_smoothing_takes_jerks_out_and_leaves_the_ends():
     rough, smooth = (walked(6.0, jitter=0.05).path("w", s) for s in (0.0, 0.5))
     jerk = [np.abs(np.diff([k.position[0] for k in p.keys], n=2)).max() for p in (rough, smooth)]

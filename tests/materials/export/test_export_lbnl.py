@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from lambent.materials.measured.equal_energy import xyz_of_rgb
 from lambent.materials.measured.klems import KLEMS_FULL
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
 from lambent.materials.measured.merl import directions_of
-from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, words
+from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, needs_radiance, words
 from tests.materials.measured.measured_files import merl_bytes
 
 GREY = (0.4, 0.4, 0.4)
@@ -103,6 +104,7 @@ def test_both_sides_and_the_directions_are_right(foil) -> None:
             assert ours < np.abs(turned - expected).mean() / 4
 
 
+@needs_radiance
 def test_radiance_reads_it(foil, tmp_path: Path) -> None:
     """Luminance and integrals as from our reader; colour to the precision Radiance keeps."""
     path, table = foil
@@ -188,3 +190,16 @@ def test_an_interrupted_write_leaves_no_file(tmp_path: Path) -> None:
 
 def test_the_writer_is_found_by_name() -> None:
     assert writer_for(Path("x"), "lbnl_xml").write is write
+
+
+def test_rings_are_written_with_their_middles(foil) -> None:
+    """The cap's angle is 0; that of every other ring is half way between its bounds, which meet."""
+    text = foil[0].read_text()
+    rings = [
+        tuple(map(float, ring))
+        for ring in re.findall(
+            r"<Theta>(.*?)</Theta>.*?<LowerTheta>(.*?)</LowerTheta>.*?<UpperTheta>(.*?)</UpperTheta>", text, re.DOTALL
+        )
+    ]
+    assert [ring[0] for ring in rings] == [0, *((low + high) / 2 for _, low, high in rings[1:])]
+    assert [low for _, low, _ in rings] == [0, *(high for *_, high in rings[:-1])] and rings[-1][2] == 90

@@ -11,6 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+needs_radiance = pytest.mark.skipif(
+    importlib.util.find_spec("pyradiance") is None, reason="pyradiance is not installed: Radiance cannot be asked"
+)
 # In a process of its own: pyradiance 1.3.1 crashes when a file that was loaded is let go.
 _ASK = """
 import sys
@@ -27,7 +30,7 @@ np.savez(outputs, xyz=xyz, hemi=hemi)
 
 
 def ask_radiance(path: Path, folder: Path, angles_deg: np.ndarray, incident_deg: np.ndarray) -> dict[str, np.ndarray]:
-    """Radiance's values for a file, by pyradiance; skips where it is not installed.
+    """Radiance's values for a file, by pyradiance; its tests are marked `needs_radiance`.
 
     Parameters
     ----------
@@ -40,8 +43,6 @@ def ask_radiance(path: Path, folder: Path, angles_deg: np.ndarray, incident_deg:
     dict
         xyz (N, 3), f as equal-energy XYZ; hemi (M, 2), reflection and transmission.
     """
-    if importlib.util.find_spec("pyradiance") is None:
-        pytest.skip("pyradiance is not installed: Radiance cannot be asked")
     inputs, outputs = folder / "asked.npz", folder / "answered.npz"
     np.savez(inputs, angles=angles_deg, incident=incident_deg)
     done = subprocess.run([sys.executable, "-c", _ASK, str(path), str(inputs), str(outputs)], capture_output=True)

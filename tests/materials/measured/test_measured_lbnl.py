@@ -17,6 +17,7 @@ from tests.materials.measured.lbnl_files import (
     angles_away_from_borders,
     ask_radiance,
     lbnl_xml,
+    needs_radiance,
     random_tree,
     words,
 )
@@ -63,6 +64,7 @@ def agree(path: Path, folder: Path, n: int = 1000, tolerance: float = JITTER, un
     return table
 
 
+@needs_radiance
 @pytest.mark.parametrize("name", REAL)
 def test_real_files_agree_with_radiance(shared_data: Path, tmp_path: Path, name: str) -> None:
     agree(shared_data / "measured" / "lbnl" / f"{name}.xml", tmp_path, unhandled=name == "t3")
@@ -75,6 +77,7 @@ def test_check_value_of_t3(shared_data: Path) -> None:
     assert table.info.isotropic and table.info.transmits
 
 
+@needs_radiance
 @pytest.mark.parametrize(
     ("structure", "basis"),
     [("Columns", KLEMS_FULL), ("Rows", KLEMS_FULL), ("Columns", KLEMS_HALF), ("Rows", KLEMS_QUARTER)],
@@ -91,6 +94,7 @@ def test_random_matrices_agree_with_radiance(tmp_path: Path, structure: str, bas
     assert not table.info.isotropic
 
 
+@needs_radiance
 def test_custom_bases_agree_with_radiance(tmp_path: Path) -> None:
     """Other bases for light that enters and leaves, not square, by rows and by columns, not up to the horizon."""
     ours = angle_basis("coarse", [(0, 20, 1), (20, 55, 5), (55, 90, 7)])
@@ -107,6 +111,7 @@ def test_custom_bases_agree_with_radiance(tmp_path: Path) -> None:
     assert (a.eval(direction(0.1, 0), direction(np.radians(87), 0)) == 0).all()
 
 
+@needs_radiance
 @pytest.mark.parametrize("rank", [3, 4])
 def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
     random = np.random.default_rng(rank)
@@ -119,6 +124,7 @@ def test_random_trees_agree_with_radiance(tmp_path: Path, rank: int) -> None:
     assert agree(path, tmp_path, n=800).info.isotropic == (rank == 3)
 
 
+@needs_radiance
 @pytest.mark.parametrize(
     ("structure", "only", "other"),
     [
@@ -167,6 +173,7 @@ def by_quadrature(table: LbnlTable, wi: Floats, n: int = 300) -> Floats:
     return np.array([np.pi * table.eval(w, wo * (1, 1, -np.sign(w[2]))).mean(axis=0) for w in wi])
 
 
+@needs_radiance
 def test_colour_of_matrices_agrees_with_radiance(tmp_path: Path) -> None:
     """XYZ of colours within Rec.709. Radiance keeps Y, and the chromaticity in 16 bits: X and Z to some per cent."""
     random = np.random.default_rng(2)
@@ -188,6 +195,7 @@ def test_colour_of_matrices_agrees_with_radiance(tmp_path: Path) -> None:
     assert any("Solar" in note for note in table.info.notes)
 
 
+@needs_radiance
 def test_colour_of_trees_agrees_with_radiance(tmp_path: Path) -> None:
     """Y, u' and v' with different cells; luminance is Y everywhere, and the sums are those of the values."""
     random = np.random.default_rng(3)

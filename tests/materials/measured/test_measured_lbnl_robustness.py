@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
@@ -22,7 +22,7 @@ FIXED_BYTES = 8 << 20
 HANGS_S = 10.0  # far beyond what any of these takes on a busy machine
 KINDS = ("matrix", "tree3", "tree4")
 WI, WO = np.array([[0.6, 0.0, 0.8]]), np.array([[-0.6, 0.0, 0.8]])
-QUICK = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUICK = settings(max_examples=40)
 
 
 def sound(kind: str) -> bytes:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
@@ -85,7 +86,7 @@ def test_without_jacobian_and_spectral(tmp_path: Path, hemisphere) -> None:
     np.testing.assert_allclose(load(path).eval(wi, wo), grey, rtol=1e-5)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 10**6), st.floats(0, 1), st.floats(0, 1))
 def test_warp_inverts_itself(seed: int, u: float, v: float) -> None:
     random = np.random.default_rng(seed)
@@ -130,3 +131,94 @@ def test_few_bad_nodes_are_counted(tmp_path: Path) -> None:
     table = load(path)
     samples = table.samples()
     assert (samples.left_out.not_finite, samples.below_zero) == (1, 1) and len(table.info.notes) == 2
+
+
+def _flat(phi_i: np.ndarray, ndf: np.ndarray, vndf: float = 1.0) -> dict[str, np.ndarray]:
+    """Tensors of an even warp, u_m = u whatever the density that is stored, sigma 1 and values 1."""
+    theta_i = np.array([0.0, 0.4, 0.8], np.float32)
+    incident = (len(phi_i), len(theta_i))
+    return {
+        "description": np.frombuffer(b"flat", dtype=np.uint8),
+        "phi_i": phi_i.astype(np.float32),
+        "theta_i": theta_i,
+        "ndf": ndf.astype(np.float32),
+        "sigma": np.ones((2, 2), np.float32),
+        "vndf": np.full((*incident, 2, 2), vndf, np.float32),
+        "luminance": np.ones((*incident, 9, 9), np.float32),
+        "rgb": np.ones((*incident, 3, 9, 9), np.float32),
+        "jacobian": np.array([1], dtype=np.uint8),
+    }
+
+
+@pytest.mark.parametrize("phi_i", [np.zeros(1), np.linspace(-np.pi, np.pi, 5)], ids=["isotropic", "whole"])
+@pytest.mark.parametrize("ndf", [1.0, 0.5])
+def test_nodes_and_weights_of_an_even_warp(tmp_path: Path, phi_i: np.ndarray, ndf: float) -> None:
+    """By hand: u = (column, row)/8 is theta_m = u0^2 pi/2 and phi_m = (2 u1 - 1) pi; f cos_o = ndf/4.
+
+    The weight is the node's share of the square, 1/64, half of it at each border, times d_wo/du: sin(theta_m)
+    d(theta_m)/du0 d(phi_m)/du1 is 2 pi^2 u0 sin(theta_m), and a turn of the half vector turns wo by 4 (wi.m) more.
+    """
+    path = tmp_path / "a"
+    path.write_bytes(tensor_bytes(_flat(phi_i, np.full((2, 2), ndf))))
+    samples = load(path).samples()
+    expected = []
+    for phi in phi_i:
+        for theta in (0.0, 0.4, 0.8):
+            wi = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+            for row, column in np.ndindex(9, 9):
+                tilt = (column / 8) ** 2 * np.pi / 2
+                turn = (row / 4 - 1) * np.pi + (phi if len(phi_i) == 1 else 0)
+                m = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
+                wo = 2 * (wi @ m) * m - wi
+                share = (0.5 if row in (0, 8) else 1) * (0.5 if column in (0, 8) else 1) / 64
+                weight = share * 2 * np.pi**2 * column / 8 * np.sin(tilt) * 4 * (wi @ m)
+                if wo[2] > 0.2 and weight > 1e-9:
+                    expected.append([*wi, *wo, ndf / 4 / wo[2], weight])
+    found = np.column_stack([samples.wi, samples.wo, samples.f[:, :1], samples.weight])
+    found = found[(found[:, 5] > 0.2) & (found[:, 7] > 1e-9)]
+    assert len(found) == len(expected) > 100
+    off = [cKDTree(some).query(others)[0].max() for some, others in ((found, expected), (expected, found))]
+    assert max(off) < 1e-4, "all columns at once, whatever the order"
+
+
+def test_samples_of_made_up_files_are_their_nodes(tmp_path: Path) -> None:
+    fields = rgl_fields(np.zeros(1))
+    fields["theta_i"] = np.array([0.0, 0.4, 0.8, 1.2], np.float32)
+    path = tmp_path / "a"
+    path.write_bytes(tensor_bytes(fields))
+    table = load(path)
+    samples = table.samples()
+    inside = (np.abs(samples.wo[:, :2]).max(axis=1) > 1e-3) & (samples.weight > 1e-6)
+    seam = np.abs(samples.wi[:, 1] + samples.wo[:, 1]) > 1e-6
+    kept = inside & seam
+    assert kept.mean() > 0.4
+    np.testing.assert_allclose(table.eval(samples.wi, samples.wo)[kept], samples.f[kept], rtol=2e-3, atol=1e-6)
+
+
+def test_weights_add_up_to_the_albedo(tmp_path: Path) -> None:
+    """f = 1/pi from the normal: the file holds cos_o/pi times 4 sigma/D; the sum is the albedo up to 84 degrees."""
+    fields = _flat(np.zeros(1), np.ones((2, 2)))
+    fields["rgb"] = np.zeros((1, 3, 3, 65, 65), np.float32)
+    fields["luminance"] = np.ones((1, 3, 65, 65), np.float32)
+    tilt = np.linspace(0, 1, 65) ** 2 * np.pi / 2
+    fields["rgb"][:] = np.maximum(np.cos(2 * tilt), 0) * 4 / np.pi
+    path = tmp_path / "a"
+    path.write_bytes(tensor_bytes(fields))
+    samples = load(path).samples()
+    normal = samples.wi[:, 2] > 0.999
+    total = (samples.p[normal] * samples.weight[normal, None]).sum(axis=0)
+    np.testing.assert_allclose(total, np.sin(np.radians(84)) ** 2, rtol=5e-3)
+
+
+def test_weights_fill_the_hemisphere_whatever_the_warp(tmp_path: Path) -> None:
+    """Projected solid angles from the normal add up to pi sin^2(84 degrees), also where the nodes crowd together."""
+    fields = _flat(np.zeros(1), np.ones((2, 2)))
+    fields["vndf"] = np.broadcast_to(np.array([[1.5, 0.3], [0.5, 1.0]], np.float32), (1, 3, 2, 2)).copy()
+    fields["rgb"] = np.ones((1, 3, 3, 129, 129), np.float32)
+    fields["luminance"] = np.ones((1, 3, 129, 129), np.float32)
+    path = tmp_path / "a"
+    path.write_bytes(tensor_bytes(fields))
+    samples = load(path).samples()
+    normal = samples.wi[:, 2] > 0.999
+    total = (samples.wo[normal, 2] * samples.weight[normal]).sum()
+    assert total == pytest.approx(np.pi * np.sin(np.radians(84)) ** 2, rel=0.02)

@@ -208,3 +208,19 @@ def test_weights_of_half_a_turn_are_those_of_the_whole(tmp_path: Path) -> None:
         total[symmetry] = (samples.weight[:, None] * samples.p).sum(), len(samples)
     assert total["PlaneSymmetrical"][0] == pytest.approx(total["Asymmetrical"][0], rel=1e-9)
     assert total["PlaneSymmetrical"][1] < 0.65 * total["Asymmetrical"][1]
+
+
+def test_mirror_images_lie_across_the_plane_of_incidence(tmp_path: Path) -> None:
+    """Half a turn that is written becomes a whole one: f at azimuth -a is that at a, not at 180 - a."""
+    path = tmp_path / "a"
+    path.write_text(zemax_text(tilted_lobe, "PlaneSymmetrical"))
+    table = load(path)
+    for theta, (sheet,) in zip(table.theta_i_deg, table.reflected, strict=True):
+        wo, f = sheet.directions, sheet.values
+        shown = np.isfinite(f[:, 0]) & (wo[:, 2] > 1e-3)
+        assert (wo[shown, 1] < -1e-3).sum() == (wo[shown, 1] > 1e-3).sum() > 5
+        wi = np.broadcast_to(direction(np.radians(theta), 0.0), wo.shape)
+        np.testing.assert_allclose(f[shown], tilted_lobe(wi[shown], wo[shown]), rtol=1e-4)
+    aside = direction(np.radians(np.array([40.0, 40.0])), np.radians(np.array([150.0, 210.0])))
+    left, right = table.eval(direction(np.radians(40), 0.0), aside)
+    np.testing.assert_allclose(left, right, rtol=1e-9)

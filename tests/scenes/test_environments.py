@@ -1,0 +1,40 @@
+"""Environments as cube maps: which way round a picture lies, and the ground under daylight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.cubemap import face_directions, texel_solid_angles
+from lambent.core.directions import normalize
+from lambent.scenes.environments import daylight, from_lat_long
+
+N = 16
+
+
+def test_a_picture_lies_upright_and_unmirrored() -> None:
+    """Top row +y, middle column -z, to the right +x: one bright place in each of six pictures."""
+    places = {(1.0, 0.5): 4, (0.5, 0.5): 5, (0.75, 0.5): 0, (0.25, 0.5): 1, (0.5, 0.0): 2, (0.5, 1.0): 3}
+    for (column, row), face in places.items():
+        x, y = np.meshgrid((np.arange(64) + 0.5) / 64, (np.arange(32) + 0.5) / 32)
+        turned = np.abs((x - column + 0.5) % 1 - 0.5) * np.sin(np.pi * y) * 2
+        picture = np.repeat(np.exp(-80 * (turned**2 + (y - row) ** 2))[..., None], 3, axis=2)
+        cube = from_lat_long(picture, N)
+        light = cube[..., 0].sum(axis=(1, 2))
+        assert np.argmax(light) == face and light[face] > 0.9 * light.sum(), (column, row)
+        middle = cube[face, N // 2 - 1 : N // 2 + 1, N // 2 - 1 : N // 2 + 1, 0]
+        assert middle.min() > 0.5 * cube.max(), "in the middle of its face"
+
+
+def test_the_ground_returns_three_tenths_of_the_daylight() -> None:
+    """Radiance .3/pi E of the sky and the sun above it, the same everywhere below the horizon."""
+    sky = daylight(64, (0.3, 0.7, -0.2)).astype(float)
+    w = normalize(face_directions(64))
+    omega = np.broadcast_to(texel_solid_angles(64), w.shape[:3])
+    above = w[..., 1] > 0
+    e = (sky * (omega * np.where(above, w[..., 1], 0))[..., None]).sum(axis=(0, 1, 2))
+    ground = sky[~above]
+    assert np.ptp(ground, axis=0) == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(ground[0], 0.3 / np.pi * e, rtol=1e-3)
+    brightest = w.reshape(-1, 3)[np.argmax(sky[..., 1])]
+    assert brightest @ normalize(np.array([0.3, 0.7, -0.2])) > np.cos(np.radians(2))

@@ -1,0 +1,71 @@
+"""Details of Mitsuba's scenes: scales and cones of emitters, channels of pictures, instances in turned scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.scenes import load_scene
+from lambent.scenes.scene import PointLight, SunSky
+from tests.scenes.test_gltf import _png as png
+from tests.scenes.test_scene_mitsuba import written
+
+BALL = '<shape type="sphere" id="ball"/>'
+
+
+def test_emission_and_lamps_are_scaled(tmp_path: Path) -> None:
+    scaled = '<rgb name="{}" value="1 2 3"/><float name="scale" value="4"/>'
+    body = f"""<shape type="sphere" id="ball"><emitter type="area">{scaled.format("radiance")}</emitter></shape>
+        <emitter type="point">{scaled.format("intensity")}</emitter>"""
+    scene = load_scene(written(tmp_path, body))
+    assert scene.object("ball").emission == pytest.approx((4, 8, 12))
+    (lamp,) = scene.lights
+    assert isinstance(lamp, PointLight) and lamp.intensity == pytest.approx((4, 8, 12))
+
+
+@pytest.mark.parametrize(
+    ("said", "inner", "outer"),
+    [
+        ("", 15.0, 20.0),
+        ('<float name="cutoff_angle" value="40"/>', 30.0, 40.0),
+        ('<float name="cutoff_angle" value="40"/><float name="beam_width" value="10"/>', 10.0, 40.0),
+    ],
+)
+def test_a_spots_beam_is_three_quarters_of_its_cone(tmp_path: Path, said: str, inner: float, outer: float) -> None:
+    (lamp,) = load_scene(written(tmp_path, f'<emitter type="spot">{said}</emitter>{BALL}')).lights
+    assert isinstance(lamp, PointLight)
+    assert (lamp.inner_deg, lamp.outer_deg) == pytest.approx((inner, outer))
+
+
+@pytest.mark.parametrize(("kind", "sun", "sky"), [("sunsky", 6.0, 15.0), ("sky", 0.0, 15.0), ("sun", 6.0, 0.0)])
+def test_daylight_is_scaled_as_a_whole_and_by_parts(tmp_path: Path, kind: str, sun: float, sky: float) -> None:
+    body = f"""<emitter type="{kind}"><vector name="sun_direction" value="0, 0.6, 0.8"/><float name="scale" value="3"/>
+        <float name="sun_scale" value="2"/><float name="sky_scale" value="5"/><float name="turbidity" value="4"/>
+        </emitter>{BALL}"""
+    made = load_scene(written(tmp_path, body)).environment
+    assert isinstance(made, SunSky)
+    assert (made.sun_scale, made.sky_scale, made.turbidity) == pytest.approx((sun, sky, 4))
+    assert np.linalg.norm(made.sun_direction) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(("channel", "byte"), [("r", 40), ("g", 120), ("b", 200), ("a", 90)])
+def test_one_channel_of_a_bitmap(tmp_path: Path, channel: str, byte: int) -> None:
+    png(tmp_path / "four.png", np.full((2, 2, 4), (40, 120, 200, 90)))
+    body = f"""<shape type="rectangle"><bsdf type="diffuse" id="m"><texture type="bitmap" name="reflectance">
+        <string name="filename" value="four.png"/><boolean name="raw" value="true"/>
+        <string name="channel" value="{channel}"/></texture></bsdf></shape>"""
+    kd = load_scene(written(tmp_path, body)).materials["m"].kd
+    assert kd == pytest.approx((byte / 255,) * 3, rel=2e-3)
+
+
+def test_instances_are_turned_with_their_scene(tmp_path: Path) -> None:
+    """z is up: what is moved by (1, 2, 5) there stands at (1, 5, -2) here."""
+    body = f"""<sensor type="perspective">
+        <transform name="to_world"><lookat origin="3, -4, 2" target="0, 0, 0" up="0, 0, 1"/></transform></sensor>
+        <shape type="shapegroup" id="group">{BALL}</shape>
+        <shape type="instance"><ref id="group"/>
+          <transform name="to_world"><translate x="1" y="2" z="5"/></transform></shape>"""
+    (thing,) = load_scene(written(tmp_path, body)).objects
+    assert np.mean(thing.mesh.bounds, axis=0) == pytest.approx((1, 5, -2), abs=1e-4)
