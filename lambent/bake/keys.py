@@ -9,7 +9,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from lambent.core.files import sha256_of
+from lambent.core.inputs import sha256_of
 from lambent.scenes.scene import Environment, ImageEnvironment, Scene
 from lambent.scenes.textures import digest, parts
 

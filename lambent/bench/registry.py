@@ -18,7 +18,7 @@ from typing import Any
 from lambent import bench
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
-from lambent.core.files import sha256_of
+from lambent.core.inputs import sha256_of
 from lambent.core.machine import core_count, cpu_name
 from lambent.core.progress import Progress, silent
 

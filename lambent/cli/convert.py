@@ -9,6 +9,7 @@ import typer
 
 from lambent.cli.console import Between, Force, Json, metric_errors, progress_bar, show
 from lambent.core.errors import UserError
+from lambent.core.inputs import read_head
 
 if TYPE_CHECKING:
     from lambent.materials.export.contract import Cost, Subject, Writer
@@ -49,20 +50,11 @@ def subject_of(file: Path, reconstruction: Between = "auto") -> Subject:
     from lambent.materials import measured
     from lambent.materials.document import load_material
 
-    if not is_document(head_of(file, 64)):
+    if not is_document(read_head(file, 64)):
         return measured.load(file, reconstruction)
     if reconstruction != "auto":
         raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
     return load_material(file)
-
-
-def head_of(file: Path, size: int) -> bytes:
-    """The first bytes of a user's file."""
-    try:
-        with file.open("rb") as stream:
-            return stream.read(size)
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=file) from error
 
 
 def is_document(head: bytes) -> bool:

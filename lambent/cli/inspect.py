@@ -9,8 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from lambent.cli.console import Between, Force, Json, show, table, words
-from lambent.cli.convert import head_of, is_document
+from lambent.cli.convert import is_document
 from lambent.core.errors import UserError
+from lambent.core.inputs import read_head
 from lambent.core.plain import plain
 
 ALBEDO_AT_DEG = (0, 30, 60)
@@ -58,7 +59,7 @@ def inspector_of(file: str) -> Callable[..., Facts]:
         return inspect_scene
     if path.is_dir():
         return inspect_store
-    head = head_of(path, HEAD_BYTES)
+    head = read_head(path, HEAD_BYTES)
     if head.startswith(PICTURES):
         return inspect_picture
     if is_scene(path, head):

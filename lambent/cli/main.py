@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 AGAIN_S = 0.02
 INTERRUPTION = "lambent: interrupted; what was finished is kept\n"
+NO_ROOM = "failed to map segment"  # of the ImportError where a library does not fit
+MEMORY = "memory is used up; close other programs, raise its limit (ulimit -v), or ask for less"
 FAULTS_OF_THE_DISK = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR,
     errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
@@ -90,6 +92,8 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         if _is_interruption(error):
             code = INTERRUPTED
+        elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and NO_ROOM in str(error)):
+            return _fail(MEMORY)
         elif isinstance(error, OSError) and error.errno in FAULTS_OF_THE_DISK:
             return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
         else:

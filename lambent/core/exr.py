@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Image
+from lambent.core.ceilings import PIXELS
 from lambent.core.errors import UserError
 from lambent.core.outputs import MARK
 
@@ -24,13 +25,13 @@ _STDERR = 2
 _silencing = threading.Lock()
 
 
-def decode(file: Path, max_pixels: int) -> Image:
+def decode(file: Path) -> Image:
     """Linear RGB (H, W, 3) of the data window; a picture of luminance alone becomes grey.
 
     Raises
     ------
     UserError
-        Where the file is damaged or cut off, deep or multi-part, larger than `max_pixels` of four channels, or has
+        Where the file is damaged or cut off, deep or multi-part, larger than `PIXELS` of four channels, or has
         neither R, G, B nor Y.
     """
     with _opened(file, header_only=True) as exr:
@@ -40,9 +41,10 @@ def decode(file: Path, max_pixels: int) -> Image:
         flat = len(exr.parts) == 1 and "deep" not in str(header["type"])
     if not flat:
         raise UserError("deep and multi-part EXR files are not read", file=file, hint="save it as one flat part")
-    if not (height > 0 and width > 0 and height * width * max(1, channels / 4) <= max_pixels):
-        got = f"{width}x{height}, {channels} channels"
-        raise UserError("picture size", file=file, got=got, expected=f"at most {max_pixels} pixels of RGBA")
+    said = f"{width} x {height}, {channels} channels"
+    if not (height > 0 and width > 0):
+        raise UserError("picture has no pixels", file=file, got=said)
+    PIXELS.check(height * width * max(4, channels) // 4, file=file, got=said)
     with _opened(file, separate_channels=True) as exr:
         planes = {name: np.asarray(channel.pixels) for name, channel in exr.channels().items()}
     names = "RGB" if all(c in planes for c in "RGB") else "YYY"
@@ -50,7 +52,10 @@ def decode(file: Path, max_pixels: int) -> Image:
         raise UserError("no picture in the EXR", file=file, got=", ".join(sorted(planes)), expected="R, G, B or Y")
     if {planes[c].shape for c in names} != {(height, width)}:
         raise UserError("channels differ in size", file=file)
-    return np.stack([planes[c] for c in names], axis=-1).astype(np.float32)
+    image = np.empty((height, width, 3), np.float32)
+    for channel, name in enumerate(names):
+        image[..., channel] = planes[name]
+    return image
 
 
 def encode(image: Image, path: Path) -> None:

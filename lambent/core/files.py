@@ -1,4 +1,4 @@
-"""File safety: whole files or none, nothing but regular files, hashes, names that stay inside their folder."""
+"""File safety: whole files or none, nothing but regular files, names that stay inside their folder."""
 
 from __future__ import annotations
 
@@ -133,30 +133,14 @@ def write_text(path: Path, text: str) -> None:
         beside.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's content, as hex."""
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def read_bytes(path: Path, limit_bytes: int) -> bytes:
-    """Content of a user's file, or a `UserError` where it is missing, a folder, unreadable or over `limit_bytes`."""
-    path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > limit_bytes:
-            raise UserError("file is too large", file=path, got=f"{size} bytes", expected=f"at most {limit_bytes}")
-        return path.read_bytes()
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=path) from error
-
-
 def inside(folder: Path, name: str) -> Path:
     """`folder / name` as a real path, or a `UserError` where the name would leave the folder."""
     folder = Path(folder).resolve()
-    if "\0" in name:
-        raise UserError("is not a file name", file=folder, got=name)
-    path = (folder / name).resolve()
+    try:
+        path = (folder / name).resolve()
+        path.is_file()  # a name that is too long fails here
+    except (ValueError, OSError, RuntimeError) as error:  # zeros, halves of characters, links that run in circles
+        raise UserError("is not a file name", file=folder, got=ascii(name)) from error
     if not path.is_relative_to(folder):
         raise UserError("path leaves its folder", file=folder, got=name, expected="a path below it")
     return path

@@ -1,7 +1,7 @@
 """Reading and writing pictures: float32, linear Rec.709, (H, W, 3), row 0 at the top.
 
 The content decides how a file is read: EXR, Radiance HDR, PNG and JPEG (8 or 16 bit, taken as sRGB). A header that
-promises more than `MAX_PIXELS`, or more than its file can hold, is refused before anything is allocated. The suffix
+promises more than `PIXELS`, or more than its file can hold, is refused before anything is allocated. The suffix
 decides how a file is written: .exr and .hdr keep linear values, .png encodes them as 8-bit sRGB.
 """
 
@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from lambent.core import exr, rgbe
 from lambent.core.arrays import Image
+from lambent.core.ceilings import PICTURE_BYTES, PIXELS
 from lambent.core.colour import srgb_decode, srgb_encode
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, read_bytes
+from lambent.core.files import atomic_path
+from lambent.core.inputs import read_bytes
 from lambent.core.outputs import MARK, check_output
 
-MAX_PIXELS = 1 << 26  # 8192 x 8192: 800 MB as float32 RGB
-LIMIT_BYTES = 2 << 30
+ROWS_AT_ONCE = 64
 HDR_SUFFIXES = (".exr", ".hdr")
 WRITABLE = (".exr", ".hdr", ".png")
 
@@ -36,13 +37,13 @@ def read_image(path: Path) -> Image:
         Where the file is missing, of another kind, cut off, too large, or holds values that are not finite.
     """
     path = Path(path)
-    data = read_bytes(path, LIMIT_BYTES)
+    data = read_bytes(path, PICTURE_BYTES)
     if data.startswith(exr.MAGIC):
-        image = exr.decode(path, MAX_PIXELS)
+        image = exr.decode(path)
     elif data.startswith(rgbe.MAGICS):
-        image = rgbe.decode(data, path, MAX_PIXELS)
+        image = rgbe.decode(data, path)
     elif data.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
-        image = srgb_decode(read_encoded(path)[..., :3])
+        image = _linear(_stored(path))
     else:
         raise UserError("not a picture Lambent reads", file=path, got=repr(data[:4]), expected="EXR, HDR, PNG or JPEG")
     bad = image.size - np.count_nonzero(np.isfinite(image))
@@ -53,15 +54,21 @@ def read_image(path: Path) -> Image:
 
 def read_encoded(path: Path) -> Image:
     """Values (H, W, 3 or 4) in [0, 1] of a PNG or JPEG as stored: for normal maps, masks and alpha."""
+    return _values(_stored(path))
+
+
+def _stored(path: Path) -> NDArray[Any]:
+    """Values of a PNG or JPEG in its own integers: (H, W, 3 or 4) of 8 bits, or (H, W) of 16."""
     from PIL import Image as Pillow
 
-    data = read_bytes(Path(path), LIMIT_BYTES)
+    data = read_bytes(Path(path), PICTURE_BYTES)
     try:
         with Pillow.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
-            if picture.width * picture.height > MAX_PIXELS:
-                got = f"{picture.width}x{picture.height}"
-                raise UserError("picture size", file=path, got=got, expected=f"at most {MAX_PIXELS} pixels")
-            return _values(picture)
+            PIXELS.check(picture.width * picture.height, file=path, got=f"{picture.width} x {picture.height}")
+            if picture.mode.startswith("I"):  # 16-bit grey
+                return np.asarray(picture)
+            alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+            return np.asarray(picture.convert("RGBA" if alpha else "RGB"))
     except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
         raise UserError("picture is damaged or cut off", file=path, hint="copy or export it again") from error
 
@@ -110,9 +117,17 @@ def to_bytes(encoded: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray(np.clip(np.nan_to_num(encoded), 0, 1) * 255 + 0.5, np.uint8)
 
 
-def _values(picture: Any) -> Image:
-    if picture.mode.startswith("I"):  # 16-bit grey
-        grey = np.asarray(picture, np.float32) / np.float32(65535)
-        return np.repeat(grey[..., None], 3, axis=-1)
-    alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
-    return np.asarray(picture.convert("RGBA" if alpha else "RGB"), np.float32) / np.float32(255)
+def _values(stored: NDArray[Any]) -> Image:
+    """Integers of a file as (..., 3 or 4) float32 in [0, 1]."""
+    values = stored.astype(np.float32)
+    values /= np.float32(65535 if stored.ndim == 2 else 255)
+    return np.repeat(values[..., None], 3, axis=-1) if stored.ndim == 2 else values
+
+
+def _linear(stored: NDArray[Any]) -> Image:
+    """Linear RGB of sRGB integers; a few rows at a time, because a large picture has its memory only once."""
+    image = np.empty((*stored.shape[:2], 3), np.float32)
+    for top in range(0, len(image), ROWS_AT_ONCE):
+        rows = slice(top, top + ROWS_AT_ONCE)
+        image[rows] = srgb_decode(_values(stored[rows])[..., :3])
+    return image

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.files import check_place
+from lambent.core.inputs import open_input
 
 MARK = "Lambent made this file and may replace it"
 _HEAD_BYTES, _TAIL_BYTES = 8 << 20, 1 << 16  # a film's mark stands behind the sizes of its frames, 8 bytes each
@@ -46,9 +47,9 @@ def check_output(path: Path, suffixes: Iterable[str] = (), *, force: bool, input
 def is_marked(path: Path) -> bool:
     """Whether Lambent drew the file at `path`; False where it cannot be read."""
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             head = file.read(_HEAD_BYTES)
             file.seek(max(file.tell(), path.stat().st_size - _TAIL_BYTES))
             return MARK.encode("ascii") in head or MARK.encode("ascii") in file.read(_TAIL_BYTES)
-    except OSError:
+    except (OSError, UserError):
         return False

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
+from lambent.core.ceilings import PIXELS
 from lambent.core.colour import xyz_to_rgb
 from lambent.core.errors import UserError
 from lambent.core.outputs import MARK
@@ -23,19 +24,22 @@ _RESOLUTION = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel
 
 
-def decode(data: bytes, file: Path, max_pixels: int) -> Image:
+def decode(data: bytes, file: Path) -> Image:
     """Linear RGB (H, W, 3) of a whole file's bytes; `file` is named in errors."""
     header_end = data.find(b"\n\n", 0, 1 << 16)
     match = _RESOLUTION.match(data, header_end + 2) if header_end >= 0 else None
     if match is None:
         raise UserError("Radiance header has no '-Y height +X width' line", file=file)
     height, width = int(match[2]), int(match[4])
-    if not 0 < width * height <= max_pixels:
-        raise UserError("picture size", file=file, got=f"{width}x{height}", expected=f"at most {max_pixels} pixels")
+    PIXELS.check(width * height, file=file, got=f"{width} x {height}")
+    if width * height == 0:
+        raise UserError("picture has no pixels", file=file, got=f"{width} x {height}")
     header = data[:header_end]
     pixels = _pixels(data, match.end(), height, width, file)
-    scale = np.ldexp(1.0, pixels[..., 3].astype(np.int32) - 136) * (pixels[..., 3] > 0)
-    image = (pixels[..., :3] * scale[..., None]).astype(np.float32)
+    image = np.empty((height, width, 3), np.float32)
+    for row, into in zip(pixels, image, strict=True):  # row by row: doubles of a whole picture take twice its memory
+        scale = np.ldexp(1.0, row[:, 3].astype(np.int32) - 136) * (row[:, 3] > 0)
+        into[:] = row[:, :3] * scale[:, None]
     for exposure in re.findall(r"^EXPOSURE=\s*([-+.\deE]+)\s*$", header.decode("latin-1"), re.MULTILINE):
         if not (is_number(exposure) and 0 < float(exposure) < float("inf")):
             raise UserError("not a positive number", file=file, field="EXPOSURE", got=exposure)

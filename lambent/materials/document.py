@@ -15,12 +15,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from lambent.core.ceilings import LOBES, MATERIAL_BYTES
 from lambent.core.errors import UserError, invalid
-from lambent.core.files import read_bytes, write_text
+from lambent.core.files import write_text
+from lambent.core.inputs import parse_json, read_bytes
 
 FORMAT: Literal["lambent-material"] = "lambent-material"
 VERSION: Literal[1] = 1
-LIMIT_BYTES = 16 << 20
 SCATTERING = {"kd", "kt_d", "lobes"}  # a document names at least one of them
 Side = Literal["reflection", "transmission"]
 Distribution = Literal["beckmann", "ggx"]
@@ -33,7 +34,8 @@ def _spread(value: object) -> object:
     return (value, value, value) if isinstance(value, int | float) else value
 
 
-Coefficient = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+COEFFICIENT_MAX = 1e6  # of published lobes a few hundred; sums and squares of it are far from overflow
+Coefficient = Annotated[float, Field(ge=0, le=COEFFICIENT_MAX, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 RGB = Annotated[tuple[Coefficient, Coefficient, Coefficient], BeforeValidator(_spread)]
 Roughness = Annotated[float, Field(ge=0.001, le=4, description="slope roughness, dimensionless")]
@@ -136,11 +138,7 @@ def load_material(path: Path) -> Material:
     UserError
         The file is not JSON, not a material, of another version, or holds an unknown or impossible field.
     """
-    try:
-        data = json.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise UserError(f"not a JSON document ({error})", file=path) from error
-    return material_from(data, path)
+    return material_from(parse_json(read_bytes(path, MATERIAL_BYTES), path), path)
 
 
 def material_from(data: Any, file: Path | str) -> Material:
@@ -149,6 +147,8 @@ def material_from(data: Any, file: Path | str) -> Material:
         raise UserError("not a material document", file=file, got=type(data).__name__, expected="an object")
     if data.get("version", VERSION) != VERSION:
         raise UserError("unknown version", file=file, field="version", got=data["version"], expected=VERSION)
+    if isinstance(data.get("lobes"), list):
+        LOBES.check(len(data["lobes"]), file=file, field="lobes")
     try:
         material = Material.model_validate(data)
     except ValidationError as error:

@@ -11,8 +11,8 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
-from lambent.core.files import sha256_of
 from lambent.core.images import to_bytes
+from lambent.core.inputs import sha256_of
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting import plot

@@ -26,7 +26,8 @@ import numpy as np
 from numcodecs import Zstd
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, inside, read_bytes
+from lambent.core.files import atomic_path, inside
+from lambent.core.inputs import read_bytes
 from lambent.store.artefact import Array, Artefact, Chunk, Region, Version, chunk_id
 
 LENGTH = "length"

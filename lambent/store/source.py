@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.core.files import sha256_of
+from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.contract import ObjectRecord, SceneRecord, scene_record

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes, remove_left_over, write_text
+from lambent.core.files import remove_left_over, write_text
+from lambent.core.inputs import read_bytes
 from lambent.core.machine import memory_bytes
 from lambent.store.artefact import Array, Artefact, Chunk, Region, chunk_id
 from lambent.store.chunk_files import ChunkFiles
@@ -32,7 +33,7 @@ MANIFEST = "manifest.json"
 __all__ = ["Array", "Artefact", "Chunk", "Store", "Writer"]
 LIMIT_BYTES = 1 << 28  # of a manifest
 SPARSE_BYTES, DENSEST = 1 << 30, 1 << 16  # an array of more bytes has files, which zstd packs no denser
-_DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+_DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError, SyntaxError)
 
 
 class Store:

@@ -18,14 +18,15 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.ceilings import VIEWS_BYTES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes, write_text
+from lambent.core.files import write_text
+from lambent.core.inputs import parse_json, read_bytes
 from lambent.store.consistency import is_usable
 from lambent.store.contract import SceneRecord
 from lambent.store.lock import lock
 
 FILE = "views.json"
-LIMIT_BYTES = 64 << 20
 LONGEST_NAME = 80
 
 
@@ -52,13 +53,11 @@ def read_views(folder: Path) -> Views:
     if not path.exists():
         return Views()
     try:
-        views = Views.model_validate(json.loads(read_bytes(path, LIMIT_BYTES)))
+        views = Views.model_validate(parse_json(read_bytes(path, VIEWS_BYTES), path))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UserError(f"saved views cannot be used ({first['msg']})", file=path, field=where or None) from error
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"saved views cannot be used ({error})", file=path, hint="mend it or delete it") from error
     _check(views, path)
     return views
 

@@ -16,6 +16,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lambent.core.ceilings import TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.photometry import ILLUMINANCE, photometric
 from lambent.materials.bsdf import MaterialBSDF
@@ -413,7 +414,7 @@ def test_broken_files_are_one_line(tmp_path: Path, name: str) -> None:
 
 
 def test_a_scene_that_multiplies_itself_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lambent.scenes.loaders.meshes.repair.TRIANGLES_MAX", 100)
+    monkeypatch.setattr("lambent.scenes.loaders.gltf.nodes.TRIANGLES", replace(TRIANGLES, most=100))
     nodes = [{"mesh": 0} for _ in range(101)]
     with pytest.raises(UserError, match="scene is too large"):
         loaded(tmp_path, document(nodes=nodes, scenes=[{"nodes": list(range(101))}]))

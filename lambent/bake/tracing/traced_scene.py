@@ -20,7 +20,7 @@ from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
 from lambent.core.arrays import Flags, Floats, Indices
-from lambent.core.files import sha256_of
+from lambent.core.inputs import sha256_of
 from lambent.core.progress import Progress, silent
 from lambent.materials.measured.patch_sheet import Lookup, lookup_of
 from lambent.materials.measured.registry import load

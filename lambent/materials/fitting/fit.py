@@ -13,7 +13,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.files import sha256_of
+from lambent.core.inputs import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side

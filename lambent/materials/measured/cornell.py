@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.ceilings import CORNELL_BYTES
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.materials.measured.scattered import ScatteredTable
@@ -20,7 +21,6 @@ from lambent.materials.measured.table import isotropic_brdf, require_values, sen
 from lambent.materials.measured.text_numbers import numbers, read_text, without_comments
 
 NAME = "Cornell / pbrt-v2 text"
-LIMIT_BYTES = 256 << 20
 _COMMENT = re.compile(rb"\A\xef\xbb\xbf|#[^\r\n]*")  # and the byte order mark
 
 
@@ -44,7 +44,7 @@ def read(path: Path) -> ScatteredTable:
     UserError
         A word is not a number, the counts do not fit, an angle is outside its range, or nothing was measured.
     """
-    values = numbers(without_comments(read_text(path, LIMIT_BYTES)), path)
+    values = numbers(without_comments(read_text(path, CORNELL_BYTES)), path)
     if not (len(values) > 1 and 1 <= values[0] <= len(values)):
         got = f"{len(values)} numbers" + (f", the first {values[0]:g}" if len(values) else "")
         raise UserError("does not begin with a count of wavelengths", file=path, got=got)

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.ceilings import MEASURED_BYTES
 from lambent.core.directions import HALF_TURN, Floats, raised
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.materials.measured import lbnl_document, lbnl_parts
 from lambent.materials.measured.lbnl_parts import Part, Side, Way, Where
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
@@ -25,7 +26,6 @@ from lambent.materials.measured.table import on_flat_pairs
 from lambent.materials.measured.text_numbers import shown
 
 NAME = "LBNL BSDF XML"
-LIMIT_BYTES = 1 << 30
 ISOTROPIC_WITHIN = 0.02  # of the mean of f
 _DIRECT_SHARE = 0.5
 
@@ -51,7 +51,7 @@ def read(path: Path) -> LbnlTable:
         The file is not well-formed, declares a document type, names an unknown basis, holds another count of values
         than its bases need, a word that is no number or a value that is not finite, or nothing above zero.
     """
-    content = read_bytes(path, LIMIT_BYTES)
+    content = read_bytes(path, MEASURED_BYTES)
     parts, notes = lbnl_parts.parts_of(lbnl_document.parse(content, path), path)
     if skipped := shown(lbnl_document.preamble(content)).split():
         notes = (*notes, f"skipped before the XML: {' '.join(skipped)[:120]}")

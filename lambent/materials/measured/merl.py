@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.ceilings import MEASURED_BYTES
 from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.materials.measured.protocol import LARGEST_F, MeasuredSamples, collect
 from lambent.materials.measured.table import ReflectionTable, fill_holes, isotropic_brdf, require_values
 
 NAME = "MERL binary"
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500
-LIMIT_BYTES = 1 << 30
 _HEADER_BYTES = 12
 _USUAL = (90, 90, 180)
 
@@ -44,7 +44,7 @@ def read(path: Path) -> MerlTable:
     UserError
         The size does not fit the header, the byte order is big-endian, or nothing was measured.
     """
-    content = read_bytes(path, LIMIT_BYTES)
+    content = read_bytes(path, MEASURED_BYTES)
     shape = struct.unpack_from("<3i", content)
     if shape != _USUAL and struct.unpack_from(">3i", content) == _USUAL:
         raise UserError("is big-endian", file=path, expected="little-endian numbers, as MERL publishes them")

@@ -7,15 +7,15 @@ A reader is a module of this package that has `NAME` (str), `recognise(head: byt
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Literal, Protocol
 
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
+from lambent.core.inputs import foreign_bytes, open_input
 from lambent.materials.measured.gonio import GonioTable
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.reconstruction import AUTO, Reconstruction
@@ -23,8 +23,6 @@ from lambent.materials.measured.text_numbers import UTF16, is_utf16
 from lambent.materials.measured.unread import kind_of
 
 HEAD_BYTES = 1 << 16
-UNREADABLE = "cannot be read as"
-_LONGEST_FAULT = 120
 
 
 class Reader(Protocol):
@@ -62,7 +60,7 @@ def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AU
     head, size = _head(path)
     reader = _reader_of(head, size, path)
     if reader is not None:
-        with _foreign_bytes(reader, path):
+        with foreign_bytes(reader.NAME, path):
             table = reader.read(path)
         if reconstruction == AUTO:
             return table
@@ -85,12 +83,8 @@ def is_known(path: Path | str) -> bool:
 
 def _head(path: Path) -> tuple[bytes, int]:
     """The first bytes of a file and its size, or a `UserError`."""
-    try:
-        size = path.stat().st_size
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES)
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=path) from error
+    with open_input(path) as file:
+        head, size = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
     if not size:
         raise UserError("file is empty", file=path)
     return head, size
@@ -101,7 +95,7 @@ def _reader_of(head: bytes, size: int, path: Path) -> Reader | None:
     failed: UserError | None = None
     for reader in readers():
         try:
-            with _foreign_bytes(reader, path):
+            with foreign_bytes(reader.NAME, path):
                 if reader.recognise(head, size):
                     return reader
         except UserError as error:  # the file may still be another reader's
@@ -109,16 +103,3 @@ def _reader_of(head: bytes, size: int, path: Path) -> Reader | None:
     if failed is not None:
         raise failed
     return None
-
-
-@contextmanager
-def _foreign_bytes(reader: Reader, path: Path) -> Iterator[None]:
-    """Turns whatever a reader raises over a file's bytes into a `UserError` with the reader's name."""
-    try:
-        yield
-    except UserError:
-        raise
-    except Exception as error:
-        said = " ".join(str(error).split())
-        fault = type(error).__name__ + (f": {said[:_LONGEST_FAULT]}" if said else "")
-        raise UserError(f"{UNREADABLE} {reader.NAME} ({fault})", file=path) from error

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.ceilings import TENSOR_BYTES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 
 Tensors = dict[str, NDArray[np.generic]]
 
 MAGIC = b"tensor_file\0"
-LIMIT_BYTES = 4 << 30
 _TYPES = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8: "<i8", 9: "<f2", 10: "<f4", 11: "<f8"}
 _DIMENSIONS_MAX = 16
 
@@ -32,7 +32,7 @@ def read_tensors(path: Path) -> Tensors:
     UserError
         The header is broken, or a tensor lies outside the file.
     """
-    content = read_bytes(path, LIMIT_BYTES)
+    content = read_bytes(path, TENSOR_BYTES)
     try:
         return _parse(content, path)
     except (struct.error, UnicodeDecodeError) as error:

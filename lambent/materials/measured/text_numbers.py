@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.ceilings import MEASURED_BYTES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 
-LIMIT_BYTES = 1 << 30
 UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 _DECIMAL_COMMA = re.compile(rb"(?:^|[\s;])[-+]?\d+,\d+(?:[eE][-+]?\d+)?(?=[\s;]|$)")
@@ -36,7 +36,7 @@ def begins_with(pattern: re.Pattern[bytes], head: bytes) -> bool:
     return text is not None and pattern.match(without_comments(text)) is not None
 
 
-def read_text(path: Path, limit_bytes: int = LIMIT_BYTES) -> bytes:
+def read_text(path: Path, limit_bytes: int = MEASURED_BYTES) -> bytes:
     """A file's `plain_text`.
 
     Raises

@@ -26,16 +26,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from lambent.core.ceilings import FITS_BYTES
 from lambent.core.directions import Floats, half_vector
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.core.plain import Triple, triple
 from lambent.materials.fresnel import dielectric, schlick_weight
 
 MERL_CHANNELS = np.array([1.0, 1.15, 1.66])
 """Factors that convert Ngan's coefficients to f as MERL's readers give it."""
-LIMIT_BYTES = 16 << 20
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RGB = rf"\[\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\]"
 _LINE = re.compile(
@@ -107,7 +107,7 @@ def read_fits(path: Path) -> dict[str, Published]:
         A line is no material of this form, names an unknown model or field, or holds an impossible number.
     """
     try:
-        text = read_bytes(path, LIMIT_BYTES).decode("utf-8-sig")
+        text = read_bytes(path, FITS_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UserError("not a text file of published fits", file=path) from error
     found: dict[str, Published] = {}

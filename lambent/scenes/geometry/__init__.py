@@ -1,12 +1,22 @@
 """Mesh building blocks: shapes with analytic normals, uv and a brushing direction."""
 
 from lambent.scenes.geometry.curves import catmull_rom, smooth_curve
-from lambent.scenes.geometry.grid import build, grid, merge, placed, signed_volume, tangents_along, transformed, turn
+from lambent.scenes.geometry.grid import (
+    build,
+    grid,
+    merge,
+    placed,
+    positions_under,
+    signed_volume,
+    tangents_along,
+    transformed,
+    turn,
+)
 from lambent.scenes.geometry.shapes import box, cushion, cylinder, extrusion, fan, lathe, patch, sphere, tube
 from lambent.scenes.geometry.teapot import teapot
 
 __all__ = [
     "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
-    "patch", "placed", "signed_volume", "smooth_curve", "sphere", "tangents_along", "teapot", "transformed", "tube",
-    "turn",
+    "patch", "placed", "positions_under", "signed_volume", "smooth_curve", "sphere", "tangents_along", "teapot",
+    "transformed", "tube", "turn",
 ]  # fmt: skip

@@ -73,12 +73,17 @@ def transformed(mesh: Mesh, matrix: ArrayLike) -> Mesh:
     normals = normalize(mesh.normals.astype(float) @ np.linalg.inv(linear))
     mirrored = np.linalg.det(linear) < 0
     return Mesh(
-        (mesh.positions @ linear.T + m[:3, 3]).astype(np.float32),
+        positions_under(mesh, m),
         normals.astype(np.float32),
         tangents_along(normals, mesh.tangents @ linear.T).astype(np.float32),
         mesh.uv,
         mesh.faces[:, ::-1].copy() if mirrored else mesh.faces,
     )
+
+
+def positions_under(mesh: Mesh, matrix: Floats) -> NDArray[np.float32]:
+    """Positions (V, 3) float32 of a mesh under an affine 4x4 matrix."""
+    return (mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
 
 
 def turn(axis: str, angle_deg: float) -> Floats:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -54,11 +55,21 @@ class Contents:
         )
 
 
-def unique_name(name: str, taken: set[str]) -> str:
-    """`name`, or name_2, name_3... where that is taken; the answer is added to `taken`."""
-    candidate, count = name, 1
-    while candidate in taken:
-        count += 1
-        candidate = f"{name}_{count}"
-    taken.add(candidate)
-    return candidate
+class UniqueNames:
+    """Gives every name once; those in `taken` are given already."""
+
+    def __init__(self, taken: Iterable[str] = ()) -> None:
+        self._taken = set(taken)
+        self._tried: Counter[str] = Counter()
+
+    def unique(self, name: str) -> str:
+        """`name`, or the first of name_2, name_3... that is free.
+
+        The search goes on where it ended, so that the thousandth object of a name costs what the second does.
+        """
+        candidate = name
+        while candidate in self._taken:
+            self._tried[name] += 1
+            candidate = f"{name}_{self._tried[name] + 1}"
+        self._taken.add(candidate)
+        return candidate

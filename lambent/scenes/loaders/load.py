@@ -17,6 +17,7 @@ from types import ModuleType
 
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
+from lambent.core.inputs import foreign_bytes
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -54,9 +55,9 @@ def _load(path_or_builtin: str | Path) -> Scene:
         return load_toml(Path(str(files(builtin) / f"{name}{TOML}")), read_geometry)
     path = Path(path_or_builtin)
     if path.suffix.lower() == TOML:
-        return load_toml(path, read_geometry)
-    contents: Contents = _format_of(path).load(path, None)
-    return contents.scene(path.stem)
+        with foreign_bytes("scene.toml", path):
+            return load_toml(path, read_geometry)
+    return _contents(path, None).scene(path.stem)
 
 
 def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Contents:
@@ -66,7 +67,13 @@ def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Conte
         make: Callable[[], tuple[SceneObject, ...]] = module.objects
         return Contents(make())
     path = scene_files.path(name, scene_file, "geometry")
-    contents: Contents = _format_of(path).load(path, scene_files.root)
+    return _contents(path, scene_files.root)
+
+
+def _contents(path: Path, root: Path | None) -> Contents:
+    module = _format_of(path)
+    with foreign_bytes(module.NAME, path):
+        contents: Contents = module.load(path, root)
     return contents
 
 

@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
+from lambent.core.ceilings import FACE_CORNERS, PLY_BYTES, TRIANGLES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.materials.document import Material
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.meshes.polygons import ranges, triangulate
-from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.scene import SceneObject
 
 NAME, ENDINGS = "PLY", (".ply",)
-LIMIT_BYTES = 4 << 30
 HEADER_MAX = 1 << 16
-CORNERS_MAX = 1 << 20  # of one face
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
@@ -67,7 +66,7 @@ def read(path: Path) -> MeshArrays:
     UserError
         Where it is not PLY, damaged, cut off, or a face names a vertex that is not there.
     """
-    data = read_bytes(path, LIMIT_BYTES)
+    data = read_bytes(path, PLY_BYTES)
     order, elements, start = _header(data, path)
     rows = _Rows(_doubles(data[start:], path) if order == "ascii" else memoryview(data)[start:], path)
     vertex: dict[str, Floats] = {}
@@ -90,7 +89,7 @@ def read(path: Path) -> MeshArrays:
         got, expected = int(outside.max()), f"below {len(positions)}"
         raise UserError("face index out of range", file=path, got=got, expected=expected)
     places, _ = triangulate(positions, corners, sizes)
-    check_triangles(len(places), path)
+    TRIANGLES.check(len(places), file=path)
     return MeshArrays(positions, corners[places], _columns(vertex, ("nx", "ny", "nz")), _columns(vertex, *UV_NAMES))
 
 
@@ -153,8 +152,9 @@ class _Rows:
         for _ in range(element.count):
             self._check(end + head.itemsize)
             (size,) = size_of.unpack_from(self._data, end + size_at)
-            if not 0 <= size < CORNERS_MAX:
+            if not 0 <= size < np.inf:
                 raise UserError("face that cannot be read", file=self._path, got=size)
+            FACE_CORNERS.check(int(size), file=self._path)
             sizes.append(int(size))
             end += head.itemsize + sizes[-1] * item.itemsize
             if len(sizes) == 1 and (rows := self._alike(element.row(sizes[0]), element.count)) is not None:

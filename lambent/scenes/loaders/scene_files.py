@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path, PureWindowsPath
 
 from lambent.core.errors import UserError
-from lambent.core.files import inside, read_bytes
+from lambent.core.files import inside
+from lambent.core.inputs import read_bytes
 
 HINT = "put the file into the scene's folder or below"
 
@@ -57,7 +58,7 @@ class SceneFiles:
             Where the file is, and whether it was found only beside `file`. The path need not exist.
         """
         last = PureWindowsPath(name.replace("/", "\\")).name
-        is_beside = bool(last) and "\0" not in name and (file.resolve().parent / last).is_file()
+        is_beside = bool(last) and _is_file(file.resolve().parent / last)
         try:
             path = self.path(name, file, field)
         except UserError:
@@ -79,3 +80,11 @@ class SceneFiles:
         if moved:
             note(f"{what} {name} was found beside {file.name}")
         return self.use(path)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a file of this name is there; names that no file can have are answered, too."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long, a zero or half of a character in it
+        return False

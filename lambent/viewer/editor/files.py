@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from lambent.core.errors import UserError
+from lambent.core.inputs import read_head
 from lambent.core.plain import plain_name
 from lambent.materials.document import Material, Provenance, load_material
 from lambent.viewer.editor.measurement import Measurement, read_measurement
@@ -25,11 +26,7 @@ def kind_of(path: Path) -> Kind:
     """Kind of a file, by its suffix and its first bytes; `UserError` where it cannot be read."""
     if path.suffix.lower() in ENVIRONMENTS:
         return "environment"
-    try:
-        with path.open("rb") as file:
-            head = file.read(64)
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=path) from error
+    head = read_head(path, 64)
     return "material" if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else "measurement"
 
 

@@ -22,8 +22,9 @@ import numpy as np
 
 from lambent.core.directions import angles, direction
 from lambent.core.errors import UserError
+from lambent.core.inputs import UNREADABLE
 from lambent.materials.measured.gonio_text import write_gonio
-from lambent.materials.measured.registry import UNREADABLE, load, readers
+from lambent.materials.measured.registry import load, readers
 from lambent.materials.measured.synthetic import Setup, synthesise
 from tests.materials.measured.lbnl_files import angle_basis, lbnl_xml, random_tree, words
 from tests.materials.measured.measured_files import (

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.inputs import UNREADABLE
 from lambent.core.progress import silent
 from lambent.materials.export.registry import writer_for
 from lambent.materials.measured import load, registry
@@ -209,7 +210,7 @@ def test_hostile_bytes_are_a_table_or_one_line(tmp_path: Path, reader: str, chan
             load(path)
         except UserError as error:
             assert "hostile.bsdf" in str(error) and "\n" not in str(error)
-            assert registry.UNREADABLE not in str(error)
+            assert UNREADABLE not in str(error)
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import base64
 import binascii
-import json
 import struct
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote
@@ -15,14 +15,13 @@ from urllib.parse import unquote
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.ceilings import ELEMENTS_READ, GLTF_BYTES, GLTF_JSON_BYTES, ZEROS, Ceiling
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError, invalid
-from lambent.core.files import read_bytes
+from lambent.core.inputs import parse_json, read_bytes
 from lambent.scenes.loaders.gltf.schema import READ_EXTENSIONS, GltfDocument
 from lambent.scenes.loaders.scene_files import SceneFiles
 
-LIMIT_BYTES = 4 << 30
-ZEROS_MAX = 60_000_000  # elements of an accessor without a buffer view
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -37,6 +36,7 @@ class Gltf:
     document: GltfDocument
     buffers: tuple[bytes, ...]
     files: SceneFiles
+    asked: Counter[str] = field(default_factory=Counter)  # numbers of accessors so far, and those that are zeros
 
     def error(self, message: str, field: str, got: object, expected: object) -> UserError:
         return UserError(message, file=self.path, field=field, got=got, expected=expected)
@@ -63,13 +63,15 @@ class Gltf:
         field = f"accessors.{index}"
         a = self.pick(self.document.accessors, index, "accessors")
         dtype, width = np.dtype(COMPONENTS[a.componentType]), WIDTHS[a.type]
-        if a.bufferView is None and a.count > ZEROS_MAX:
-            raise self.error("too many zeros", field, a.count, f"at most {ZEROS_MAX}")
         if a.bufferView is None:
+            self._ask("zeros", ZEROS, a.count * width, field)
             array = np.zeros((a.count, width), dtype)
         else:
             array = self._elements(a.bufferView, a.byteOffset, dtype, (a.count, width), field)
+        self._ask("read", ELEMENTS_READ, a.count * width, field)
         s, field = a.sparse, f"{field}.sparse"
+        if s is not None and s.count > a.count:
+            raise self.error("more values than the accessor has", field, s.count, f"at most {a.count}")
         if s is not None and s.count:
             kind = np.dtype(COMPONENTS[s.index_type])
             places = self._elements(s.index_view, s.index_offset, kind, (s.count, 1), f"{field}.indices")
@@ -78,6 +80,10 @@ class Gltf:
             values = self._elements(s.value_view, s.value_offset, dtype, (s.count, width), f"{field}.values")
             array[places[:, 0]] = values
         return array
+
+    def _ask(self, what: str, ceiling: Ceiling, count: int, field: str) -> None:
+        self.asked[what] += count
+        ceiling.check(self.asked[what], file=self.path, field=field)
 
     def _elements(
         self, view: int, offset: int, dtype: np.dtype[Any], shape: tuple[int, int], field: str
@@ -117,7 +123,7 @@ class Gltf:
         if "://" in uri:
             hint = "put the file beside the scene"
             raise UserError("is on the network", file=self.path, field=field, got=uri, hint=hint)
-        return self.files.read(self._file(uri, field), LIMIT_BYTES)
+        return self.files.read(self._file(uri, field), GLTF_BYTES)
 
     def _file(self, uri: str, field: str) -> Path:
         return self.files.path(unquote(uri), self.path, field)
@@ -131,12 +137,12 @@ def read(path: Path, root: Path | None = None) -> Gltf:
     UserError
         Where the file is truncated, not glTF 2.0, needs an extension that is not read, or names a file elsewhere.
     """
-    data = read_bytes(path, LIMIT_BYTES)
+    data = read_bytes(path, GLTF_BYTES)
     text, binary = _chunks(data, path) if path.suffix.lower() == ".glb" else (data, None)
-    try:
-        raw = json.loads(text.decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"its JSON cannot be read ({error})", file=path) from error
+    if len(text) > GLTF_JSON_BYTES:
+        expected, hint = f"at most {GLTF_JSON_BYTES}", "save it as .glb, or with its buffers in files"
+        raise UserError("its JSON is too large", file=path, got=f"{len(text)} bytes", expected=expected, hint=hint)
+    raw = parse_json(text, path)
     if not isinstance(raw, dict):
         raise UserError("not a glTF document", file=path, got=type(raw).__name__, expected="an object")
     try:
@@ -147,19 +153,23 @@ def read(path: Path, root: Path | None = None) -> Gltf:
         raise UserError("unknown glTF version", file=path, field="asset.version", got=document.version, expected=2)
     unread = sorted(set(document.extensionsRequired) - READ_EXTENSIONS)
     if unread:
-        hint = "export without compression" if any("compression" in name for name in unread) else None
-        raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=hint)
+        advice = "export without compression" if any("compression" in name for name in unread) else None
+        raise UserError("needs an extension that is not read", file=path, got=", ".join(unread), hint=advice)
     gltf = Gltf(path, document, (), SceneFiles(path, root))
     return replace(gltf, buffers=tuple(_buffers(gltf, binary)))
 
 
 def _buffers(gltf: Gltf, binary: bytes | None) -> Iterator[bytes]:
-    """The content of every buffer; `binary` is the first one's if it has no uri."""
+    """The content of every buffer; `binary` is the first one's if it has no uri. Those of one uri share it."""
+    known: dict[str, bytes] = {}
     for i, buffer in enumerate(gltf.document.buffers):
         field = f"buffers.{i}"
         if buffer.uri is None and (i or binary is None):
             raise UserError("has neither a uri nor a binary chunk", file=gltf.path, field=field)
-        content = binary if buffer.uri is None else gltf.resource(buffer.uri, field)
+        uri = buffer.uri
+        if uri is not None and uri not in known:
+            known[uri] = gltf.resource(uri, field)
+        content = binary if uri is None else known[uri]
         assert content is not None
         if len(content) < buffer.byteLength:
             raise gltf.error("buffer is truncated", field, f"{len(content)} bytes", buffer.byteLength)

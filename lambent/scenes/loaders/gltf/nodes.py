@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera
+from lambent.core.ceilings import NODES, TRIANGLES
 from lambent.core.directions import Floats, normalize
 from lambent.core.errors import UserError
 from lambent.core.photometry import radiometric
 from lambent.core.plain import Triple, triple
-from lambent.scenes.geometry import transformed
-from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.geometry import positions_under, transformed
+from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
 from lambent.scenes.loaders.gltf.materials import surface_of
 from lambent.scenes.loaders.gltf.schema import MaterialDocument, Node, Primitive
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
-from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.scene import DirectionalLight, Light, Mesh, PointLight, SceneObject
 
@@ -47,8 +49,8 @@ class _Materials:
 
     def __init__(self, gltf: Gltf) -> None:
         self._documents = [*gltf.document.materials, MaterialDocument(name="default")]
-        taken: set[str] = set()
-        self._names = [unique_name(d.name or f"material_{i}", taken) for i, d in enumerate(self._documents)]
+        names = UniqueNames()
+        self._names = [names.unique(d.name or f"material_{i}") for i, d in enumerate(self._documents)]
         self.textures = Textures(gltf)
         self.made = MadeMaterials()
 
@@ -72,9 +74,10 @@ class _Reading:
         self._lights: list[Light] = []
         self._cameras: list[Camera] = []
         self._warnings: list[str] = []
-        self._names: set[str] = set()
-        self._camera_names: set[str] = set()
+        self._names, self._camera_names = UniqueNames(), UniqueNames()
+        self._renamed: dict[str, list[str]] = {}
         self._meshes: dict[tuple[int, int, int], Mesh | None] = {}
+        self._turned: dict[tuple[int, int, int, bytes], Mesh] = {}  # by mesh and the linear part of its transform
         self._triangles = 0
 
     def contents(self) -> Contents:
@@ -87,14 +90,22 @@ class _Reading:
             tuple(self._lights),
             tuple(self._cameras),
             tuple(self._gltf.files.sources),
-            (*self._warnings, *made.notes, *images.notes),
+            (*self._warnings, *self._renamings(), *made.notes, *images.notes),
             made.textures,
             variants=self._variants,
         )
 
+    def _renamings(self) -> Iterator[str]:
+        for name, others in self._renamed.items():
+            if len(others) == 1:
+                yield f"{name}: the name is used twice, one is now {others[0]}"
+            else:
+                yield f"{name}: the name is used {len(others) + 1} times, now also {others[0]} to {others[-1]}"
+
     def walk(self) -> None:
         """Visit every node of the scene once, parents first."""
         gltf, document = self._gltf, self._gltf.document
+        NODES.check(len(document.nodes), file=gltf.path)
         if document.scenes:
             roots = gltf.pick(document.scenes, document.scene, "scene").nodes
         else:
@@ -140,14 +151,22 @@ class _Reading:
             if local is None:
                 continue
             self._triangles += len(local.faces)
-            check_triangles(self._triangles, gltf.path)
+            TRIANGLES.check(self._triangles, file=gltf.path)
             material, emission = self._materials.use(number)
             single = wanted if len(mesh.primitives) == 1 else f"{wanted}_{material}"
-            name = unique_name(single, self._names)
+            name = self._names.unique(single)
             if name != single:
-                self._warnings.append(f"{single}: the name is used twice, one is now {name}")
-            self._objects.append(SceneObject(name, transformed(local, world), material, emission))
+                self._renamed.setdefault(single, []).append(name)
+            self._objects.append(SceneObject(name, self._placed(key, local, world), material, emission))
             self._note_variants(primitive, name)
+
+    def _placed(self, key: tuple[int, int, int], local: Mesh, world: Floats) -> Mesh:
+        """A mesh in the world. Nodes that only move it share its other arrays: thousands of screws are one normal."""
+        turned = (*key, world[:3, :3].tobytes())
+        if turned not in self._turned:
+            self._turned[turned] = transformed(local, world)
+        first = self._turned[turned]
+        return Mesh(positions_under(local, world), first.normals, first.tangents, first.uv, first.faces)
 
     def _note_variants(self, primitive: Primitive, name: str) -> None:
         """Note an object's material in each of the file's material sets that has one for it."""
@@ -169,7 +188,7 @@ class _Reading:
         if camera.yfov is None:
             self._warnings.append(f"{wanted}: left out, a camera without perspective")
             return
-        name = unique_name(wanted, self._camera_names)
+        name = self._camera_names.unique(wanted)
         position, forward, up = world[:3, 3], -normalize(world[:3, 2]), normalize(world[:3, 1])
         target, fov_y_deg = triple(position + forward), math.degrees(camera.yfov)
         self._cameras.append(Camera(name, triple(position), target, triple(up), fov_y_deg))
@@ -190,13 +209,14 @@ class _Reading:
 def _local(node: Node) -> Floats:
     if node.matrix is not None:
         return np.asarray(node.matrix, float).reshape(4, 4).T
-    x, y, z, w = normalize(np.asarray(node.rotation, float)) if any(node.rotation) else (0.0, 0.0, 0.0, 1.0)
     matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ] @ np.diag(node.scale)
+    if any(node.rotation[:3]) or node.scale != (1, 1, 1):
+        x, y, z, w = normalize(np.asarray(node.rotation, float)) if any(node.rotation) else (0.0, 0.0, 0.0, 1.0)
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ] @ np.diag(node.scale)
     matrix[:3, 3] = node.translation
     return matrix
 
@@ -212,8 +232,13 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         order = np.arange(len(positions))
     else:
         order = gltf.accessor(primitive.indices)[:, 0].astype(np.int64)
-    notes = []
+    notes: list[str] = []
+    count, used = len(positions), np.arange(len(positions))
+    if len(order) < count and order.size and int(order.max()) < count:  # a few of an accessor that many share
+        used, order = np.unique(order, return_inverse=True)
+        positions = positions[used]
     faces = _faces(order, primitive.mode)
+    TRIANGLES.check(len(faces), file=gltf.path, field=name)
     if primitive.mode == 4 and len(order) % 3:
         notes.append(f"{name}: {len(order) % 3} indices left over")
 
@@ -221,9 +246,9 @@ def _primitive(gltf: Gltf, primitive: Primitive, name: str, uv_set: int) -> tupl
         if attribute not in attributes:
             return None
         array = gltf.floats(attributes[attribute], width, f"{name} {attribute}")
-        if len(array) != len(positions):
-            raise gltf.error("wrong length", f"{name} {attribute}", len(array), len(positions))
-        return array
+        if len(array) != count:
+            raise gltf.error("wrong length", f"{name} {attribute}", len(array), count)
+        return array[used]
 
     if "COLOR_0" in attributes:
         notes.append(f"{name}: colours of its vertices are not read")

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Index = Annotated[int, Field(ge=0)]
+Index = Annotated[int, Field(ge=0, le=1 << 53)]
 Share = Annotated[float, Field(ge=0, le=1)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Three = tuple[Finite, Finite, Finite]
@@ -36,7 +36,7 @@ class _Part(BaseModel):
 
 
 class _Extended(_Part):
-    extensions: dict[str, dict[str, Any]] = {}
+    extensions: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
 
 class Buffer(_Part):
@@ -90,7 +90,7 @@ class MeshDocument(_Part):
 
 class Node(_Extended):
     name: str | None = None
-    children: list[Index] = []
+    children: list[Index] = Field(default_factory=list)  # a factory: pydantic copies other defaults for each node
     mesh: Index | None = None
     camera: Index | None = None
     light: Index | None = _extension("KHR_lights_punctual", "light")

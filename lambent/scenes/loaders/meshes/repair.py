@@ -17,7 +17,6 @@ from lambent.scenes.geometry.grid import FLAT
 from lambent.scenes.loaders.meshes.polygons import smooth_normals
 from lambent.scenes.scene import Mesh
 
-TRIANGLES_MAX = 20_000_000  # of one file
 ABSURD = 1e15
 
 
@@ -42,13 +41,6 @@ class MeshArrays:
         made = smooth_normals(self.positions, self.triangles, self.triangles)
         normals[: len(made)] = made
         return replace(self, normals=normals)
-
-
-def check_triangles(count: int, file: Path) -> None:
-    """`UserError` where a scene has more triangles than can be held."""
-    if count > TRIANGLES_MAX:
-        got, most = f"{count} triangles", f"at most {TRIANGLES_MAX}"
-        raise UserError("scene is too large", file=file, got=got, expected=most)
 
 
 def mesh_of(arrays: MeshArrays, *, name: str, file: Path) -> tuple[Mesh | None, list[str]]:

@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from lambent.core.ceilings import LOBES
 from lambent.core.directions import Floats
 from lambent.core.errors import did_you_mean
 from lambent.core.plain import is_number
@@ -28,7 +29,6 @@ from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.surface import BLACK, GREY, ROUGHNESS_MIN, SpecularLobe, Surface, blended
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 
-LOBES_MAX = 16
 OREN_NAYAR_MEAN = 0.21396  # mean over both hemispheres of max(0, cos phi) sin alpha tan beta
 WHITE = np.ones(3)
 # Measured by tests/scenes/test_scene_mitsuba_bsdfs.py, from 0 to 75 degrees: the largest error of the albedo, and the
@@ -57,8 +57,7 @@ def surface_of(plugin: Plugin) -> Surface:
     key = id(plugin.element)
     if key not in known:
         surface = KINDS.get(plugin.type, _unknown)(plugin)
-        if len(surface.lobes) > LOBES_MAX:
-            raise plugin.element.error("too many lobes", got=len(surface.lobes), expected=f"at most {LOBES_MAX}")
+        LOBES.check(len(surface.lobes), file=plugin.element.file, field=plugin.element.place)
         plugin.note_unread()
         if plugin.type in MEASURED:
             plugin.reading.note(f"{plugin.type}: {MEASURED[plugin.type]}")

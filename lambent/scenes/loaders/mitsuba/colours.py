@@ -10,15 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lambent.core.ceilings import SPECTRUM_BYTES, WAVELENGTHS
 from lambent.core.colour import XYZ_TO_RGB, srgb_decode
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
-LIMIT_BYTES = 1 << 20
-WAVELENGTHS_MAX = 4096
 
 
 def colour_of(element: Element, document: Document, *, emitted: bool = False) -> Floats:
@@ -84,7 +83,7 @@ def _file(element: Element, document: Document, emitted: bool) -> Floats:
     path = document.files.path(written, element.file, f"line {element.line} <{element.tag}> filename")
     if not path.is_file():
         raise element.error("file not found", got=written)
-    lines = read_bytes(path, LIMIT_BYTES).decode("utf-8", "replace").splitlines()
+    lines = read_bytes(path, SPECTRUM_BYTES).decode("utf-8", "replace").splitlines()
     rows = [line.replace(",", " ").split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     try:
         return _spectrum(element, written, [row[:2] for row in rows], emitted)
@@ -95,12 +94,13 @@ def _file(element: Element, document: Document, emitted: bool) -> Floats:
 def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]], emitted: bool) -> Floats:
     from lambent.materials.measured.spectral import rgb_of_spectra
 
+    WAVELENGTHS.check(len(pairs), file=element.file, field=element.place)
     try:
         table = np.array([[float(v) for v in pair] for pair in pairs])
         nm, values = table.T
     except ValueError as error:
         raise element.error("not a spectrum", got=text, expected="wavelength:value pairs") from error
-    if not np.isfinite(table).all() or (np.diff(nm) <= 0).any() or len(nm) > WAVELENGTHS_MAX:
+    if not np.isfinite(table).all() or (np.diff(nm) <= 0).any():
         raise element.error("not a spectrum", got=text, expected="finite values at increasing wavelengths")
     if not emitted:
         return np.asarray(np.maximum(rgb_of_spectra(nm) @ values, 0))

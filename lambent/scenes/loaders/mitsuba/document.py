@@ -13,12 +13,11 @@ from xml.parsers import expat
 
 import numpy as np
 
+from lambent.core.ceilings import MITSUBA_BYTES, XML_ELEMENTS, XML_FILES, XML_LEVELS, XML_TEXT
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.scenes.loaders.scene_files import SceneFiles
 
-LIMIT_BYTES = 256 << 20
-ELEMENTS_MAX, DEPTH_MAX, FILES_MAX, TEXT_MAX = 1_000_000, 64, 64, 1 << 20
 ABSURD = 1e30
 OLD_TAGS = {"camera": "sensor", "luminaire": "emitter", "lookAt": "lookat"}
 _PARAMETER = re.compile(r"\$(\w+)")
@@ -70,10 +69,13 @@ class Element:
             raise self.error("wrong count of numbers", got=len(values), expected="1 or 3")
         return np.array(values * 3 if len(values) == 1 else values)
 
-    def error(self, message: str, *, got: object = None, expected: object = None, hint: str | None = None) -> UserError:
+    @property
+    def place(self) -> str:
         what = self.attributes.get("name") or self.attributes.get("id") or self.attributes.get("type") or ""
-        place = f"line {self.line} <{self.tag}> {what}".rstrip()
-        return UserError(message, file=self.file, field=place, got=got, expected=expected, hint=hint)
+        return f"line {self.line} <{self.tag}> {what}".rstrip()
+
+    def error(self, message: str, *, got: object = None, expected: object = None, hint: str | None = None) -> UserError:
+        return UserError(message, file=self.file, field=self.place, got=got, expected=expected, hint=hint)
 
 
 @dataclass
@@ -140,8 +142,7 @@ def _filled(text: str, parameters: dict[str, str], element: Element) -> str:
         raise element.error("parameter is not set", got=f"${word}", hint=hint)
 
     filled = _PARAMETER.sub(value, text)
-    if len(filled) > TEXT_MAX:
-        raise element.error("parameters make it too long", got=f"{len(filled)} characters", expected=TEXT_MAX)
+    XML_TEXT.check(len(filled), file=element.file, field=element.place)
     return filled
 
 
@@ -157,8 +158,7 @@ class _Parser:
         if path in self._open:
             raise UserError("includes itself", file=path)
         self._count += 1
-        if self._count > FILES_MAX:
-            raise UserError("too many included files", file=path, expected=f"at most {FILES_MAX}")
+        XML_FILES.check(self._count, file=path)
         self._open.append(path)
         scene = self._parse(path)
         children: list[Element] = []
@@ -181,11 +181,8 @@ class _Parser:
 
         def start(tag: str, attributes: dict[str, str]) -> None:
             self._elements += 1
-            if self._elements > ELEMENTS_MAX or len(stack) > DEPTH_MAX:
-                what = "elements" if self._elements > ELEMENTS_MAX else "levels"
-                line = f"line {parser.CurrentLineNumber}"
-                most = ELEMENTS_MAX if what == "elements" else DEPTH_MAX
-                raise UserError(f"too many {what}", file=path, field=line, expected=f"at most {most}")
+            for ceiling, found in ((XML_ELEMENTS, self._elements), (XML_LEVELS, len(stack))):
+                ceiling.check(found, file=path, field=f"line {parser.CurrentLineNumber}")
             element = Element(OLD_TAGS.get(tag, tag), attributes, path, parser.CurrentLineNumber)
             stack[-1].children.append(element)
             stack.append(element)
@@ -197,8 +194,8 @@ class _Parser:
         parser.EndElementHandler = lambda _: stack.pop()
         parser.StartDoctypeDeclHandler = refuse
         try:
-            parser.Parse(self._files.read(path, LIMIT_BYTES), True)
-        except (expat.ExpatError, UnicodeError, ValueError) as error:
+            parser.Parse(self._files.read(path, MITSUBA_BYTES), True)
+        except (expat.ExpatError, LookupError, ValueError) as error:  # LookupError: of an unknown encoding
             raise UserError(f"not XML ({error})", file=path) from error
         if not top.children or top.children[0].tag != "scene":
             got = f"<{top.children[0].tag}>" if top.children else "nothing"

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.camera import Camera
+from lambent.core.ceilings import TRIANGLES
 from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import Contents, unique_name
-from lambent.scenes.loaders.meshes.repair import check_triangles
+from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.mitsuba import lights
 from lambent.scenes.loaders.mitsuba.bsdfs import surface_of
 from lambent.scenes.loaders.mitsuba.document import read
@@ -53,8 +53,8 @@ class _Scene:
         self._world: Floats = np.eye(4)
         self._objects: list[SceneObject] = []
         self._by_element: dict[int, str] = {}
-        self._names: set[str] = set()
-        self._material_names: set[str] = set()
+        self._names = UniqueNames()
+        self._material_names = UniqueNames()
         self._local: dict[int, Made] = {}
         self._triangles = 0
         self._warnings: list[str] = []
@@ -113,9 +113,9 @@ class _Scene:
         shape.objects("sensor")
         shape.note_unread(but=("max_smooth_angle", "name", "id"))
         self._triangles += len(mesh.faces)
-        check_triangles(self._triangles, self._path)
+        TRIANGLES.check(self._triangles, file=self._path)
         material = self._material(bsdf, wanted)
-        self._objects.append(SceneObject(unique_name(wanted, self._names), mesh, material, emission))
+        self._objects.append(SceneObject(self._names.unique(wanted), mesh, material, emission))
 
     def _add_instance(self, shape: Plugin, world: Floats) -> None:
         """A group's shapes once more, at another place."""
@@ -134,7 +134,7 @@ class _Scene:
         key = id(bsdf.element) if bsdf is not None else 0
         if key not in self._by_element:
             wanted = "default" if bsdf is None else bsdf.element.id or f"{shape}_{bsdf.type}"
-            name = self._by_element[key] = unique_name(wanted, self._material_names)
+            name = self._by_element[key] = self._material_names.unique(wanted)
             self._made.make(name, lambda _: Surface.grey() if bsdf is None else surface_of(bsdf))
         return self._by_element[key]
 
@@ -152,12 +152,12 @@ class _Scene:
         return environment, found
 
     def _cameras(self, sensors: list[Plugin]) -> list[Camera]:
-        names: set[str] = set()
+        names = UniqueNames()
         cameras = []
         for plugin in sensors:
             camera = lights.camera_of(plugin, plugin.element.id or "camera", self._world)
             if camera is not None:
-                cameras.append(replace(camera, name=unique_name(camera.name, names)))
+                cameras.append(replace(camera, name=names.unique(camera.name)))
         return cameras
 
     def _say_the_rest(self) -> None:

@@ -11,15 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.ceilings import SERIALIZED_BYTES, SERIALIZED_VERTICES, TRIANGLES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
-from lambent.scenes.loaders.meshes.repair import TRIANGLES_MAX, MeshArrays
+from lambent.core.inputs import read_bytes
+from lambent.scenes.loaders.meshes.repair import MeshArrays
 
-LIMIT_BYTES = 2 << 30
 MAGIC = 0x041C
 DOUBLE = 0x2000
 OPTIONAL = ((0x0001, "normals", 3), (0x0002, "uv", 2), (0x0008, "colours", 3))
-VERTICES_MAX = 60_000_000
 HEAD_BYTES = 1 << 16  # of a mesh: its flags, name and counts lie in them
 
 
@@ -31,7 +30,7 @@ def read(path: Path, index: int) -> MeshArrays:
     UserError
         Where the file is damaged, cut off, or promises more than it holds.
     """
-    data = read_bytes(path, LIMIT_BYTES)
+    data = read_bytes(path, SERIALIZED_BYTES)
     start, version = _offset(data, index, path)
     inflate = zlib.decompressobj()
 
@@ -46,9 +45,8 @@ def read(path: Path, index: int) -> MeshArrays:
     if not 4 <= begin <= len(head) - 16:
         raise UserError("mesh is cut off, or its name does not end", file=path, got=f"{len(head)} bytes")
     flags, (vertices, triangles) = struct.unpack_from("<I", head)[0], struct.unpack_from("<QQ", head, begin)
-    if vertices > VERTICES_MAX or triangles > TRIANGLES_MAX:
-        got, most = f"{vertices} vertices, {triangles} triangles", f"at most {VERTICES_MAX} and {TRIANGLES_MAX}"
-        raise UserError("mesh is too large", file=path, got=got, expected=most)
+    SERIALIZED_VERTICES.check(vertices, file=path)
+    TRIANGLES.check(triangles, file=path)
     real = np.dtype("<f8" if flags & DOUBLE else "<f4")
     widths = {"positions": 3, **{name: width for bit, name, width in OPTIONAL if flags & bit}}
     size = 12 * triangles + vertices * real.itemsize * sum(widths.values())

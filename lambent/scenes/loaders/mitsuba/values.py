@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.camera import Camera, camera_axes
+from lambent.core.ceilings import XML_NESTING, XML_PLUGINS
 from lambent.core.directions import Floats, normalize, rotation_about
 from lambent.core.errors import did_you_mean
 from lambent.core.plain import triple
@@ -21,8 +22,6 @@ OBJECTS = {
     "bsdf", "texture", "shape", "emitter", "sensor", "film", "sampler", "rfilter", "medium", "phase", "volume",
     "integrator", "subsurface",
 }  # fmt: skip
-PLUGINS_MAX = 400_000
-NESTING_MAX = 32
 FAR = 1e9
 # Filters, caches, samplers: settings of Mitsuba that do not describe the scene.
 MACHINERY = {
@@ -46,8 +45,7 @@ class Reading:
 
     def count_plugin(self, element: Element) -> None:
         self._plugins += 1
-        if self._plugins > PLUGINS_MAX:
-            raise element.error("scene refers to itself too often", expected=f"at most {PLUGINS_MAX} plugins")
+        XML_PLUGINS.check(self._plugins, file=element.file, field=element.place)
 
 
 class Plugin:
@@ -57,8 +55,7 @@ class Plugin:
         reading.count_plugin(element)
         if id(element) in trail:
             raise element.error("contains itself", got=element.id)
-        if len(trail) > NESTING_MAX:
-            raise element.error("is nested too deep", expected=f"at most {NESTING_MAX}")
+        XML_NESTING.check(len(trail), file=element.file, field=element.place)
         self.element, self.reading = element, reading
         self._trail = (*trail, id(element))
         self._within = element.id or within

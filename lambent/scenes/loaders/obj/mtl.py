@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.core.ceilings import MATERIALS, MTL_BYTES
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.core.plain import Triple, is_number
 from lambent.materials.fresnel import r0_of
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -26,8 +27,6 @@ from lambent.scenes.loaders.surfaces.texture_images import TextureImage, Texture
 from lambent.scenes.loaders.surfaces.textured import Textured, absolute, combined, constant, scaled
 from lambent.scenes.scene import Texture, UvTransform
 
-LIMIT_BYTES = 16 << 20
-MATERIALS_MAX = 65536
 DEFAULT = "default"
 PLASTIC_R0_MAX = 0.08
 MIRRORS = range(3, 10)  # illum that asks for reflections
@@ -97,7 +96,7 @@ class Library:
 
 def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
     """Materials of one library file by name."""
-    text = read_bytes(path, LIMIT_BYTES).decode("utf-8-sig", "replace")
+    text = read_bytes(path, MTL_BYTES).decode("utf-8-sig", "replace")
     entries: dict[str, Entry] = {}
     entry: Entry | None = None
     for number, line in enumerate(text.splitlines(), 1):
@@ -109,8 +108,7 @@ def _entries(path: Path, notes: list[str]) -> dict[str, Entry]:
             name = line.strip()[len("newmtl") :].strip() or f"material_{number}"
             if name in entries:
                 notes.append(f"material {name} is described twice in {path.name}: the last holds")
-            if len(entries) > MATERIALS_MAX:
-                raise UserError("too many materials", file=path, got=f"over {MATERIALS_MAX}")
+            MATERIALS.check(len(entries), file=path)
             entry = entries[name] = Entry(path)
         elif entry is None:
             if key in NUMBERS | MAPS:

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.ceilings import MATERIALS, TRIANGLES
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.meshes.polygons import smooth_normals, triangulate
-from lambent.scenes.loaders.meshes.repair import MeshArrays, check_triangles, mesh_of
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.loaders.obj.mtl import Library
 from lambent.scenes.loaders.obj.text import ObjText, read
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -48,12 +49,12 @@ def load(path: Path, root: Path | None = None) -> Contents:
     text = read(path)
     warnings = [f"{what} are not read" for word, what in UNREAD.items() if any(w == word for _, w, _ in text.words)]
     triangles = triangles_of(text, path)
-    names, material_names, owner = _owners(text, triangles.lines, warnings)
+    names, material_names, owner = _owners(text, triangles.lines, warnings, path)
     library = Library(files)
     for line, word, rest in text.words:
         if word == "mtllib":
             library.add(path, rest, line)
-    taken: set[str] = set()
+    names_given = UniqueNames()
     objects = []
     materials_of = Counter(name for name, _ in names)
     by_owner = np.argsort(owner, kind="stable")
@@ -65,7 +66,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
         warnings += notes
         if mesh is not None:
             used = library.use(material_names[material])
-            objects.append(SceneObject(unique_name(single, taken), mesh, used, library.made.emission[used]))
+            objects.append(SceneObject(names_given.unique(single), mesh, used, library.made.emission[used]))
     if not objects:
         raise UserError("holds no triangles", file=path, hint="; ".join(warnings) or None)
     return Contents(
@@ -80,7 +81,7 @@ def load(path: Path, root: Path | None = None) -> Contents:
 def triangles_of(text: ObjText, file: Path) -> Triangles:
     """All faces cut into triangles."""
     places, polygon = triangulate(text.v, text.corners[:, 0], text.sizes)
-    check_triangles(len(places), file)
+    TRIANGLES.check(len(places), file=file)
     lines = text.lines[polygon]
     at, groups = [0], [0]
     for line, word, rest in text.words:
@@ -90,7 +91,9 @@ def triangles_of(text: ObjText, file: Path) -> Triangles:
     return Triangles(text.corners[places], lines, np.array(groups)[np.searchsorted(at, lines) - 1])
 
 
-def _owners(text: ObjText, lines: Indices, warnings: list[str]) -> tuple[list[tuple[str, int]], list[str], Indices]:
+def _owners(
+    text: ObjText, lines: Indices, warnings: list[str], file: Path
+) -> tuple[list[tuple[str, int]], list[str], Indices]:
     """Objects as (name, number of the material), names of the materials, and the object of each triangle."""
     by = "o" if any(word == "o" for _, word, _ in text.words) else "g"
     things, thing_at = _changes(text, by, "object")
@@ -102,8 +105,7 @@ def _owners(text: ObjText, lines: Indices, warnings: list[str]) -> tuple[list[tu
         things, thing = ["object"], np.zeros_like(thing)
     key = thing * len(materials) + material
     kinds, first, owner = np.unique(key, return_index=True, return_inverse=True)
-    if len(kinds) > 16 * OBJECTS_MAX:
-        raise UserError("too many materials", got=len(kinds))
+    MATERIALS.check(len(kinds), file=file)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.ceilings import CORNERS, OBJ_BYTES
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 
-LIMIT_BYTES = 4 << 30
 BLOCK_BYTES = 8 << 20
-INDICES_MAX = 240_000_000
 Bytes = NDArray[np.uint8]
 WIDTHS = {"v": 3, "vt": 2, "vn": 3}
 # Slashes and double slashes of a corner of the form v, v/vt, v//vn, v/vt/vn; the place of each index, -1 for none.
@@ -53,7 +52,7 @@ class ObjText:
 
 def read(file: Path) -> ObjText:
     """The content of a file: see `parse`."""
-    return parse(read_bytes(file, LIMIT_BYTES), file)
+    return parse(read_bytes(file, OBJ_BYTES), file)
 
 
 def parse(data: bytes, file: Path) -> ObjText:
@@ -79,8 +78,7 @@ def parse(data: bytes, file: Path) -> ObjText:
             counts[kind] += len(at)
         faces += text.faces(before)
         total += len(faces[-1][0])
-        if total > INDICES_MAX:
-            raise UserError("scene is too large", file=file, got=f"over {INDICES_MAX} corners")
+        CORNERS.check(total, file=file)
         words += text.words()
     corners, sizes, lines = (np.concatenate(part) for part in zip(*faces, strict=True))
     for column, kind in enumerate(WIDTHS):
@@ -115,7 +113,7 @@ class _Block:
 
     def __init__(self, block: bytes, first_line: int, file: Path) -> None:
         if b"\\\n" in block:  # empty lines in place of continued ones keep the line numbers
-            block = re.sub(rb"(?:[^\n]*\\\n)+[^\n]*\n?", _joined, block)
+            block = re.sub(rb"(?m)^(?:[^\n]*\\\n)+[^\n]*\n?", _joined, block)
         block = block.translate(_BLANKS)
         if block.startswith(b" ") or b"\n " in block:
             block = re.sub(rb"(?m)^ +", b"", block)

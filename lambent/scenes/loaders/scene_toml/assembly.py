@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lambent.core.errors import UserError, did_you_mean
 from lambent.materials.document import Material
-from lambent.scenes.loaders.contents import Contents, unique_name
+from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.scene import MaterialTextures, SceneObject
 
 NAMES_HINT = "see the names with `lambent inspect`"
@@ -46,13 +46,13 @@ def assembled(contents: Sequence[Contents], variant: str | None, path: Path) -> 
     materials: dict[str, Material] = {}
     textures: dict[str, MaterialTextures] = {}
     warnings: list[str] = []
-    taken: set[str] = set()
+    names = UniqueNames()
     for c in contents:
         called = _own_names(c, materials, textures, warnings)
         variants = c.variants.get(variant, {}) if variant is not None else {}
         for o in c.objects:
             material, emission = variants.get(o.name, (o.material, o.emission))
-            name, material = unique_name(o.name, taken), called.get(material, material)
+            name, material = names.unique(o.name), called.get(material, material)
             objects.append(replace(o, name=name, material=material, emission=emission))
         materials |= {called[n]: m.model_copy(update={"name": called[n]}) for n, m in c.materials.items()}
         textures |= {called[n]: t for n, t in c.textures.items() if n in called}
@@ -65,12 +65,12 @@ def _own_names(
 ) -> dict[str, str]:
     """Names of a file's materials that differ from those of other files."""
     called: dict[str, str] = {}
-    taken = set(materials) | set(contents.materials)
+    names = UniqueNames({*materials, *contents.materials})
     for name, material in contents.materials.items():
         same = name in materials and material == materials[name] and contents.textures.get(name) is textures.get(name)
         called[name] = name
         if name in materials and not same:
-            called[name] = unique_name(name, taken)
+            called[name] = names.unique(name)
             warnings.append(f"material {name}: two files have one of this name, the second is now {called[name]}")
     return called
 

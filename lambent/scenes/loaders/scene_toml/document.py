@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,18 +13,20 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes, read_head
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.schema import GeometrySection, ImageSection, SceneDocument, known_keys
 from lambent.scenes.scene import Environment, ImageEnvironment, PointLight, ReflectorRule, Scene, SceneObject
 
-LIMIT_BYTES = 4 << 20
+_DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
 
 
@@ -71,8 +75,11 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
 
 
 def _parse(path: Path) -> SceneDocument:
+    content = read_bytes(path, SCENE_TOML_BYTES)
+    deepest = max((key[0].count(b".") for key in _DEEP_KEY.finditer(content)), default=0)
+    TOML_LEVELS.check(deepest, file=path)  # the parser's time grows with their square
     try:
-        data = tomllib.loads(read_bytes(path, LIMIT_BYTES).decode("utf-8-sig"))
+        data = tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise UserError(f"not a TOML document ({error})", file=path) from error
     try:
@@ -85,6 +92,8 @@ def _geometry(entry: str | GeometrySection, path: Path, files: SceneFiles, read_
     if isinstance(entry, str):
         return read_geometry(entry, path, files)
     contents, size = read_geometry(entry.file, path, files), entry.scale
+    if not 1e-9 <= size <= 1e9 or max(np.abs(o.mesh.positions).max() for o in contents.objects) * size > ABSURD:
+        raise UserError("scale leads absurdly far", file=path, field="geometry.scale", got=size)
     matrix = np.diag([size] * 3 + [1.0])
 
     def scaled(position: Triple) -> Triple:
@@ -142,8 +151,7 @@ def _material_of_file(source: Path, field: str, path: Path) -> Material:
 
 
 def _begins_as_json(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
+    return read_head(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def _apply(
@@ -190,6 +198,6 @@ def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Envi
 
 
 def _check_names(names: list[str], path: Path, field: str) -> None:
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(names).items():
+        if count > 1:
             raise UserError("name is used twice", file=path, field=field, got=name)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.plain import Triple
-from lambent.materials.document import Distribution, Lobe, Material
+from lambent.materials.document import COEFFICIENT_MAX, Distribution, Lobe, Material
 from lambent.scenes.loaders.surfaces.surface import ROUGHNESS_MIN, Surface, rgb
 from lambent.scenes.loaders.surfaces.textured import relative
 from lambent.scenes.scene import MaterialTextures, Texture
@@ -82,7 +82,7 @@ def finished(name: str, surface: Surface, notes: list[str]) -> tuple[Material, M
             Lobe(
                 side=lobe.side,
                 distribution=lobe.distribution,
-                k=rgb(k * share),
+                k=rgb(np.minimum(k * share, COEFFICIENT_MAX)),
                 mx=mx,
                 my=my,
                 r0=rgb(np.clip(lobe.r0, 0, 1)),

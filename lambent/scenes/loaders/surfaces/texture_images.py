@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core import exr, rgbe
+from lambent.core.ceilings import PIXELS, TEXTURE_BYTES
 from lambent.core.colour import srgb_decode
 from lambent.core.directions import Floats
 from lambent.core.errors import UserError
-from lambent.core.files import read_bytes
-from lambent.core.images import MAX_PIXELS, read_image
+from lambent.core.images import read_image
+from lambent.core.inputs import read_bytes
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.textured import Textured
 from lambent.scenes.scene import IDENTITY, UvTransform
 
 SIDE_MAX = 2048  # texels; larger images are reduced, which is noted
-LIMIT_BYTES = 1 << 30
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF")
 _LINEAR_OF_BYTE = srgb_decode(np.arange(256, dtype=np.float32) / 255)
 
@@ -65,7 +65,7 @@ class TextureImages:
         """
         path = self._files.look_for("picture", name, file, field, note, otherwise)
         if path is not None and path not in self._read:
-            data = read_bytes(path, LIMIT_BYTES)
+            data = read_bytes(path, TEXTURE_BYTES)
             if data.startswith((exr.MAGIC, *rgbe.MAGICS)):
                 rgb = self._reduced(read_image(path), path.name)
                 self._read[path] = TextureImage(np.concatenate([rgb, np.ones_like(rgb[..., :1])], axis=-1), alpha=False)
@@ -86,9 +86,7 @@ class TextureImages:
             with Image.open(io.BytesIO(data), formats=FORMATS) as opened:
                 picture: Image.Image = opened
                 width, height = picture.size
-                if width * height > MAX_PIXELS:
-                    got, most = f"{width} x {height}", f"at most {MAX_PIXELS} pixels"
-                    raise UserError("picture is too large", file=file, field=field, got=got, expected=most)
+                PIXELS.check(width * height, file=file, field=field, got=f"{width} x {height}")
                 alpha = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
                 if picture.mode.startswith("I"):  # 16-bit grey, which `convert` would clip
                     grey = np.asarray(picture, np.float32) / np.float32(257)

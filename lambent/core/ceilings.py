@@ -1,0 +1,66 @@
+"""The ceilings of input: how large a file of each kind may be, and how much it may ask for.
+
+A file beyond one is a `UserError` with the ceiling and what was found, before memory is taken for it. `NAME_BYTES` are
+sizes of files, for `inputs.read_bytes`; the others are counts, each with its own `check`. docs/reliability.md lists
+them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lambent.core.errors import UserError
+
+MATERIAL_BYTES = 16 << 20
+FITS_BYTES = 16 << 20
+MEASURED_BYTES = 1 << 30
+CORNELL_BYTES = 256 << 20
+TENSOR_BYTES = 4 << 30
+SCENE_TOML_BYTES = 4 << 20
+GLTF_BYTES = 4 << 30
+GLTF_JSON_BYTES = 256 << 20
+OBJ_BYTES = 4 << 30
+MTL_BYTES = 16 << 20
+PLY_BYTES = 4 << 30
+MITSUBA_BYTES = 256 << 20
+SERIALIZED_BYTES = 2 << 30
+SPECTRUM_BYTES = 1 << 20
+PICTURE_BYTES = 2 << 30
+TEXTURE_BYTES = 1 << 30
+VIEWS_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """The most of something that input may ask for; `fault` is said of input that asks for more."""
+
+    fault: str
+    most: int
+    unit: str
+
+    def check(self, found: int, *, file: Path | str | None = None, field: str | None = None, got: str = "") -> None:
+        """`UserError` where `found` is more; `got` says it in other words."""
+        if found > self.most:
+            expected = f"at most {self.most} {self.unit}"
+            raise UserError(self.fault, file=file, field=field, got=got or f"{found} {self.unit}", expected=expected)
+
+
+PIXELS = Ceiling("picture is too large", 1 << 26, "pixels")  # 8192 x 8192: 800 MB as float32 RGB
+LOBES = Ceiling("too many lobes", 64, "lobes")
+TRIANGLES = Ceiling("scene is too large", 20_000_000, "triangles")
+CORNERS = Ceiling("scene is too large", 240_000_000, "corners of faces")
+FACE_CORNERS = Ceiling("face has too many corners", 1 << 16, "corners")
+MATERIALS = Ceiling("too many materials", 65_536, "materials")
+NODES = Ceiling("too many nodes", 1_000_000, "nodes")
+ELEMENTS_READ = Ceiling("meshes ask for too much", 300_000_000, "numbers of accessors")
+ZEROS = Ceiling("too many zeros", 4_000_000, "numbers of accessors without a buffer view")
+TOML_LEVELS = Ceiling("key has too many levels", 64, "levels")
+XML_ELEMENTS = Ceiling("too many elements", 1_000_000, "elements")
+XML_LEVELS = Ceiling("too many levels", 64, "levels")
+XML_FILES = Ceiling("too many included files", 64, "files")
+XML_TEXT = Ceiling("parameters make it too long", 1 << 20, "characters")
+XML_PLUGINS = Ceiling("scene refers to itself too often", 400_000, "plugins")
+XML_NESTING = Ceiling("is nested too deep", 32, "plugins within plugins")
+SERIALIZED_VERTICES = Ceiling("mesh is too large", 60_000_000, "vertices")
+WAVELENGTHS = Ceiling("spectrum is too long", 4096, "wavelengths")
