@@ -82,10 +82,17 @@ def test_imports_go_downstairs() -> None:
     assert not climbing, "\n".join(climbing)
 
 
+def _packages(module: str) -> list[str]:
+    """The packages that hold a module, which run before it."""
+    parts = module.split(".")
+    return [".".join(parts[:n]) for n in range(1, len(parts))]
+
+
 def module_graph() -> dict[str, set[str]]:
     """Module -> modules of the package that it imports, anywhere in its file, for types or in functions.
 
-    Packages that hold the module are left out: Python imports them before it.
+    Packages that hold an imported module are imported with it. Those that hold the module itself are left out: Python
+    imports them before it.
     """
     names = {".".join(path.with_suffix("").relative_to(ROOT).parts).removesuffix(".__init__"): path for path in MODULES}
     graph = {}
@@ -93,6 +100,7 @@ def module_graph() -> dict[str, set[str]]:
         # "package.module.attribute" imports the module, "package.module" itself
         wanted = [(one, one.rpartition(".")[0]) for _, one in imports_of(path)]
         found = {next((module for module in pair if module in names), name) for pair in wanted}
+        found |= {package for module in found for package in _packages(module)}
         graph[name] = {module for module in found if not f"{name}.".startswith(f"{module}.")}
     return graph
 

@@ -28,7 +28,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting.account import lambertian_errors
 from lambent.materials.fitting.fit import METHODS, FitResult, Method, fit
-from lambent.materials.fitting.metrics import errors_of
+from lambent.materials.measured.metrics import errors_of
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.registry import load
 from lambent.materials.measured.synthetic import synthesise

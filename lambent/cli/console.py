@@ -59,7 +59,7 @@ def words(value: object) -> str:
 
 def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> str:
     """Table of errors under the metrics, with their units and as shares of the subject's own size."""
-    from lambent.materials.fitting.metrics import METRICS
+    from lambent.materials.measured.metrics import METRICS
 
     rows = ((name, f"{value:.3g}", METRICS[name].unit, f"{share[name]:.2%}") for name, value in errors.items())
     return table([("error", "absolute", "unit", "of its size"), *rows])

@@ -67,9 +67,9 @@ def command(
     from lambent.materials.fitting.account import below_zero
     from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.grid import Schedule
-    from lambent.materials.fitting.metrics import METRICS
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
     from lambent.materials.fitting.plot import plot_files, save_plots
+    from lambent.materials.measured.metrics import METRICS
 
     inputs = [file, *([] if environment is None else [environment])]
     plotted = () if plot is None else (plot, *plot_files(plot.parent, plot.stem))
@@ -131,7 +131,7 @@ def _count(lobes: str) -> int | Literal["auto"]:
 
 def describe(result: FitResult) -> str:
     """Parameters with units, errors beside those of a Lambertian surface, and the albedo where it is furthest off."""
-    from lambent.materials.fitting.metrics import METRICS
+    from lambent.materials.measured.metrics import METRICS
 
     rows = [("error", "fit", "Lambertian", "unit")]
     for name, value in result.errors.items():

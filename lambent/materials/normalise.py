@@ -16,7 +16,7 @@ from lambent.materials.bsdf import MaterialBSDF, specular_only
 from lambent.materials.check import furnace
 from lambent.materials.document import Material
 from lambent.materials.export.pairs import CHECK_LOG2, pairs_of
-from lambent.materials.fitting.metrics import errors_and_shares
+from lambent.materials.measured.metrics import errors_and_shares
 
 MARGIN = 0.999  # for the furnace's own error
 HALVINGS = 6  # of the interval that holds alpha's factor

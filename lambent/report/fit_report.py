@@ -19,8 +19,8 @@ from lambent.materials.fitting import plot
 from lambent.materials.fitting.account import PEAK_SHARE, evaluate, peak_share
 from lambent.materials.fitting.fit import FitResult
 from lambent.materials.fitting.incidence import Incidence, incidences
-from lambent.materials.fitting.metrics import METRICS, Metric
 from lambent.materials.fitting.slices import slices
+from lambent.materials.measured.metrics import METRICS, Metric
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, negative_readings
 from lambent.report import page
 from lambent.scenes.scene import Environment

@@ -9,7 +9,7 @@ from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.disks import disk_directions
-from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.synthetic import synthesise
 from lambent.viewer.editor import readings
 from lambent.viewer.editor.matrix import matrix

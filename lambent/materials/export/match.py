@@ -15,7 +15,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import Pairs
-from lambent.materials.fitting.metrics import CUBEROOT, errors_and_shares, light_ratios
+from lambent.materials.measured.metrics import CUBEROOT, errors_and_shares, light_ratios
 
 MOST_EVALUATIONS = 60  # of the Jacobian, per start
 ALBEDO_BINS = 8

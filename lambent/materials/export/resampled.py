@@ -13,8 +13,8 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.pairs import CHECK_LOG2, is_isotropic, pairs_of
-from lambent.materials.fitting.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.gonio import Symmetry, symmetry_of
+from lambent.materials.measured.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.protocol import MeasuredSamples, negative_readings
 from lambent.materials.measured.registry import load
 from lambent.materials.measured.retro import towards_light

@@ -22,9 +22,9 @@ from lambent.materials.fitting.albedos import Comparison, Curve
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
-from lambent.materials.fitting.metrics import Metric, errors_of, metric_named
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, problem_of
+from lambent.materials.measured.metrics import Metric, errors_of, metric_named
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 from lambent.materials.measured.retro import towards_light
 

@@ -20,8 +20,8 @@ from lambent.materials.fitting.disks import (
     measured_disk,
 )
 from lambent.materials.fitting.incidence import Incidence, incidences
-from lambent.materials.fitting.metrics import Metric
 from lambent.materials.fitting.slices import Slice
+from lambent.materials.measured.metrics import Metric
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.plots import (
     DISK_PIXELS,

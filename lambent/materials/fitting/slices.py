@@ -13,10 +13,10 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.metrics import Metric
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS
 from lambent.materials.fitting.problem import Problem, problem_of
 from lambent.materials.fitting.scale import Channel, solve_scale
+from lambent.materials.measured.metrics import Metric
 from lambent.materials.measured.protocol import MeasuredSamples
 
 STEPS = 33  # along each axis

@@ -23,8 +23,8 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.directions import half_vector, reflect
 from lambent.materials.bsdf import components
-from lambent.materials.fitting.metrics import CUBEROOT
 from lambent.materials.measured.back_vector import back_share
+from lambent.materials.measured.metrics import CUBEROOT
 from lambent.materials.measured.protocol import MeasuredSamples
 
 Reconstruction = Literal["half_vector", "back_vector", "quadrilinear"]

@@ -17,9 +17,9 @@ from lambent.materials.bsdf import components, evaluate
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.incidence import Incidence, incidences
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.lobes import Vector
 from lambent.materials.measured import load
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.viewer.editor.readings import FINE_PX, Disks, incidents_of, single
 

@@ -10,7 +10,7 @@ from typing import get_args
 from imgui_bundle import imgui
 
 from lambent.materials.document import KINDS, Lobe, Material
-from lambent.materials.fitting.metrics import METRICS
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.models.model import Parameter
 from lambent.viewer.editor.editor import DISTRIBUTIONS, LOBES, METHODS, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names

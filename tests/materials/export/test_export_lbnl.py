@@ -18,12 +18,12 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.export import patch_mean
 from lambent.materials.export.lbnl_xml import write
 from lambent.materials.export.registry import writer_for
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.measured import load
 from lambent.materials.measured.equal_energy import xyz_of_rgb
 from lambent.materials.measured.klems import KLEMS_FULL
 from lambent.materials.measured.lbnl_xml import LbnlTable, read
 from lambent.materials.measured.merl import directions_of
+from lambent.materials.measured.metrics import METRICS
 from tests.materials.measured.lbnl_files import angles_away_from_borders, ask_radiance, lbnl_xml, needs_radiance, words
 from tests.materials.measured.measured_files import merl_bytes
 

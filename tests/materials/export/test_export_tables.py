@@ -14,9 +14,9 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gonio_text, merl, rgl
 from lambent.materials.export.registry import writers
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.measured import load
 from lambent.materials.measured.gonio import GonioTable
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
 from tests.tools.in_mitsuba import f_cos, interaction
 

@@ -16,9 +16,9 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting import albedos
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.least_squares import Bounds, _add_albedos, _moved, _unknowns
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import box_of
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.protocol import MeasuredTable, TableInfo, collect
 
 COAT = Lobe(k=(0.8,) * 3, r0=(0.04,) * 3, mx=0.05, my=0.05, alpha=0.7)

@@ -11,7 +11,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.grid import Schedule
-from lambent.materials.fitting.metrics import METRICS, errors_of
+from lambent.materials.measured.metrics import METRICS, errors_of
 from lambent.materials.measured.registry import load
 from tests.materials.fitting.known_answers import FEW, FOIL, ISOTROPIC, KNOWN, PAINT, TWO_LOBES, grey, setup_of
 

@@ -5,9 +5,9 @@ import pytest
 
 from lambent.core.progress import silent
 from lambent.materials.fitting.grid import Schedule, search
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import box_of, to_search
 from lambent.materials.fitting.problem import Mixture, problem_of
+from lambent.materials.measured.metrics import METRICS
 from tests.materials.fitting.known_answers import FEW, PAINT, grey
 
 

@@ -13,8 +13,8 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export import rgl
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.measured import load
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.synthetic import synthesise
 from lambent.materials.measured.tensor_file import read_tensors, tensor_bytes

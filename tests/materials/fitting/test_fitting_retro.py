@@ -14,10 +14,10 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.fitting.grid import Schedule
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.parameters import box_of, check, to_search
 from lambent.materials.fitting.problem import Candidate, Mixture, problem_of
 from lambent.materials.fitting.slices import slices
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.retro import towards_light
 from lambent.materials.measured.synthetic import ISOTROPIC, synthesise
 

@@ -9,9 +9,9 @@ import pytest
 
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
-from lambent.materials.fitting.metrics import METRICS
 from lambent.materials.fitting.plot import error_slices
 from lambent.materials.fitting.slices import slices
+from lambent.materials.measured.metrics import METRICS
 from lambent.materials.measured.synthetic import ANISOTROPIC
 from tests.materials.fitting.known_answers import FEW, FOIL, PAINT, grey
 

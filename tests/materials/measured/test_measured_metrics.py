@@ -5,7 +5,7 @@ import pytest
 
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
-from lambent.materials.fitting.metrics import METRICS, errors_of, metric_named
+from lambent.materials.measured.metrics import METRICS, errors_of, metric_named
 from lambent.materials.measured.protocol import LeftOut, MeasuredSamples, TableInfo
 
 INFO = TableInfo("by hand", "test", False, False, 1, "f")
