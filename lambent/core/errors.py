@@ -48,7 +48,7 @@ class UserError(Exception):
             parts.append(f"; expected {_short(expected, 4 * LONGEST)}")
         if hint is not None:
             parts.append(f"; {hint}")
-        super().__init__("".join(parts).replace("\n", " "))
+        super().__init__(" ".join("".join(parts).splitlines()))
 
 
 def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserError:
