@@ -36,6 +36,7 @@ ONLY_IN = {
     "rich": {"cli"},
     "zarr": {"store"},
     "numcodecs": {"store"},
+    "numba": {"editing"},
 }
 HEAVY = {
     "mitsuba", "drjit", "wgpu", "rendercanvas", "imgui_bundle", "scipy", "matplotlib", "skimage", "trimesh", "zarr",
@@ -156,7 +157,7 @@ def test_module_names_say_what_they_hold() -> None:
 def test_every_data_file_is_packaged() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     patterns = settings["tool"]["setuptools"]["package-data"]["lambent"]
-    data = [p.name for p in PACKAGE.rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc")]
+    data = [p.name for p in PACKAGE.rglob("*") if p.is_file() and p.suffix != ".py" and p.parent.name != "__pycache__"]
     assert not [name for name in data if not any(fnmatch.fnmatch(name, p.rpartition("/")[2]) for p in patterns)]
 
 
@@ -185,6 +186,6 @@ def test_every_dependency_is_pinned() -> None:
 
 def test_every_dependency_is_used_and_every_import_is_a_dependency() -> None:
     needed, for_tests = dependencies()
-    comes_along = {"drjit"}  # with mitsuba
+    comes_along = {"drjit", "llvmlite"}  # with mitsuba, with numba
     assert third_party(MODULES) == set(needed.values()) | comes_along
     assert third_party(TESTS) - {path.stem for path in TESTS} <= set((needed | for_tests).values()) | comes_along

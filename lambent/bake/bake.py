@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
@@ -22,9 +22,11 @@ from lambent.bake.context import Artefact, BakeContext
 from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
+from lambent.bake.view import View
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
+from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 from lambent.store.contract import TIMINGS
@@ -45,6 +47,8 @@ def bake(
     seed: int = 0,
     light_map: str | None = None,
     probes: str | None = None,
+    views: Sequence[View] = (),
+    editables: Mapping[str, Editable] | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -61,6 +65,11 @@ def bake(
         The light map's integrator: path tracing and final gathering, or photons. By default as in the store.
     probes : {'cached', 'traced'}, optional
         Whether surfaces seen by probes show the light map, or all paths are traced. By default as in the store.
+    views : sequence of View, optional
+        Views whose materials are to be edited: what they show, its visibility and its transport are baked. For these
+        alone, without light map and probes, `only` is {"transport"}.
+    editables : mapping, optional
+        Terms and curves of materials, by name, that are to be edited as something else than their documents say.
 
     Returns
     -------
@@ -87,12 +96,16 @@ def bake(
     methods = chosen(before, light_map=light_map, probes=probes)
     with Store.create(store_path, inputs_of(scene)) as store:
         store.set_document(METHODS, methods)
-        scene = divided(scene, store, progress)
+        undivided = scene
+        if "geometry" in order:
+            scene = divided(scene, store, progress)
         store.set_document("changes", changes)
         write_source(store, scene)
         if not resume:
             store.forget_all()
-        context = BakeContext(scene, store, kinds, quality, methods, seed, progress)
+        context = BakeContext(
+            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {}
+        )
         for kind in order:
             if context.stale(kind):
                 with _timed(context, kind):

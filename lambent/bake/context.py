@@ -20,13 +20,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
+from lambent.bake.view import View
 from lambent.core.progress import Progress, silent
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.store.contract import is_two_sided
 from lambent.store.store import Array, Store, Writer
 
 if TYPE_CHECKING:
     from lambent.bake.tracing.traced_scene import TracedScene
+    from lambent.bake.transport.view_tracer import ViewTracer
 
 GEOMETRY = ("positions", "normals", "tangents", "uv", "uv2", "faces")
 
@@ -45,7 +49,8 @@ class Artefact(Protocol):
 class BakeContext:
     """One bake: the scene as it is baked, the store that it goes to, and what several artefacts share.
 
-    `scene` has its textures as they are stored, and objects in the parts that have probes of their own.
+    `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
+    them whole, as views show them. `editables` are terms of materials that are not those of their documents.
     """
 
     scene: Scene
@@ -55,6 +60,9 @@ class BakeContext:
     methods: Mapping[str, str]
     seed: int = 0
     progress: Progress = silent
+    undivided: Scene | None = None
+    views: Sequence[View] = ()
+    editables: Mapping[str, Editable] = field(default_factory=dict)
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:
@@ -85,6 +93,10 @@ class BakeContext:
         key = self.keys(kind)[name]
         return self.store.begin(name, "raw", shape, chunks, "float32", key=key, meta=self.provenance())
 
+    def editable(self, material: str) -> Editable:
+        """The terms and curves of a material of the scene."""
+        return self.editables.get(material) or of_material(self.scene.materials[material])
+
     def provenance(self, **more: Any) -> dict[str, Any]:
         """Notes of an array: quality, seed, engine, and more."""
         return {"quality": self.quality.name, "seed": self.seed, "engine": engine().variant, **more}
@@ -113,3 +125,15 @@ class BakeContext:
         from lambent.bake.tracing.traced_scene import TracedScene
 
         return TracedScene(self.atlas, self.geometry, self.two_sided, self.progress)
+
+    @cached_property
+    def in_views(self) -> Scene:
+        """The scene with whole objects."""
+        return self.undivided or self.scene
+
+    @cached_property
+    def view_tracer(self) -> ViewTracer:
+        """The scene of the views as it is traced, and its lights."""
+        from lambent.bake.transport.view_tracer import ViewTracer
+
+        return ViewTracer(self.in_views)

@@ -45,6 +45,15 @@ def material_inputs(scene: Scene) -> object:
     return [(o.name, look[o.material]) for o in scene.objects]
 
 
+def texture_inputs(scene: Scene, *channels: str) -> object:
+    """These channels of all textures, and what they are masked by, by material."""
+    found = {}
+    for name, textures in scene.textures.items():
+        images = {part: digest(t) for part, t in parts(textures).items() if part in (*channels, "opacity")}
+        found[name] = [images, textures.cutoff] if images else None
+    return {name: said for name, said in found.items() if said}
+
+
 def light_inputs(scene: Scene) -> object:
     """Everything that emits."""
     emissions = [(o.name, o.emission) for o in scene.objects]

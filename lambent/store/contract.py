@@ -25,6 +25,31 @@
                                            image's size: a camera that is renamed keeps its arrays, one that moves has
                                            none. meta["view"] is the ViewRecord; `baked_views` lists them
 
+To edit the materials of a view, with the image's size in its key:
+
+    view/KEY/view_points/pixel             (P,) uint32, row * width + column of the pixels that show a surface, rising
+    view/KEY/view_points/object            (P,) uint32, its object: meta["objects"][i] is [name, material]
+    view/KEY/view_points/theta_o           (P,) float32, angle between the viewer and the shading normal, radians
+    view/KEY/view_points/backdrop          (height, width, 3) float16, W/(sr m^2), what is seen without reflection: the
+                                           environment, and what surfaces emit
+    view/KEY/visibility/LIGHTS             (ceil(M / 32), P) uint32, bit m % 32 of word m // 32: whether light m is seen.
+                                           LIGHTS is the number of lights asked for, meta["lights"] that found, M
+    view/KEY/transport/LIGHTS/MATERIAL/TERM/rows    (J, 3, Q) float16: direct light of one term of a material by wavelet
+                                           (core.wavelets) of its curve, at the Q points of the material in their order.
+                                           TERM is the term's number in its Editable
+    .../pairs, values, spans               of a term with two curves instead: (N, 2) uint8 bands j, k of its curves, and
+                                           (N, 3) float16 light by these; (Q, 2) uint32, first entry of each point and
+                                           the one past its last. Pairs that nobody can see are left out
+
+    view/KEY/transport/LIGHTS/terms        (T,) uint32, Q of each term; written last. meta["terms"] has for each
+                                           "material", "term", "fixed": its quotient and angles (Term.fixed), "curves":
+                                           names and numbers of bands, and "scale"
+
+Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum over wavelets, or pairs, of the array
+times the curves' coefficients. Coefficients of pairs are means over equal bands from 0 to 90 degrees, those of rows the
+wavelets of such means; f_q and f_o are the term's. Textures are in the array. The first set of LIGHTS is small and soon
+there; `transport_lights` lists those that are complete, the last being the best.
+
 The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings". Every array
 is absent, partial or complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """
@@ -157,6 +182,13 @@ def baked_views(store: Store) -> dict[str, ViewRecord]:
         return {a.name.split("/")[1]: ViewRecord.model_validate(a.meta.get(VIEW)) for a in mine}
     except ValidationError as error:
         raise UserError("broken store", file=store.folder, field="view", got=str(error)) from error
+
+
+def transport_lights(store: Store, camera: Camera, width: int, height: int) -> list[int]:
+    """Numbers of lights, rising, for which the whole transport of a view is in the store."""
+    start = f"{VIEW}/{view_key(camera, width, height)}/transport/"
+    names = [a.name.removeprefix(start) for a in store.artefacts("transport") if a.name.startswith(start) and a.complete]
+    return sorted(int(name.removesuffix("/terms")) for name in names if name.endswith("/terms"))
 
 
 def probe_name(object_name: str, part: str) -> str:

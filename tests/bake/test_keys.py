@@ -17,9 +17,12 @@ from lambent.bake.bake import found
 from lambent.bake.context import BakeContext
 from lambent.bake.methods import chosen
 from lambent.bake.quality import Quality
+from lambent.bake.view import View
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material, Provenance
+from lambent.materials.factored.of_models import editable
+from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import (
     ConstantEnvironment,
@@ -41,9 +44,23 @@ from tests.bake.small_scenes import GREY, MIRROR, TINY
 NOTHING: tuple[str, ...] = ()
 PROBES = ("probe/",)
 LIT = ("light_map/", *PROBES)  # whatever light falls on
-SKY = ("environment/", *LIT)
-SURFACES = ("geometry/", *LIT)
 OF_BALL = ("probe/ball/",)
+CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+SEEN = View(CAMERA, 8, 6)
+VISIBLE = (SEEN.name("visibility", ""), SEEN.name("transport", ""))
+POINTS = (SEEN.name("view_points", ""), *VISIBLE)
+SHINING = (SEEN.name("view_points", "backdrop"), *VISIBLE)
+LIGHTS = (*LIT, *SHINING)
+LOOK = (*LIT, *POINTS)  # where light falls, and where on it the viewer looks
+SKY = ("environment/", *LIGHTS)
+SURFACES = ("geometry/", *LOOK)
+
+
+def of_terms(*terms: str) -> tuple[str, ...]:
+    """Transport of terms MATERIAL/NUMBER, and its list."""
+    return tuple(SEEN.name("transport", f"{n}/{part}") for n in (400,) for part in ("terms", *terms))
+
+
 
 Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
 VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
@@ -58,31 +75,35 @@ MESH: Answers = {
 OBJECT: Answers = {
     "name": ("parquet", SURFACES),
     "mesh": (patch((-2, 0, 2), (4, 0, 0), (0, 0, -3)), SURFACES),
-    "material": ("worn", LIT),
-    "emission": ((0.0, 0.0, 0.1), LIT),
+    "material": ("worn", LOOK),
+    "emission": ((0.0, 0.0, 0.1), LIGHTS),
     "light_map_scale": (0.5, SURFACES),
 }
 MATERIAL: Answers = {
     "name": ("renamed", NOTHING),
     "provenance": (Provenance(source="other.brdf"), NOTHING),
     "kd": ((0.1, 0.2, 0.31), LIT),
-    "kd_coupled": (True, LIT),
+    "kd_coupled": (True, (*LIT, *of_terms("sheet/0/"))),
     "kt_d": ((0.1, 0.1, 0.2), LIT),
-    "lobes": (lambda lobes: lobes * 2, LIT),
+    "lobes": (lambda lobes: lobes * 2, (*LIT, *of_terms("sheet/3/"))),
 }
 LOBE: Answers = {
-    "side": ("transmission", LIT),
+    "side": ("transmission", (*LIT, *of_terms("sheet/2/"))),
     "distribution": ("ggx", LIT),
     "k": ((0.9, 1.0, 1.0), LIT),
-    "mx": (0.02, LIT),
-    "my": (0.02, LIT),
+    "mx": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"))),
+    "my": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"))),
     "r0": ((0.04, 0.04, 0.05), LIT),
-    "alpha": (0.5, LIT),
-    "retro": (True, LIT),
+    "alpha": (0.5, (*LIT, *of_terms("sheet/2/"))),
+    "retro": (True, (*LIT, *of_terms("sheet/2/"))),
 }
+IN_VIEWS = {part: POINTS if part in ("normal", "direction", "opacity") else () for part in CHANNELS}
+IN_VIEWS["diffuse"] = IN_VIEWS["specular"] = (SEEN.name("transport", "400/worn/"), *of_terms())
 TEXTURES: Answers = {
-    **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), LIT) for part in CHANNELS},
-    "cutoff": (0.25, LIT),
+    **{
+        part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), (*LIT, *IN_VIEWS[part])) for part in CHANNELS
+    },
+    "cutoff": (0.25, LOOK),
 }
 TEXTURE: Answers = {
     "texels": (lambda a: a * np.float16(0.75), LIT),
@@ -102,18 +123,18 @@ IMAGE: Answers = {
 }
 CONSTANT: Answers = {"radiance": ((1.0, 1.0, 1.1), SKY)}
 POINT: Answers = {
-    "position": ((0.0, 2.0, 0.1), LIT),
-    "intensity": ((5.0, 5.0, 4.0), LIT),
-    "direction": ((0.0, -0.6, 0.8), LIT),
-    "inner_deg": (5.0, LIT),
-    "outer_deg": (40.0, LIT),
+    "position": ((0.0, 2.0, 0.1), LIGHTS),
+    "intensity": ((5.0, 5.0, 4.0), LIGHTS),
+    "direction": ((0.0, -0.6, 0.8), LIGHTS),
+    "inner_deg": (5.0, LIGHTS),
+    "outer_deg": (40.0, LIGHTS),
 }
-DIRECTIONAL: Answers = {"direction": ((0.0, -0.6, 0.8), LIT), "irradiance": ((1.0, 1.0, 0.5), LIT)}
+DIRECTIONAL: Answers = {"direction": ((0.0, -0.6, 0.8), LIGHTS), "irradiance": ((1.0, 1.0, 0.5), LIGHTS)}
 SCENE: Answers = {
     "name": ("renamed", NOTHING),
     "objects": (lambda objects: objects[::-1], SURFACES),
     "environment": (None, SKY),
-    "lights": (lambda lights: lights[:1], LIT),
+    "lights": (lambda lights: lights[:1], LIGHTS),
     "cameras": ((VIEW,), NOTHING),
     "paths": ((CameraPath("path", (VIEW, replace(VIEW, position=(0.0, 1.0, 2.0)))),), NOTHING),
     "exposure_ev": (2.0, NOTHING),
@@ -162,7 +183,7 @@ CASES: list[tuple[type, Answers, Callable[[Scene], Any], Callable[[Scene, Any], 
     ),
 ]  # fmt: skip
 SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
-    "geometry": {"texels": (64, SURFACES)},
+    "geometry": {"texels": (64, ("geometry/", *LIT))},
     "environment": {"texels": (32, ("environment/",))},
     "light_map": {
         "samples": ((64, 128), LIT),
@@ -172,6 +193,14 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "photons_per_texel": (65, NOTHING),  # of the other method
         "gather_noise": (0.1, LIT),
         "tile_texels": (128, LIT),
+    },
+    "view_points": {},
+    "visibility": {"lights": ((400, 500), (SEEN.name("visibility", "500"), SEEN.name("transport", "500/")))},
+    "transport": {
+        "sharp": (512, NOTHING),  # no term has one narrow curve alone; see below
+        "sharp_of_two": (64, of_terms("mirror/0/", "sheet/2/")),
+        "smooth": (32, of_terms("grey/0/", "sheet/0/", "sheet/1/", "worn/0/")),
+        "smooth_of_two": (16, of_terms("mirror/0/", "sheet/2/")),
     },
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
 }
@@ -226,9 +255,11 @@ def keys(tmp_path: Path) -> Callable[..., dict[str, str]]:
     """The key of every array of a bake, by name."""
     store = Store.create(tmp_path / "store", {})
 
-    def found_keys(scene: Scene, quality: Quality = TINY, seed: int = 0, **methods: str | None) -> dict[str, str]:
+    def found_keys(
+        scene: Scene, quality: Quality = TINY, seed: int = 0, editables: Any = None, **methods: str | None
+    ) -> dict[str, str]:
         how = chosen({}, **{"light_map": None, "probes": None, **methods})
-        context = BakeContext(scene, store, found(), quality, how, seed)
+        context = BakeContext(scene, store, found(), quality, how, seed, views=(SEEN,), editables=editables or {})
         return {name: key for kind in found() for name, key in context.keys(kind).items()}
 
     return found_keys
@@ -313,6 +344,16 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
     assert stale(photons, more) == starting(photons, LIT)
 
 
+def test_what_a_material_is_edited_as(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
+    """The quotient and the angles are inputs; curves and scales are not."""
+    phong = {"sheet": editable(Phong())}
+    before, mine = keys(scene, editables=phong), of_terms("sheet/0/")
+    assert starting(before, (SEEN.name("transport", "400/sheet/"),)) == starting(before, mine[1:])
+    assert not stale(before, keys(scene, editables={"sheet": editable(Phong(exponent=7.0))}))
+    more = keys(scene, TINY.changed(transport={"sharp": 512}), editables=phong)
+    assert stale(before, more) == starting(before, mine)
+
+
 def test_every_input_is_answered_for() -> None:
     """A new field of the scene, or a new setting, has to be added to the tables above."""
     more = [(SunSky, SUN_SKY), (ConstantEnvironment, CONSTANT)]
@@ -322,4 +363,4 @@ def test_every_input_is_answered_for() -> None:
     kinds = found()
     assert kinds.keys() == SETTINGS.keys()
     for kind, of in SETTINGS.items():
-        assert {field.name for field in fields(kinds[kind].SETTINGS["preview"])} == of.keys(), kind
+        assert {field.name for field in fields(kinds[kind].SETTINGS["preview"])} == of.keys() if of else not hasattr(kinds[kind], "SETTINGS"), kind

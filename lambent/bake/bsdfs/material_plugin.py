@@ -33,7 +33,9 @@ from lambent.scenes.scene import MaterialTextures
 
 PLUGIN = "lambent_material"
 TANGENT_ATTRIBUTE = "vertex_tangent"
-DIFFUSE_ATTRIBUTE = "diffuse"  # of the BSDF: the texture that multiplies kd and kt_d
+# Attributes of the BSDF: the textures that multiply kd and kt_d, and k of every lobe; the shading frame in world space.
+DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE = "diffuse", "specular", "normal"
+ATTRIBUTES = (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE, TANGENT_ATTRIBUTE)
 
 
 def material_dict(
@@ -114,11 +116,18 @@ def register_material_plugin() -> None:
             return dr.select(self.textures.is_hole(si, active), mi.Color3f(1.0), mi.Color3f(0.0))
 
         def has_attribute(self, name: str, active: Any = True) -> Any:
-            return mi.Bool(name == DIFFUSE_ATTRIBUTE)
+            return mi.Bool(name in ATTRIBUTES)
 
         def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
-            """The diffuse texture, whatever the coefficients it multiplies."""
-            return self.textures.diffuse(si, active)
+            """One of ATTRIBUTES; a texture whatever the coefficients it multiplies."""
+            if name == DIFFUSE_ATTRIBUTE:
+                return self.textures.diffuse(si, active)
+            if name == SPECULAR_ATTRIBUTE:
+                return self.textures.specular(si, active)
+            turned = brushing_angle(si, active, anisotropic=True)
+            frame = self.textures.frame(turned, si, active) if self.framed else Turned(*turned)
+            axis = (0.0, 0.0, 1.0) if name == NORMAL_ATTRIBUTE else (1.0, 0.0, 0.0)
+            return mi.Color3f(si.to_world(mi.Vector3f(frame.to_world(mi.Vector3f(*axis)))))
 
         def to_string(self) -> str:
             return f"{PLUGIN}[{self.material.model_dump_json()}]"

@@ -60,7 +60,14 @@ class SurfaceTextures:
 
     def diffuse(self, si: Any, active: Any) -> Any:
         """Factor (mi.Color3f) of kd and kt_d."""
-        return mi.Color3f(*self.at("diffuse", si, active)) if "diffuse" in self else mi.Color3f(1.0)
+        return self._colour("diffuse", si, active)
+
+    def specular(self, si: Any, active: Any) -> Any:
+        """Factor (mi.Color3f) of k of every lobe."""
+        return self._colour("specular", si, active)
+
+    def _colour(self, part: str, si: Any, active: Any) -> Any:
+        return mi.Color3f(*self.at(part, si, active)) if part in self else mi.Color3f(1.0)
 
     def material(self, material: Material, si: Any, active: Any) -> Material:
         """The material with its parameters at `si`."""

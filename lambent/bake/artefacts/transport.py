@@ -1,0 +1,224 @@
+"""Transport of the terms of a view's materials: direct light by bands of their curves, first of few lights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bake.artefacts.visibility import lights_key, trace
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of, texture_inputs
+from lambent.bake.quality import QualityName
+from lambent.bake.view import View
+from lambent.core.progress import Progress
+from lambent.materials.factored.terms import Factor, Term
+from lambent.store.store import Store, Writer
+
+if TYPE_CHECKING:
+    from lambent.bake.transport.view_points import ViewPoints
+    from lambent.scenes.triangle_lights import TriangleLights
+
+KIND = "transport"
+NEEDS = ("view_points", "visibility")
+REVISION = 1
+POINTS, BYTES = 1 << 15, 1 << 31  # a chunk, and the memory that pairs of bands may take meanwhile
+ENTRIES = 1 << 16  # of pairs, a chunk
+SMOOTH = ("theta_i", "theta_o", "theta_d")  # angles over which curves have no narrow peaks
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Bands, powers of two, of curves over angles with narrow peaks and over `SMOOTH` ones, alone or as one of two."""
+
+    sharp: int
+    smooth: int
+    sharp_of_two: int
+    smooth_of_two: int
+
+
+SETTINGS = {
+    QualityName.preview: Settings(256, 64, 128, 32),
+    QualityName.normal: Settings(256, 64, 128, 32),
+    QualityName.final: Settings(256, 128, 256, 64),
+}
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One term of one material in one view under so many lights."""
+
+    view: View
+    lights: int
+    material: str
+    number: int
+    term: Term
+    bands: tuple[tuple[Factor, int], ...]
+    key: str
+
+    def name(self, array: str) -> str:
+        return self.view.name(KIND, f"{self.lights}/{self.material}/{self.number}/{array}")
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        return ("spans", "pairs", "values") if len(self.bands) == 2 else ("rows",)
+
+    def said(self, scale: float) -> dict[str, Any]:
+        curves = [[factor.curve, count] for factor, count in self.bands]
+        fixed = self.term.fixed
+        return {"material": self.material, "term": self.number, "fixed": fixed, "curves": curves, "scale": scale}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for view in context.views:
+        for count in context.settings("visibility").lights:
+            parts = list(_parts(context, view, count))
+            found |= {part.name(array): part.key for part in parts for array in part.arrays}
+            curves = [(p.material, p.number, p.key, p.term.curves) for p in parts]
+            found[_terms_name(view, count)] = key_of(KIND, REVISION, curves)
+    return found
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    counts = context.settings("visibility").lights
+    for count in counts:
+        for view in context.views:
+            trace(context, view, count)
+            _bake_view(context, view, count)
+
+
+def _bake_view(context: BakeContext, view: View, count: int) -> None:
+    from lambent.bake.transport.stored import scale_of
+
+    lights, points = context.view_tracer.lights(count), context.view_tracer.points(view)
+    scale, sizes = scale_of(lights), []
+    seen = context.store.read(view.name("visibility", str(count)))
+    worn = np.array([o.material for o in context.in_views.objects])[points.object]
+    parts = list(_parts(context, view, count))
+    for part in parts:
+        mine = worn == part.material
+        sizes.append(np.count_nonzero(mine))
+        if context.stale(KIND) & {part.name(array) for array in part.arrays}:
+            what = f"{part.material}: {part.term.name}, {len(lights)} lights"
+            baking = _Baking(part, points.where(mine), lights, seen[:, mine], scale, what, context.progress)
+            (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
+    said = {**view.meta, "terms": [part.said(scale) for part in parts]}
+    context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
+
+
+@dataclass(frozen=True)
+class _Baking:
+    """The points of a part and what they see."""
+
+    part: _Part
+    points: ViewPoints
+    lights: TriangleLights
+    seen: np.ndarray
+    scale: float
+    what: str
+    progress: Progress
+
+    def rows(self, store: Store) -> None:
+        """Transport by wavelets of one curve; without a curve, one row."""
+        from lambent.bake.transport.bands import transport
+        from lambent.bake.transport.stored import wavelet_rows
+
+        bands, many = self._bands(), len(self.points)
+        writer = self._begin(store, "rows", (bands[0].count, 3, many), (bands[0].count, 3, POINTS), "float16")
+        for chunk in self._missing(writer):
+            some = writer.artefact.region(chunk)[2]
+            found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
+            writer.write(chunk, wavelet_rows(found * self._texture(some).T, self.scale))
+        writer.finish()
+
+    def pairs(self, store: Store) -> None:
+        """Transport by pairs of bands: the entries of a block of points are written before its spans."""
+        from lambent.bake.transport.bands import pair_transport
+        from lambent.bake.transport.stored import LEAST, halves
+
+        bands, many = self._bands(), len(self.points)
+        spans = self._begin(store, "spans", (many, 2), (_points_at_once(bands), 2), "uint32")
+        pairs = self._begin(store, "pairs", (0, 2), (ENTRIES, 2), "uint8", growing=True)
+        values = self._begin(store, "values", (0, 3), (ENTRIES, 3), "float16", growing=True)
+        for chunk in self._missing(spans):
+            some = spans.artefact.region(chunk)[0]
+            begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
+            begin = -(-begin // ENTRIES) * ENTRIES
+            seen, least = self.seen[:, some], LEAST * self.scale
+            found = pair_transport(self.points.where(some), self.lights, seen, self.part.term, bands, least)
+            texture = np.repeat(self._texture(some), found.counts, axis=0)
+            light = halves(found.values * texture / np.float32(self.scale))
+            for writer, array in ((pairs, found.bands), (values, light)):
+                _append(writer, begin, array)
+            ends = begin + np.cumsum(found.counts)
+            spans.write(chunk, np.stack([ends - found.counts, ends], axis=1).astype(np.uint32))
+        for writer in (pairs, values, spans):
+            writer.finish()
+
+    def _bands(self) -> list[Any]:
+        from lambent.bake.transport.bands import Bands
+
+        return [Bands(*pair) for pair in self.part.bands or ((Factor("", "theta_i"), 1),)]
+
+    def _texture(self, some: slice) -> np.ndarray:
+        """(points, 3) factors of textures: those of diffuse light where the curves say nothing of a highlight."""
+        is_diffuse = all(factor.over in ("theta_i", "theta_o") for factor in self.part.term.factors)
+        return (self.points.diffuse if is_diffuse else self.points.specular)[some]
+
+    def _begin(
+        self, store: Store, array: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: str, growing: bool = False
+    ) -> Writer:
+        meta = {**self.part.view.meta, **self.part.said(self.scale)}
+        name = self.part.name(array)
+        return store.begin(name, KIND, shape, chunks, dtype, key=self.part.key, meta=meta, growing=growing)
+
+    def _missing(self, writer: Writer) -> Iterator[tuple[int, ...]]:
+        """The chunks that are missing, each reported when it is taken."""
+        total = len(writer.artefact.chunk_grid)
+        for chunk in writer.missing:
+            self.progress(total - len(writer.missing), total, self.what)
+            yield chunk
+        self.progress(total, total, self.what)
+
+
+def _points_at_once(bands: list[Any]) -> int:
+    return max(1, min(POINTS, BYTES // (12 * bands[0].count * bands[1].count)))
+
+
+def _append(writer: Writer, begin: int, entries: np.ndarray) -> None:
+    """Write entries into whole chunks from `begin`, the last one filled with zeros."""
+    size = -(-len(entries) // ENTRIES) * ENTRIES
+    padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
+    if begin + size > writer.artefact.shape[0]:
+        writer.extend(begin + size - writer.artefact.shape[0])
+    for first in range(0, size, ENTRIES):
+        writer.write(((begin + first) // ENTRIES, 0), padded[first : first + ENTRIES])
+
+
+def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
+    """The terms of every material that an object of the scene has."""
+    scene = context.in_views
+    light = lights_key(context, view, count)
+    textures: Any = texture_inputs(scene, "diffuse", "specular")
+    for material in dict.fromkeys(o.material for o in scene.objects):
+        for number, term in enumerate(context.editable(material).terms):
+            bands = tuple((factor, _count(context, factor, len(term.factors))) for factor in term.factors)
+            angles = [(factor.over, factor.stretch, count) for factor, count in bands]
+            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material))
+            yield _Part(view, count, material, number, term, bands, key)
+
+
+def _count(context: BakeContext, factor: Factor, curves: int) -> int:
+    how: Settings = context.settings(KIND)
+    if factor.over in SMOOTH:
+        return how.smooth if curves == 1 else how.smooth_of_two
+    return how.sharp if curves == 1 else how.sharp_of_two
+
+
+def _terms_name(view: View, count: int) -> str:
+    return view.name(KIND, f"{count}/terms")

@@ -1,0 +1,47 @@
+"""What the pixels of a view show: the points of surfaces, and all that shines by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inputs
+from lambent.bake.view import View
+
+KIND = "view_points"
+NEEDS = ()
+REVISION = 1
+PARTS = ("pixel", "object", "theta_o")
+BACKDROP = "backdrop"
+
+
+def points_key(context: BakeContext, view: View) -> str:
+    """The key of a view's points, all that is at them included."""
+    scene = context.in_views
+    places = [view.meta["view"]["camera"] | {"name": ""}, view.width, view.height]
+    worn = [o.material for o in scene.objects]
+    return key_of(KIND, REVISION, places, worn, texture_inputs(scene, "normal", "direction"), *geometry_inputs(scene))
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    found = {}
+    for view in context.views:
+        key = points_key(context, view)
+        found |= {view.name(KIND, part): key for part in PARTS}
+        found[view.name(KIND, BACKDROP)] = key_of(KIND, REVISION, key, light_inputs(context.in_views))
+    return found
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    objects = [[o.name, o.material] for o in context.in_views.objects]
+    for i, view in enumerate(context.views):
+        context.progress(i, len(context.views), f"view {view.camera.name}")
+        points = context.view_tracer.points(view)
+        theta_o = np.arctan2(np.hypot(points.wo[:, 0], points.wo[:, 1]), points.wo[:, 2])
+        for part, array in zip(PARTS, (points.pixel.astype(np.uint32), points.object.astype(np.uint32), theta_o)):
+            context.put(KIND, view.name(KIND, part), array, {**view.meta, "objects": objects})
+        backdrop = np.minimum(context.view_tracer.backdrop(view), np.finfo(np.float16).max).astype(np.float16)
+        context.put(KIND, view.name(KIND, BACKDROP), backdrop, view.meta)
+    context.progress(1, 1, "views")

@@ -1,0 +1,70 @@
+"""Which lights the points of a view see: traced once, whatever is edited."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lambent.bake.artefacts.view_points import points_key
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of, light_inputs
+from lambent.bake.quality import QualityName
+from lambent.bake.tiles import run_tiles
+from lambent.bake.view import View
+
+KIND = "visibility"
+NEEDS = ("view_points",)
+REVISION = 1
+POINTS = 1 << 16  # a chunk
+BITS = 32
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers of `lights`, rising: editing begins with the first and goes on with the next when it is there."""
+
+    lights: tuple[int, ...]
+
+
+SETTINGS = {
+    QualityName.preview: Settings((400,)),
+    QualityName.normal: Settings((400, 4000)),
+    QualityName.final: Settings((400, 10_000)),
+}
+
+
+def lights_key(context: BakeContext, view: View, count: int) -> str:
+    """The key of what a view's points see of so many lights, and of these."""
+    return key_of(KIND, REVISION, points_key(context, view), light_inputs(context.in_views), count)
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    counts = context.settings(KIND).lights
+    return {view.name(KIND, str(n)): lights_key(context, view, n) for view in context.views for n in counts}
+
+
+def bake(context: BakeContext) -> None:
+    """The first lights of each view: `transport` traces the others when it comes to them."""
+    for view in context.views:
+        trace(context, view, context.settings(KIND).lights[0])
+
+
+def trace(context: BakeContext, view: View, count: int) -> None:
+    """Go on with the visibility of so many lights until it is complete."""
+    engine()  # before Mitsuba is imported
+    from lambent.bake.transport.bands import visibility
+
+    name = view.name(KIND, str(count))
+    if name not in context.stale(KIND):
+        return
+    tracer = context.view_tracer
+    points, lights = tracer.points(view), tracer.lights(count)
+    shape = -(-len(lights) // BITS), len(points)
+    meta = {**view.meta, "lights": len(lights)}
+    chunks = max(1, shape[0]), max(1, min(POINTS, shape[1]))
+    writer = context.store.begin(name, KIND, shape, chunks, "uint32", key=context.keys(KIND)[name], meta=meta)
+    run_tiles(
+        writer, lambda region, _: visibility(tracer.scene, points.where(region[1]), lights),
+        seed=0, progress=context.progress, what=f"visibility of {len(lights)} lights",
+    )  # fmt: skip
+    writer.finish()

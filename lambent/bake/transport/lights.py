@@ -1,0 +1,99 @@
+"""All that lights a scene, as triangles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.sky.daylight import radiance_from
+from lambent.core.arrays import Floats
+from lambent.core.geometry import triangle_areas
+from lambent.core.latlong import lat_long_directions
+from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, joined, small_lights, surface_triangles
+
+ROWS = 256  # of the environment's samples; the bright ones are replaced by the finer ones within them
+LEAST_FINE, MOST_FINE = 4, 32  # rows of these in one of those: as many as the environment's picture has
+BRIGHT = 1 / 4000  # of all light: samples with more are bright
+Samples = tuple[Floats, Floats, Floats]
+LAMPS = 0.5  # of all lights, where there are an environment and glowing surfaces
+
+
+def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleLights:
+    """The lights of a scene: about `count` triangles, and its point and directional lights.
+
+    `samples` are those of the environment, if there is one.
+    """
+    parts = []
+    glowing = [o for o in scene.objects if any(o.emission)]
+    share = LAMPS if glowing and samples is not None else 1.0
+    if samples is not None:
+        parts.append(environment_triangles(*samples, round(count * (share if glowing else 1.0))))
+    if glowing:
+        corners = np.concatenate([o.mesh.corners for o in glowing])
+        radiance = np.concatenate([np.broadcast_to(o.emission, (len(o.mesh.faces), 3)) for o in glowing])
+        parts.append(lamp_triangles(corners, radiance, max(1, round(count * share))))
+    return joined([*parts, small_lights(scene.lights)] if scene.lights else parts)
+
+
+def environment_samples(environment: Any) -> Samples:
+    """Directions (N, 3), solid angles (N,) and radiance (N, 3) of an environment (mi.Emitter): fine where it is bright.
+
+    Every sample has the mean of the radiance in its part of the sphere, so that small lamps count with all their light.
+    """
+    n = int(np.clip(np.ceil(_rows_of(environment) / ROWS), LEAST_FINE, MOST_FINE))
+    rows, columns = ROWS * n, 2 * ROWS * n
+    weight = -np.diff(np.cos(np.linspace(0, np.pi, rows + 1))) * (2 * np.pi / columns)
+    coarse_weight = weight.reshape(ROWS, n).sum(axis=1) * n
+    light = np.empty((ROWS, 2 * ROWS, 3))
+    for row in range(ROWS):
+        fine = slice(row * n, (row + 1) * n)
+        found = radiance_from(environment, _directions(rows, columns, fine).reshape(-1, 3))
+        light[row] = np.einsum("rcgx,r->cx", found.reshape(n, 2 * ROWS, n, 3), weight[fine])
+    bright = light.sum(axis=-1) > BRIGHT * light.sum()
+    parts = [(lat_long_directions(ROWS, 2 * ROWS)[~bright], np.repeat(coarse_weight, (~bright).sum(axis=1)))]
+    for row in np.flatnonzero(bright.any(axis=1)):
+        fine = slice(row * n, (row + 1) * n)
+        inside = np.broadcast_to(bright[row].repeat(n), (n, columns))
+        parts.append((_directions(rows, columns, fine)[inside], np.repeat(weight[fine], inside.sum(axis=1))))
+    w, weights = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    many = np.count_nonzero(~bright)
+    fine_radiance = radiance_from(environment, w[many:]) if len(w) > many else np.zeros((0, 3))
+    return w, weights, np.concatenate([light[~bright] / weights[:many, None], fine_radiance])
+
+
+def _rows_of(environment: Any) -> int:
+    """Rows of the picture of an environment."""
+    return int(mi.traverse(environment)["data"].shape[0])
+
+
+def _directions(rows: int, columns: int, some: slice) -> Floats:
+    """`lat_long_directions`, some rows of them."""
+    theta = (np.arange(some.start, some.stop) + 0.5) / rows * np.pi
+    phi = (np.arange(columns) + 0.5) / columns * (2 * np.pi) - np.pi
+    across = np.stack([np.sin(phi), np.zeros(columns), -np.cos(phi)], axis=-1)
+    return across * np.sin(theta)[:, None, None] + np.cos(theta)[:, None, None] * np.array([0.0, 1.0, 0.0])
+
+
+def lamp_triangles(corners: Floats, radiance: Floats, count: int) -> TriangleLights:
+    """Glowing triangles (F, 3, 3) of radiances (F, 3) as about `count` lights, in proportion to the light they give.
+
+    Of more triangles than that, evenly spaced ones stand for their neighbours.
+    """
+    areas = triangle_areas(corners)
+    power = areas * radiance.sum(axis=1)
+    lit = power > 0
+    corners, radiance, areas, power = corners[lit], radiance[lit], areas[lit], power[lit]
+    if len(corners) > count:
+        reached = np.cumsum(power) / power.sum() * count
+        chosen = np.searchsorted(reached, np.arange(count) + 0.5)
+        share = power.sum() / count / power[chosen]
+        return surface_triangles(corners[chosen], radiance[chosen] * share[:, None], np.inf)
+    cuts = np.maximum(1, np.floor(np.sqrt(power / power.sum() * count))).astype(int)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(axis=1)
+    parts = [
+        surface_triangles(c[None], r[None], edge / n * (1 + 1e-9))
+        for c, r, edge, n in zip(corners, radiance, edges, cuts, strict=True)
+    ]
+    return joined(parts)

@@ -1,0 +1,84 @@
+"""The points that the pixels of a view show: where they are, their shading frames, and the viewer in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.bsdfs.material_plugin import (
+    DIFFUSE_ATTRIBUTE,
+    NORMAL_ATTRIBUTE,
+    SPECULAR_ATTRIBUTE,
+    TANGENT_ATTRIBUTE,
+)  # fmt: skip
+from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.camera import Camera, pixel_rays
+
+Floats32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class ViewPoints:
+    """What P pixels of a view show; float32.
+
+    Attributes
+    ----------
+    pixel, object : (P,) int
+        row * width + column, and the number of the object in the scene.
+    p, flat : (P, 3)
+        Position and geometric normal, world space.
+    t, b, n : (P, 3)
+        Shading frame in world space, turned so that the viewer is above it.
+    wo : (P, 3)
+        Direction to the viewer in that frame.
+    diffuse, specular : (P, 3)
+        What textures multiply diffuse and specular terms by.
+    """
+
+    pixel: NDArray[np.int64]
+    object: NDArray[np.int64]
+    p: Floats32
+    flat: Floats32
+    t: Floats32
+    b: Floats32
+    n: Floats32
+    wo: Floats32
+    diffuse: Floats32
+    specular: Floats32
+
+    def __len__(self) -> int:
+        return len(self.pixel)
+
+    def where(self, chosen: NDArray[np.bool_] | slice) -> ViewPoints:
+        """The chosen points."""
+        return replace(self, **{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
+
+
+def view_points(builder: SceneBuilder, scene: Any, camera: Camera, width: int, height: int) -> ViewPoints:
+    """The points in the centres of the pixels; pixels that show no surface have none."""
+    origin = np.asarray(camera.position, float)
+    ray = rays_from(origin, pixel_rays(camera, width, height).reshape(-1, 3))
+    si = intersect(scene, ray, mi.Bool(True), has_holes(scene))
+    hit = si.is_valid()
+    bsdf = si.bsdf()
+    n = bsdf.eval_attribute_3(NORMAL_ATTRIBUTE, si, hit)
+    t = bsdf.eval_attribute_3(TANGENT_ATTRIBUTE, si, hit)
+    n, t = mi.Vector3f(n.x, n.y, n.z), mi.Vector3f(t.x, t.y, t.z)
+    to_viewer = -ray.d
+    below = dr.dot(n, to_viewer) < 0
+    n = dr.select(below, -n, n)
+    t = dr.normalize(t - n * dr.dot(n, t))
+    b = dr.cross(n, t)
+    wo = mi.Vector3f(dr.dot(to_viewer, t), dr.dot(to_viewer, b), dr.dot(to_viewer, n))
+    number = dr.gather(mi.UInt32, builder.object_numbers(), dr.reinterpret_array(mi.UInt32, si.shape), hit)
+    textures = (bsdf.eval_attribute_3(name, si, hit) for name in (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE))
+    arrays = [array_of(v) for v in (si.p, si.n, t, b, n, wo, *textures)]
+    shown = np.flatnonzero(np.array(hit))
+    objects = np.array(number)[shown].astype(np.int64)
+    return ViewPoints(shown, objects, *(a[shown] for a in arrays))

@@ -1,0 +1,55 @@
+"""The scene of edited views as it is traced: what pixels show, and the lights, each found once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, cached_property
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.transport.lights import Samples, environment_samples, scene_lights
+from lambent.bake.transport.view_points import ViewPoints, view_points
+from lambent.bake.view import View
+from lambent.core.camera import pixel_rays
+from lambent.scenes.scene import Scene
+from lambent.scenes.textures import prepared
+from lambent.scenes.triangle_lights import TriangleLights
+
+
+class ViewTracer:
+    """A scene for Mitsuba, whose views are taken apart into points."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
+        self.scene: Any = self._builder.build()
+        self.points = cache(self._points)
+        self.lights = cache(self._lights)
+
+    def _points(self, view: View) -> ViewPoints:
+        """What the pixels of a view show."""
+        return view_points(self._builder, self.scene, view.camera, view.width, view.height)
+
+    def _lights(self, count: int) -> TriangleLights:
+        """About `count` lights."""
+        return scene_lights(self._builder.scene, self._samples, count)
+
+    @cached_property
+    def _samples(self) -> Samples | None:
+        """Samples of the environment."""
+        environment = self._builder.environment
+        return None if environment is None else environment_samples(environment)
+
+    def backdrop(self, view: View) -> NDArray[np.float32]:
+        """(height, width, 3) radiance that the pixels show without reflection."""
+        directions = pixel_rays(view.camera, view.width, view.height).reshape(-1, 3)
+        ray = rays_from(np.asarray(view.camera.position, float), directions)
+        si = intersect(self.scene, ray, mi.Bool(True), has_holes(self.scene))
+        si.wi = dr.select(si.is_valid(), si.wi, -ray.d)
+        seen = array_of(si.emitter(self.scene).eval(si))
+        return seen.reshape(view.height, view.width, 3)

@@ -1,0 +1,70 @@
+"""Undo and redo without limit. States are frozen and share all that did not change, so a step costs little memory."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+State = TypeVar("State")
+
+
+class History(Generic[State]):
+    """A state and those before it. A stroke is what one drag does: any number of changes, undone as a whole.
+
+    Attributes
+    ----------
+    now
+        The present state.
+    """
+
+    def __init__(self, state: State) -> None:
+        self.now = state
+        self._past: list[State] = []
+        self._future: list[State] = []
+        self._stroke: list[State] = []  # the state before the open stroke
+
+    def change(self, state: State) -> None:
+        """Go to `state`: a step of its own, or a part of the open stroke."""
+        if self._stroke:
+            self.now = state
+        else:
+            self._step(self.now, state)
+
+    def begin_stroke(self) -> None:
+        self.end_stroke()
+        self._stroke = [self.now]
+
+    def restart_stroke(self) -> None:
+        """Back to the state before the open stroke, from which the next move of a drag begins."""
+        if self._stroke:
+            self.now = self._stroke[0]
+
+    def end_stroke(self) -> None:
+        for before in self._stroke:
+            self._step(before, self.now)
+        self._stroke = []
+
+    def _step(self, before: State, after: State) -> None:
+        self.now = after
+        if after != before:
+            self._past.append(before)
+            self._future.clear()
+
+    @property
+    def can_undo(self) -> bool:
+        return bool(self._past) or any(before != self.now for before in self._stroke)
+
+    @property
+    def can_redo(self) -> bool:
+        return bool(self._future)
+
+    def undo(self) -> None:
+        self.end_stroke()
+        if self._past:
+            self._future.append(self.now)
+            self.now = self._past.pop()
+
+    def redo(self) -> None:
+        self.end_stroke()
+        if self._future:
+            self._past.append(self.now)
+            self.now = self._future.pop()

@@ -1,0 +1,81 @@
+"""Incremental pictures: every frame adds the largest changes of the coefficients (Ben-Artzi 2007, chapter 7).
+
+    picture = sum over j of effective[j] * transport[j],   effective -> the coefficients that are wanted
+
+An edit changes few wavelets, so its frame is nearly always exact; after a large one, later frames finish it. Hazard:
+thousands of float32 sums drift, so every frame also computes one block of pixels anew, from all coefficients.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.editing.products import Halves, Pixels, add_rows
+
+TERMS = 30  # a frame
+RENEWED_IN = 64  # frames until every pixel was computed anew
+
+
+class IncrementalPicture:
+    """The picture of one term of one object while its curve is edited.
+
+    Parameters
+    ----------
+    transport
+        (J, C, P) float16, of bands or, better, of wavelets (`core.wavelets`).
+
+    Attributes
+    ----------
+    picture : (C, P) float32
+        Radiance by channel and pixel.
+    wanted, effective : (J, C) float64
+        Coefficients of the curve, and those that `picture` shows.
+    """
+
+    def __init__(self, transport: Halves) -> None:
+        self.transport = transport
+        bands, channels, pixels = transport.shape
+        self.wanted: Floats = np.zeros((bands, channels))
+        self.effective: Floats = np.zeros((bands, channels))
+        self.picture: Pixels = np.zeros((channels, pixels), np.float32)
+        self._next_block = 0
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the picture shows the coefficients that are wanted."""
+        return bool(np.array_equal(self.wanted, self.effective))
+
+    def want(self, coefficients: Floats) -> None:
+        """Set the coefficients (J, C) that the picture is to show."""
+        self.wanted = np.array(np.broadcast_to(coefficients, self.wanted.shape), float)
+
+    def step(self, terms: int = TERMS) -> None:
+        """One frame: the `terms` largest changes (7.3-7.5), and one block of pixels anew."""
+        change = self.wanted - self.effective
+        size = np.sum(change * change, axis=1)
+        rows = np.flatnonzero(size)
+        if len(rows) > terms:
+            rows = np.sort(np.argpartition(-size, terms - 1)[:terms])
+        add_rows(self.picture, self.transport, rows, change[rows])
+        self.effective[rows] = self.wanted[rows]  # effective + change, without its rounding
+        self._renew(self._next_block, RENEWED_IN)
+        self._next_block = (self._next_block + 1) % RENEWED_IN
+
+    def clear(self) -> None:
+        """Show nothing: effective coefficients of 0."""
+        self.effective[:] = 0
+        self.picture[:] = 0
+
+    def draw(self) -> None:
+        """The exact picture at once, from every coefficient."""
+        self.effective = self.wanted.copy()
+        self._renew(0, 1)
+
+    def _renew(self, block: int, blocks: int) -> None:
+        """Compute one of `blocks` blocks of pixels from the effective coefficients."""
+        pixels = self.picture.shape[1]
+        part = slice(pixels * block // blocks, pixels * (block + 1) // blocks)
+        self.picture[:, part] = 0
+        rows = np.flatnonzero(self.effective.any(axis=1))
+        add_rows(self.picture, self.transport, rows, self.effective[rows], part)

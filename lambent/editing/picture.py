@@ -1,0 +1,295 @@
+"""The edited picture of a view: every term of every material, each an incremental picture, over what is not edited.
+
+    radiance = sum over terms of  f_q f_o(theta_o) texture  sum over j of  c_j T_j        (Ben-Artzi 2007, eqs 3.1, 4.6)
+
+Scales, textures and curves of the viewer multiply whole pixels, so their edits are exact at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats, Image, Indices
+from lambent.core.discovery import known
+from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
+from lambent.editing.products import Pixels
+from lambent.editing.rows import PairTransport, Rows, coefficients_of
+from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
+from lambent.materials.factored.of_models import same_quotients
+from lambent.materials.factored.terms import Editable, Term
+
+
+@dataclass(frozen=True)
+class Part:
+    """The pixels that show one material, and their transport.
+
+    Attributes
+    ----------
+    start : Editable
+        What the transport was computed for.
+    pixel : (P,) int
+        row * width + column, each once.
+    theta_o : (P,)
+        Angle between the viewer and the normal, in radians.
+    transport : tuple
+        Of each term of `start`. `Rows` of a term with two curves hold for the other curve as it is in `start`.
+    diffuse, specular : (P, 3), optional
+        What textures multiply diffuse and other terms by; None where there are none, or the transport has them.
+    """
+
+    start: Editable
+    pixel: Indices
+    theta_o: Floats
+    transport: tuple[Rows | PairTransport, ...]
+    diffuse: Floats | None = None
+    specular: Floats | None = None
+
+
+class TransportNeeded(Exception):
+    """The transport of a material does not serve the edit: another quotient, or a second curve without its matrix.
+
+    Attributes
+    ----------
+    material : str
+    terms : tuple of str
+        Names of the terms whose transport has to be computed.
+    """
+
+    def __init__(self, material: str, terms: tuple[str, ...]) -> None:
+        super().__init__(f"{material}: transport of {', '.join(terms)} has to be computed")
+        self.material, self.terms = material, terms
+
+
+class EditedPicture:
+    """The picture of a view while its materials are edited.
+
+    Parameters
+    ----------
+    background : (H, W, 3) float32
+        Linear radiance of what is not edited; 0, or anything, where a part is.
+    parts
+        By name of the material.
+    """
+
+    def __init__(self, background: Image, parts: Mapping[str, Part]) -> None:
+        self._background = np.array(background, np.float32)
+        self._covered = np.zeros(background.shape[0] * background.shape[1], np.int64)
+        self._parts: dict[str, Part] = {}
+        self._terms: dict[str, list[_TermPicture]] = {}
+        for name, part in parts.items():
+            self.put(name, part)
+
+    def put(self, material: str, part: Part) -> None:
+        """Add a material, or replace its transport (of more lights, of another quotient), and draw `part.start`."""
+        terms = [_TermPicture(*pair, part) for pair in zip(part.start.terms, part.transport, strict=True)]
+        for term, start in zip(terms, part.start.terms, strict=True):
+            term.show(part.start.curves, start)
+            term.draw()
+        before = self._parts.get(material)
+        if before is not None:
+            self._covered[before.pixel] -= 1
+        self._covered[part.pixel] += 1
+        assert self._covered.max(initial=0) <= 1, f"a pixel of {material} shows another material too"
+        self._background.reshape(-1, 3)[part.pixel] = 0
+        self._parts[material], self._terms[material] = part, terms
+
+    def show(self, material: str, edited: Editable) -> None:
+        """Let the picture go to a material as it is edited now; frames do so by `step`, or at once by `draw`.
+
+        Of two curves in a term, the one that changes becomes active. Raises `TransportNeeded`, and leaves the picture
+        as it is, where the transport serves no such edit.
+        """
+        part, terms = self._parts[material], self._terms[material]
+        if not same_quotients(part.start, edited):
+            before = {term.name: (term.quotient, term.factors, term.side) for term in part.start.terms}
+            new = [t.name for t in edited.terms if before.get(t.name) != (t.quotient, t.factors, t.side)]
+            raise TransportNeeded(material, tuple(new or (term.name for term in edited.terms)))
+        missing = tuple(term.name for term in terms if not term.serves(edited.curves))
+        if missing:
+            raise TransportNeeded(material, missing)
+        for term, now in zip(terms, edited.terms, strict=True):
+            term.show(edited.curves, now)
+
+    def activate(self, material: str, curve: str) -> None:
+        """Make a curve the active one of its terms, before it is dragged."""
+        known("curve", curve, self._parts[material].start.curves)
+        for term in self._terms[material]:
+            term.activate(curve)
+
+    def step(self, terms: int = TERMS) -> None:
+        """One frame: the `terms` largest changes of all active pictures together."""
+        active = [term for pictures in self._terms.values() for term in pictures if not term.is_settled]
+        sizes = [term.sizes_of_changes() for term in active]
+        whose = np.repeat(np.arange(len(active)), [len(size) for size in sizes])
+        size = np.concatenate([*sizes, np.zeros(0)])
+        largest = np.argpartition(-size, terms - 1)[:terms] if len(size) > terms else np.arange(len(size))
+        shares = np.bincount(whose[largest[size[largest] > 0]], minlength=len(active))
+        for term, share in zip(active, shares, strict=True):
+            term.step(int(share))
+
+    def draw(self) -> None:
+        """The exact picture at once."""
+        for terms in self._terms.values():
+            for term in terms:
+                term.draw()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the picture shows all that is wanted."""
+        return all(term.picture.is_exact for terms in self._terms.values() for term in terms)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether it does and every pixel was computed anew since: another frame would change no bit."""
+        return all(term.is_settled for terms in self._terms.values() for term in terms)
+
+    def image(self) -> Image:
+        """(H, W, 3) float32, linear radiance."""
+        image = self._background.copy()
+        for name, terms in self._terms.items():
+            for term in terms:
+                _compose(
+                    image.reshape(-1, 3), self._parts[name].pixel, term.picture.picture, term.scale, term.multiplier
+                )  # fmt: skip
+        return image
+
+
+def is_diffuse(term: Term) -> bool:
+    """Whether the texture of the diffuse colour multiplies a term: its curves know neither highlight nor Fresnel."""
+    return bool(term.factors) and all(factor.over in ("theta_i", "theta_o") for factor in term.factors)
+
+
+class _TermPicture:
+    """One term: its incremental picture over the active curve, and what multiplies it."""
+
+    def __init__(self, term: Term, transport: Rows | PairTransport, part: Part) -> None:
+        self.name, self._factors, self._start = term.name, term.factors, part.start.curves
+        self._transport = transport
+        self._counts = _counts(transport, len(term.factors))
+        texture = part.diffuse if is_diffuse(term) else part.specular
+        self._texture = np.ascontiguousarray(np.ones((3, 1)) if texture is None else texture.T, np.float32)
+        self._theta_o = np.asarray(part.theta_o, np.float32)
+        self._viewer: Curve | None = None
+        self._shown, self._colour = self._start, term.scale
+        self._to_renew = 0  # blocks of pixels that are older than the last edit
+        self.multiplier = self._texture
+        self._active = transport.over if isinstance(transport, Rows) else 0
+        self._use(transport if isinstance(transport, Rows) else self._folded())
+
+    @property
+    def is_settled(self) -> bool:
+        return self.picture.is_exact and self._to_renew <= 0
+
+    def serves(self, curves: Mapping[str, Curve]) -> bool:
+        """Whether curves can be shown with this transport."""
+        if len(self._factors) < 2 or not isinstance(self._transport, Rows):
+            return True
+        idle = self._factors[1 - self._active].curve
+        return curves[idle] is self._start[idle] or np.array_equal(curves[idle].values, self._start[idle].values)
+
+    def show(self, curves: Mapping[str, Curve], term: Term) -> None:
+        """Want the curves, and the scale of `term`."""
+        before, self._shown, self._colour = self._shown, curves, term.scale
+        viewer = curves[term.viewer] if term.viewer else None
+        if viewer is not self._viewer:
+            self._viewer = viewer
+            self.multiplier = self._texture if viewer is None else _viewed(self._texture, self._theta_o, viewer)
+        if self._pairs is not None and self._changed(before, 1 - self._active):
+            self._refold(self._active if self._changed(before, self._active) else 1 - self._active)
+        self._want()
+
+    def activate(self, curve: str) -> None:
+        """Fold the other curve in where this term has two and `curve` is idle."""
+        if self._pairs is not None and self._factors[1 - self._active].curve == curve:
+            self._refold(1 - self._active)
+
+    @property
+    def scale(self) -> NDArray[np.float32]:
+        """(3,): radiance of a value of 1 in the picture."""
+        return np.asarray(np.multiply(self._colour, self._unit), np.float32)
+
+    def sizes_of_changes(self) -> Floats:
+        """(J,) squared size of the changes that frames have to make, as they show."""
+        change = (self.picture.wanted - self.picture.effective) * self.scale
+        return np.asarray(np.sum(change * change, axis=1))
+
+    def step(self, terms: int) -> None:
+        self.picture.step(terms)
+        self._to_renew -= 1
+
+    def draw(self) -> None:
+        self.picture.draw()
+        self._to_renew = 0
+
+    @property
+    def _pairs(self) -> PairTransport | None:
+        return None if isinstance(self._transport, Rows) else self._transport
+
+    def _want(self) -> None:
+        wanted = self._coefficients(self._shown, self._active) if self._factors else np.ones((1, 3))
+        if not np.array_equal(wanted, self.picture.wanted):
+            self.picture.want(wanted)
+            self._to_renew = RENEWED_IN
+
+    def _use(self, rows: Rows) -> None:
+        self._unit = rows.unit
+        self.picture = IncrementalPicture(rows.values)
+
+    def _refold(self, active: int) -> None:
+        self._active = active
+        self._use(self._folded())
+        self._want()
+        self.draw()
+
+    def _folded(self) -> Rows:
+        """Rows over the active curve, with the idle one as it is shown."""
+        assert self._pairs is not None
+        idle = 1 - self._active
+        return self._pairs.fold(idle, self._shown[self._factors[idle].curve].band_means(self._counts[idle]))
+
+    def _coefficients(self, curves: Mapping[str, Curve], factor: int) -> Floats:
+        return coefficients_of(curves[self._factors[factor].curve], self._counts[factor])
+
+    def _changed(self, before: Mapping[str, Curve], factor: int) -> bool:
+        then, now = self._coefficients(before, factor), self._coefficients(self._shown, factor)
+        return then is not now and not np.array_equal(then, now)
+
+
+def _counts(transport: Rows | PairTransport, factors: int) -> dict[int, int]:
+    """Number of wavelets by number of the factor."""
+    if not isinstance(transport, Rows):
+        assert factors == 2, "a matrix of transport is for a term with two curves"
+        return dict(enumerate(transport.counts))
+    assert transport.over < max(factors, 1), "rows are over a curve that the term has"
+    return {transport.over: len(transport.values)}
+
+
+def _viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
+    """(3, P): a texture (3, P), or (3, 1), times f_o(theta_o)."""
+    texture = np.ascontiguousarray(np.broadcast_to(texture, (3, len(theta_o))))
+    return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
+
+
+@numba.njit(parallel=True, cache=True)
+def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
+    out = np.empty_like(texture)
+    last = len(values) - 2
+    for p in numba.prange(len(step)):
+        k = min(max(int(step[p]), 0), last)
+        share = min(max(step[p] - k, np.float32(0)), np.float32(1))
+        for c in range(len(texture)):
+            out[c, p] = texture[c, p] * (values[k, c] + share * (values[k + 1, c] - values[k, c]))
+    return out
+
+
+@numba.njit(parallel=True, fastmath=True, cache=True)
+def _compose(image, pixel, picture, scale, multiplier):  # type: ignore[no-untyped-def]
+    step = 0 if multiplier.shape[1] == 1 else 1
+    for p in numba.prange(len(pixel)):
+        for c in range(3):
+            image[pixel[p], c] += scale[c] * multiplier[c, p * step] * picture[c, p]

@@ -1,0 +1,85 @@
+"""Transport of one term of one material as its edited picture reads it: rows of wavelets, in half floats.
+
+A term with two curves is edited one curve at a time. Its transport is a matrix per pixel, and the curve that is idle is
+folded into it (Ben-Artzi 2007, eqs 4.14, 4.15).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.wavelets import transformed
+from lambent.editing.products import Halves, Pixels
+from lambent.materials.factored.curve import Curve
+
+LARGEST = 2.0**14  # of stored rows: a quarter of the largest half float
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Transport over one curve: `unit` times `values`.
+
+    Attributes
+    ----------
+    values : (J, 3, P) float16
+        By wavelets of the curve, J a power of two; J = 1 where a term has no curve.
+    unit : float
+        W/(sr m^2) of a value of 1. Half floats end at 65504; the sun's light does not.
+    over : int
+        Number of the term's factor that has the curve.
+    """
+
+    values: Halves
+    unit: float = 1.0
+    over: int = 0
+
+    @classmethod
+    def of_wavelets(cls, transport: Pixels, over: int = 0) -> Rows:
+        """Rows of transport (J, 3, P) in W/(sr m^2), scaled by a power of two so that half floats hold them."""
+        largest = float(max(transport.max(initial=0.0), -transport.min(initial=0.0)))
+        unit = 2.0 ** np.ceil(np.log2(largest / LARGEST)) if largest > 0 else 1.0
+        return cls((transport / np.float32(unit)).astype(np.float16), float(unit), over)
+
+    @classmethod
+    def of_bands(cls, transport: Pixels, over: int = 0) -> Rows:
+        """Rows of transport (J, 3, P) by bands, in W/(sr m^2)."""
+        return cls.of_wavelets(np.asarray(transformed(transport), np.float32), over)
+
+
+class PairTransport(Protocol):
+    """Transport over both curves of a term."""
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Bands (J, K) of the first and of the second curve, powers of two."""
+
+    def fold(self, curve_index: int, means: Floats) -> Rows:
+        """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its means (K, 3) over bands."""
+
+
+@dataclass(frozen=True)
+class DensePairs:
+    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over every pair of bands of two curves."""
+
+    bands: Pixels
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        return self.bands.shape[0], self.bands.shape[1]
+
+    def fold(self, curve_index: int, means: Floats) -> Rows:
+        sums = "jkcp,jc->kcp" if curve_index == 0 else "jkcp,kc->jcp"
+        return Rows.of_bands(np.einsum(sums, self.bands, np.asarray(means, np.float32)), 1 - curve_index)
+
+
+@lru_cache(maxsize=256)
+def coefficients_of(curve: Curve, count: int) -> Floats:
+    """(count, 3) wavelets of a curve: what rows are multiplied by."""
+    wavelets = transformed(curve.band_means(count))
+    wavelets.flags.writeable = False
+    return wavelets

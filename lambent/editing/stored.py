@@ -1,0 +1,119 @@
+"""Transport of a view in a store (store.contract) as the parts of its edited picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
+from lambent.editing.folding import folded
+from lambent.editing.picture import EditedPicture, Part, TransportNeeded
+from lambent.editing.products import Halves
+from lambent.editing.rows import PairTransport, Rows
+from lambent.editing.session import Session
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.store.contract import scene_record, transport_lights, view_artefact_name
+from lambent.store.store import Store
+
+
+@dataclass(frozen=True)
+class StoredPairs:
+    """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
+
+    spans: NDArray[np.uint32]
+    pairs: NDArray[np.uint8]
+    values: Halves
+    unit: float
+    counts: tuple[int, int]
+
+    def fold(self, curve_index: int, means: Floats) -> Rows:
+        """Rows over the other curve, see `rows.PairTransport`."""
+        edited = 1 - curve_index
+        rows, scale = folded(self.spans, self.pairs, self.values, means, edited, self.counts[edited])
+        return Rows(rows, self.unit * scale, edited)
+
+
+def edited_picture(store: Store, session: Session, lights: int | None = None) -> EditedPicture:
+    """The picture of a session's view, drawn exactly as the session has edited it.
+
+    Materials of the view that the session does not edit are drawn as the scene has them.
+
+    Parameters
+    ----------
+    lights
+        Which of the stored transports to take; the one with the most lights where it is None.
+
+    Raises
+    ------
+    UserError
+        The store has no transport of the view, or one of other terms than the materials have.
+    """
+    view = session.document
+    counts = transport_lights(store, view.camera, *view.size)
+    lights = max(counts, default=None) if lights is None else lights
+    if lights is None or lights not in counts:
+        found = ", ".join(map(str, counts)) or "none"
+        what = f"no transport of camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
+        raise UserError(
+            what, file=store.folder, field="lights", got=lights or found, expected=found if counts else None,
+            hint="bake the view for editing first",
+        )  # fmt: skip
+    scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
+    parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
+    backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
+    picture = EditedPicture(backdrop.astype(np.float32), parts)
+    for name in view.materials:
+        known("material", name, scene, file=store.folder, field="materials")
+        if name in parts:
+            _show(picture, name, session, store)
+    picture.draw()
+    return picture
+
+
+def _show(picture: EditedPicture, name: str, session: Session, store: Store) -> None:
+    try:
+        picture.show(name, session.editable(name))
+    except TransportNeeded as error:
+        raise UserError(str(error), file=store.folder, hint="bake the view for editing again") from error
+
+
+def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], lights: int) -> dict[str, Part]:
+    """The parts of a view, of those materials that it shows; `materials` are as they were when transport was made."""
+    view = session.document
+
+    def name(kind: str, part: str) -> str:
+        return view_artefact_name(view.camera, *view.size, kind, part)
+
+    pixel, number, theta_o = (store.read(name("view_points", part)) for part in ("pixel", "object", "theta_o"))
+    worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
+    said = store.artefact(name("transport", f"{lights}/terms")).meta["terms"]
+    parts = {}
+    for material, start in materials.items():
+        mine = worn == material
+        if not mine.any():
+            continue
+        baked = {one["term"]: one for one in said if one["material"] == material}
+        if {k: one.get("fixed") for k, one in baked.items()} != {k: t.fixed for k, t in enumerate(start.terms)}:
+            raise UserError(
+                "transport is of other terms than the material has", file=store.folder, field=material,
+                hint="bake the view for editing again",
+            )  # fmt: skip
+        arrays = name("transport", f"{lights}/{material}")
+        transport = tuple(_transport(store, f"{arrays}/{k}", baked[k]) for k in range(len(start.terms)))
+        parts[material] = Part(start, pixel[mine].astype(np.int64), theta_o[mine], transport)
+    return parts
+
+
+def _transport(store: Store, name: str, said: Mapping[str, Any]) -> Rows | PairTransport:
+    curves, unit = said["curves"], float(said["scale"])
+    if len(curves) < 2:
+        return Rows(store.read(f"{name}/rows"), unit)
+    spans, pairs, values = (store.read(f"{name}/{array}") for array in ("spans", "pairs", "values"))
+    return StoredPairs(spans, pairs, values, unit, (curves[0][1], curves[1][1]))

@@ -1,0 +1,228 @@
+"""Wavelets of light on the sphere, for relighting: Haar's on a hierarchy of spherical triangles.
+
+Each of the icosahedron's 20 faces is cut into four triangles, level by level. A function is held by its values times
+the square roots of the triangles' areas, so that dot products are integrals. One step takes the values of four children
+to one mean and three details: the reflection that swaps the middle child with the parent's constant function, which is
+orthonormal for any areas, and treats the three corners alike (Haar wavelets on the sphere: Schroeder and Sweldens 1995;
+with orthonormal bases, Bonneau 1999).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba
+import numpy as np
+
+from lambent.core.arrays import Floats, Indices
+from lambent.core.directions import normalize
+from lambent.scenes.triangle_lights import icosahedron, solid_angles
+
+FACES, CHILDREN = 20, 4
+DEEPEST = 6  # 81,920 triangles of 1.5 degrees
+PARTS = 2  # levels below the triangles at which a turned environment is looked up: 16 points each
+
+
+@dataclass(frozen=True)
+class TriangleTree:
+    """The icosahedron cut `depth` times: N = 20 * 4^depth triangles; children of i are 4 i ... 4 i + 3."""
+
+    depth: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.depth <= DEEPEST + PARTS:
+            raise ValueError(f"a tree is 0 to {DEEPEST + PARTS} levels deep, not {self.depth}")
+
+    def __len__(self) -> int:
+        return int(FACES * CHILDREN**self.depth)
+
+    @cached_property
+    def corners(self) -> Floats:
+        """(N, 3, 3) unit corners of the finest triangles, counter-clockwise from outside."""
+        triangles = icosahedron()
+        for _ in range(self.depth):
+            triangles = children_of(triangles)
+        return triangles
+
+    @cached_property
+    def areas_sr(self) -> Floats:
+        """(N,) solid angles; their sum is 4 pi."""
+        return solid_angles(self.corners)
+
+    @cached_property
+    def levels(self) -> Indices:
+        """(N,) level of each coefficient: 0 for the 20 faces, then 1, 2, ... for the details, coarse to fine."""
+        counts = [FACES, *(3 * FACES * CHILDREN**level for level in range(self.depth))]
+        return np.repeat(np.arange(self.depth + 1), counts)
+
+    def of_radiance(self, radiance: Floats) -> Floats:
+        """Coefficients (N, ...) of radiance (N, ...) by triangle."""
+        return self._transformed(_scaled(radiance, np.sqrt(self.areas_sr)))
+
+    def of_transport(self, transport: Floats) -> Floats:
+        """Rows (N, ...) of transport (N, ...), the picture that each triangle makes with a radiance of 1.
+
+        The picture is the sum of the rows times `of_radiance`, exactly.
+        """
+        return self._transformed(_scaled(transport, 1 / np.sqrt(self.areas_sr)))
+
+    def radiance(self, coefficients: Floats) -> Floats:
+        """Radiance (N, ...) by triangle of coefficients: the inverse of `of_radiance`."""
+        values = np.array(coefficients[:FACES])
+        for matrices in self._steps[::-1]:
+            details = coefficients[len(values) : CHILDREN * len(values)].reshape(len(values), 3, *values.shape[1:])
+            both = np.concatenate([values[:, None], details], axis=1)
+            values = np.einsum("nki,nk...->ni...", matrices, both).reshape(-1, *values.shape[1:])
+        return _scaled(values, 1 / np.sqrt(self.areas_sr))
+
+    def containing(self, w: Floats) -> Indices:
+        """(...) number of the finest triangle that has each unit direction (..., 3)."""
+        flat = np.ascontiguousarray(w, float).reshape(-1, 3)
+        return np.asarray(_find(flat, icosahedron(), self.depth)).reshape(w.shape[:-1])
+
+    def means(self, w: Floats, weight_sr: Floats, radiance: Floats) -> Floats:
+        """Mean radiance (N, 3) in each triangle of samples: directions (S, 3), solid angles (S,), radiance (S, 3).
+
+        A triangle without samples has the mean of the smallest one around it that has some.
+        """
+        at, count = self.containing(w), len(self)
+        weight = [np.bincount(at, weight_sr, count)]
+        light = [np.stack([np.bincount(at, weight_sr * radiance[:, c], count) for c in range(3)], axis=1)]
+        while len(weight[-1]) > FACES:
+            weight.append(weight[-1].reshape(-1, CHILDREN).sum(axis=1))
+            light.append(light[-1].reshape(-1, CHILDREN, 3).sum(axis=1))
+        mean = np.broadcast_to(light[-1].sum(axis=0) / max(weight[-1].sum(), 1e-300), (FACES, 3))
+        for at_level, (w_sr, total) in enumerate(zip(weight[::-1], light[::-1], strict=True)):
+            mean = np.repeat(mean, CHILDREN, axis=0) if at_level else mean
+            mean = np.where(w_sr[:, None] > 0, total / np.maximum(w_sr, 1e-300)[:, None], mean)
+        return np.asarray(mean)
+
+    def _transformed(self, values: Floats) -> Floats:
+        details: list[Floats] = []
+        for matrices in self._steps:
+            four = values.reshape(-1, CHILDREN, *values.shape[1:])
+            both = np.einsum("nki,ni...->nk...", matrices.astype(values.dtype), four)
+            details.append(both[:, 1:].reshape(-1, *values.shape[1:]))
+            values = both[:, 0]
+        return np.concatenate([values, *details[::-1]])
+
+    @cached_property
+    def _steps(self) -> list[Floats]:
+        """Matrices (n, 4, 4) from children to mean and details, fine to coarse."""
+        steps, areas = [], self.areas_sr
+        for _ in range(self.depth):
+            four = areas.reshape(-1, CHILDREN)
+            areas = four.sum(axis=1)
+            steps.append(_reflections(np.sqrt(four / areas[:, None])))
+        return steps
+
+
+@dataclass(frozen=True)
+class TurningLight:
+    """An environment that can be turned, as radiance by triangle.
+
+    Attributes
+    ----------
+    tree
+        The triangles that light the scene.
+    fine : (N * 16, 3)
+        Mean radiance of the environment, unturned, in the parts of the triangles.
+    """
+
+    tree: TriangleTree
+    fine: Floats
+
+    @classmethod
+    def of_samples(cls, tree: TriangleTree, w: Floats, weight_sr: Floats, radiance: Floats) -> TurningLight:
+        """Of samples as in `TriangleTree.means`."""
+        return cls(tree, TriangleTree(tree.depth + PARTS).means(w, weight_sr, radiance))
+
+    def radiance(self, rotation: Floats | None = None) -> Floats:
+        """(N, 3) mean radiance by triangle once the environment is turned by `rotation` (3, 3)."""
+        parts = self._parts
+        values = self.fine
+        if rotation is not None:
+            values = values[parts.containing(self._centres @ np.asarray(rotation, float))]
+        each = CHILDREN**PARTS
+        light = (values * parts.areas_sr[:, None]).reshape(-1, each, 3).sum(axis=1)
+        return np.asarray(light / parts.areas_sr.reshape(-1, each).sum(axis=1, keepdims=True))
+
+    @cached_property
+    def _parts(self) -> TriangleTree:
+        return TriangleTree(self.tree.depth + PARTS)
+
+    @cached_property
+    def _centres(self) -> Floats:
+        return normalize(self._parts.corners.sum(axis=1))
+
+
+def children_of(triangles: Floats) -> Floats:
+    """(4 n, 3, 3): every spherical triangle (n, 3, 3) cut at the middles of its edges; the middle child is the last."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    ab, bc, ca = normalize(a + b), normalize(b + c), normalize(c + a)
+    four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.stack([np.stack(child, axis=1) for child in four], axis=1).reshape(-1, 3, 3)
+
+
+def _reflections(constant: Floats) -> Floats:
+    """(n, 4, 4) orthonormal, first row `constant` (n, 4), which are unit and positive.
+
+    The reflection I - 2 v v^T swaps the unit vector of the middle child, the last, with `constant`; its rows are then
+    put in the order constant, corners.
+    """
+    middle = np.array([0.0, 0.0, 0.0, 1.0])
+    v = normalize(middle - constant)
+    matrix = np.eye(CHILDREN) - 2 * v[:, :, None] * v[:, None, :]
+    return np.asarray(matrix[:, [3, 0, 1, 2]])
+
+
+def _scaled(values: Floats, factors: Floats) -> Floats:
+    return np.asarray(values * factors.astype(values.dtype).reshape(-1, *[1] * (values.ndim - 1)))
+
+
+@numba.njit(parallel=True, cache=True)
+def _find(w, faces, depth):  # type: ignore[no-untyped-def]
+    """Number of the finest triangle by descent; cuts are the planes through the middles of two edges."""
+    found = np.empty(len(w), np.int64)
+    for s in numba.prange(len(w)):
+        x = (w[s, 0], w[s, 1], w[s, 2])
+        best, number = -np.inf, 0
+        for f in range(len(faces)):
+            near = 0.0
+            for k in range(3):
+                near += (faces[f, 0, k] + faces[f, 1, k] + faces[f, 2, k]) * x[k]
+            if near > best:
+                best, number = near, f
+        face = faces[number]
+        a, b, c = (
+            (face[0, 0], face[0, 1], face[0, 2]),
+            (face[1, 0], face[1, 1], face[1, 2]),
+            (face[2, 0], face[2, 1], face[2, 2]),
+        )
+        for _ in range(depth):
+            ab, bc, ca = _middle(a, b), _middle(b, c), _middle(c, a)
+            if _side(ab, ca, x) > 0:
+                child, b, c = 0, ab, ca
+            elif _side(bc, ab, x) > 0:
+                child, a, c = 1, ab, bc
+            elif _side(ca, bc, x) > 0:
+                child, a, b = 2, ca, bc
+            else:
+                child, a, b, c = 3, ab, bc, ca
+            number = 4 * number + child
+        found[s] = number
+    return found
+
+
+@numba.njit(cache=True)
+def _middle(a, b):  # type: ignore[no-untyped-def]
+    x, y, z = a[0] + b[0], a[1] + b[1], a[2] + b[2]
+    scale = 1 / np.sqrt(x * x + y * y + z * z)
+    return x * scale, y * scale, z * scale
+
+
+@numba.njit(cache=True)
+def _side(p, q, x):  # type: ignore[no-untyped-def]
+    """Positive on the side of (p x q)."""
+    return (p[1] * q[2] - p[2] * q[1]) * x[0] + (p[2] * q[0] - p[0] * q[2]) * x[1] + (p[0] * q[1] - p[1] * q[0]) * x[2]

@@ -1,0 +1,196 @@
+"""Transport of a view: light by bands, against brute force, known scenes and the path tracer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core.camera import Camera
+from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_directions
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.curve import END_RAD, Curve
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.terms import Editable
+from lambent.materials.lobes import NUMPY
+from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
+from tests.bake.small_scenes import GREY
+
+SIZE = 10
+CAMERA = Camera("front", (0.0, 1.6, 2.4), (0.0, 0.35, 0.0))
+GLOSSY = Material(kd=(0.4, 0.3, 0.2), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5, k=(0.6, 0.5, 0.4)),))
+BRUSHED = Material(lobes=(Lobe(mx=0.1, my=0.3, r0=0.5),))
+
+
+def environment(height: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions, solid angles and radiance of a sky with a soft sun over a dim ground."""
+    w = lat_long_directions(height, 2 * height).reshape(-1, 3)
+    weight = np.repeat(-np.diff(np.cos(np.linspace(0, np.pi, height + 1))), 2 * height) * np.pi / height
+    sun = normalize(np.array([0.5, 0.7, 0.4]))
+    sky = (
+        np.where(w[:, 1:2] > 0, [0.5, 0.7, 1.0], [0.1, 0.08, 0.05])
+        + 30 * np.clip((w @ sun - 0.95) / 0.05, 0, 1)[:, None]
+    )
+    return w, weight, sky
+
+
+def ball_on_floor(material: Material = GLOSSY) -> Scene:
+    floor = SceneObject("floor", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "grey")
+    ball = SceneObject("ball", placed(sphere(0.5, 48, 24), (0, 0.55, 0)), "glossy")
+    return Scene("ball", (floor, ball), {"grey": GREY, "glossy": material})
+
+
+@dataclass
+class View:
+    """A small view of a scene with its points, lights and what is seen of them."""
+
+    scene: Scene
+    lights: TriangleLights
+    points: Any
+    seen: np.ndarray
+
+    def picture(self, editable: Editable, *counts: int) -> np.ndarray:
+        """(P, 3) direct light by bands of a material."""
+        from lambent.bake.transport.bands import Bands, pair_transport, transport
+
+        total = np.zeros((len(self.points), 3))
+        for term in editable.terms:
+            bands = [Bands(f, c) for f, c in zip(term.factors, counts, strict=False)]
+            means = [editable.curves[b.factor.curve].band_means(b.count) for b in bands]
+            if len(bands) == 1:
+                rows = transport(self.points, self.lights, self.seen, term, bands[0])
+                total += np.einsum("jc,jcp->pc", means[0], rows) * term.scale
+                continue
+            found = pair_transport(self.points, self.lights, self.seen, term, bands, 0.0)
+            share = found.values * means[0][found.bands[:, 0]] * means[1][found.bands[:, 1]]
+            np.add.at(total, np.repeat(np.arange(len(total)), found.counts), share * term.scale)
+        return total
+
+    def brute_force(self, editable: Editable, cuts: int, counts: tuple[int, ...] = ()) -> np.ndarray:
+        """(P, 3) direct light by the same triangles, each as cuts^2 small ones that shine alike, numpy alone.
+
+        Curves are smooth, or steps over `counts` bands.
+        """
+        total = np.zeros((len(self.points), 3))
+        p = self.points
+        visible = (self.seen[np.arange(len(self.lights)) // 32] >> (np.arange(len(self.lights)) % 32)[:, None]) & 1
+        frame = np.stack([p.t, p.b, p.n], axis=1).astype(float)
+        for m, corners in enumerate(self.lights.corners):
+            wi_centre = normalize(frame @ self.lights.centres[m])
+            parts = normalize(_small(corners, cuts))
+            wi = np.einsum("pij,sj->spi", frame, parts)
+            for term in editable.terms:
+                quotient = np.asarray(term.quotient.evaluate(tuple(wi_centre.T), tuple(p.wo.T.astype(float)), NUMPY))
+                light = self.lights.light[m] * (quotient * np.maximum(wi_centre[:, 2], 0) * visible[m])[:, None]
+                value = np.ones((len(parts), len(p), 3))
+                for factor, count in zip_longest(term.factors, counts[: len(term.factors)]):
+                    curve, angle = editable.curves[factor.curve], _angle(factor, wi, p.wo)
+                    value = value * (curve.at(angle) if count is None else _steps(curve, count, angle))
+                total += light * value.mean(axis=0) * term.scale
+        return total
+
+
+def _steps(curve: Curve, count: int, angle: np.ndarray) -> np.ndarray:
+    return curve.band_means(count)[np.minimum((angle / END_RAD * count).astype(int), count - 1)]
+
+
+def _angle(factor: Any, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    wo = np.broadcast_to(wo, wi.shape).astype(float)
+    components = [tuple(np.moveaxis(w, -1, 0)) for w in (wi, wo)]
+    return angle_of(factor.over, *components, factor.stretch)
+
+
+def _small(corners: np.ndarray, cuts: int) -> np.ndarray:
+    """Centres of the pieces of a triangle, on its plane."""
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+    return surface_triangles(corners[None], np.ones((1, 3)), longest / cuts * 1.0001).centres
+
+
+def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SIZE)) -> View:
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+    from lambent.bake.transport.bands import visibility
+    from lambent.bake.transport.view_points import view_points
+
+    builder = SceneBuilder(scene)
+    traced = builder.build()
+    points = view_points(builder, traced, CAMERA, *size)
+    return View(scene, lights, points, visibility(traced, points, lights))
+
+
+@pytest.fixture(scope="module")
+def outdoors() -> View:
+    return view(ball_on_floor(), environment_triangles(*environment(), 400))
+
+
+@pytest.mark.parametrize(("material", "counts"), [(GLOSSY, (256, 64)), (BRUSHED, (256, 256))])
+def test_bands_are_the_sum_over_the_triangles(outdoors: View, material: Material, counts: tuple[int, int]) -> None:
+    """Within 1e-3 where the curve is made of steps, too; the steps themselves cost a little more."""
+    editable = of_material(material)
+    found = outdoors.picture(editable, *counts)
+    for steps, tolerance in ((counts, 1e-3), ((), 2e-3)):
+        expected = outdoors.brute_force(editable, 8, steps)
+        assert np.abs(found - expected).mean() < tolerance * expected.mean()
+        assert np.abs(found - expected).max() < 0.02 * expected.max()
+
+
+def test_constant_curves_need_no_precision_of_bands(outdoors: View) -> None:
+    """With curves of 1 the picture is the sum over the lights, whatever the bands."""
+    editable = of_material(Material(kd=0.5))
+    expected = outdoors.brute_force(editable, cuts=1)
+    for count in (4, 64, 256):
+        assert np.allclose(outdoors.picture(editable, count), expected, rtol=1e-4, atol=1e-5)
+
+
+def test_a_curve_shows_in_its_band_alone(outdoors: View) -> None:
+    """Light of a diffuse surface between 22.5 and 45 degrees, counted by hand at a point of the floor."""
+    editable = of_material(Material(kd=1.0))
+    window = Curve.of(lambda x: ((x > np.pi / 8) & (x <= np.pi / 4)).astype(float))
+    found = outdoors.picture(editable.with_curve("diffuse", window), 64)
+    free = np.flatnonzero((outdoors.points.object == 0) & (np.linalg.norm(outdoors.points.p, axis=1) > 2.0))[0]
+    w, weight, radiance = environment(192)
+    inside = (w[:, 1] < np.cos(np.pi / 8)) & (w[:, 1] >= np.cos(np.pi / 4))
+    expected = (radiance * (weight * w[:, 1] * inside)[:, None]).sum(axis=0) / np.pi
+    assert np.allclose(found[free], expected, rtol=0.03)
+
+
+def test_lamps_light_as_their_solid_angle_says() -> None:
+    """A square lamp of radiance 7 over the floor: irradiance by quadrature, radiance kd / pi of it; none behind it."""
+    square = np.array([[-0.5, 2, -0.5], [0.5, 2, -0.5], [0.5, 2, 0.5], [-0.5, 2, 0.5]])
+    downwards = square[[[0, 1, 2], [0, 2, 3]]]
+    floor = Scene("floor", (SceneObject("floor", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "grey"),), {"grey": GREY})
+    lit = view(floor, surface_triangles(downwards, np.full((2, 3), 7.0), 0.12))
+    dark = view(floor, surface_triangles(downwards[:, ::-1], np.full((2, 3), 7.0), 0.12))
+    editable = of_material(Material(kd=0.5))
+    found = lit.picture(editable, 32)
+    p = lit.points.p.astype(float)
+    g = (np.arange(60) + 0.5) / 60 - 0.5
+    lamp = np.stack(np.meshgrid(g, [2.0], g, indexing="ij"), axis=-1).reshape(-1, 3)
+    to = lamp - p[:, None]
+    cosines = to[..., 1] ** 2 / (to**2).sum(axis=-1)
+    expected = 0.5 / np.pi * 7 * (cosines / (to**2).sum(axis=-1)).mean(axis=1)
+    assert np.allclose(found, expected[:, None], rtol=5e-3)
+    assert not dark.picture(editable, 32).any()
+
+
+def test_light_through_a_sheet_comes_from_behind_it() -> None:
+    sheet = Scene("sheet", (SceneObject("sheet", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "grey"),), {"grey": GREY})
+    w, weight, _ = environment()
+    below = environment_triangles(w, weight, np.where(w[:, 1:2] < 0, [1.0, 2.0, 3.0], 0.0), 300)
+    found = view(sheet, below).picture(of_material(Material(kt_d=0.8)), 64)
+    assert np.allclose(found, 0.8 * np.array([1, 2, 3]), rtol=0.01)
+    assert not view(sheet, below).picture(of_material(Material(kd=0.8)), 64).max() > 0.01
+
+
+def test_solid_angles_of_small_triangles_do_not_cancel() -> None:
+    corners = normalize(np.array([[1, 0, 0], [1, 1e-4, 0], [1, 0, 1e-4]], float))
+    assert solid_angles(corners) == pytest.approx(0.5e-8, rel=1e-6)

@@ -1,0 +1,185 @@
+"""Transport of a view in its store: pictures from what is stored, few lights first, interrupted bakes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.artefacts.transport import Settings
+from lambent.bake.bake import bake
+from lambent.bake.quality import quality_named
+from lambent.bake.view import View
+from lambent.core.images import write_image
+from lambent.core.progress import Cancelled
+from lambent.core.wavelets import transformed
+from lambent.materials.document import Material
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, MaterialTextures, Scene, SceneObject, Texture
+from lambent.store.contract import baked_views, transport_lights, view_artefact_name
+from lambent.store.store import Store
+from tests.bake.small_scenes import GREY
+from tests.bake.test_transport import CAMERA, GLOSSY, ball_on_floor, view
+
+SIZE = (12, 10)
+HOW = Settings(sharp=64, smooth=16, sharp_of_two=64, smooth_of_two=16)
+FEW = quality_named("preview").changed("few", visibility={"lights": (60, 200)}, transport=vars(HOW))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    file = tmp_path_factory.mktemp("sky") / "sky.exr"
+    picture = np.full((32, 64, 3), 0.3, np.float32)
+    picture[4:8, 10:14] = (30.0, 25.0, 20.0)
+    write_image(file, picture)
+    lamp = SceneObject("lamp", patch((-1.2, 0.0, -0.5), (2.4, 0, 0), (0, 0.9, 0)), "grey", (5.0, 4.0, 3.0))
+    scene = ball_on_floor()
+    return replace(scene, objects=(*scene.objects, lamp), environment=ImageEnvironment(file, rotation_deg=30.0))
+
+
+def bake_view(scene: Scene, folder: Path, **more: object) -> Store:
+    return bake(scene, folder, quality=FEW, only={"transport"}, views=[View(CAMERA, *SIZE)], **more)  # type: ignore
+
+
+@pytest.fixture(scope="module")
+def store(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return bake_view(scene, tmp_path_factory.mktemp("view") / "s")
+
+
+def name(kind: str, part: str) -> str:
+    return view_artefact_name(CAMERA, *SIZE, kind, part)
+
+
+def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.ndarray:
+    """(P, 3) reflected light of a view, from its store alone."""
+    objects = store.artefact(name("view_points", "object")).meta["objects"]
+    worn = np.array([material for _, material in objects])[store.read(name("view_points", "object"))]
+    total = np.zeros((len(worn), 3))
+    for term in store.artefact(name("transport", f"{lights}/terms")).meta["terms"]:
+        editable = editables[term["material"]]
+        of_term = editable.terms[term["term"]]
+        start = name("transport", f"{lights}/{term['material']}/{term['term']}/")
+        means = [editable.curves[curve].band_means(count) for curve, count in term["curves"]]
+        if len(means) == 1:
+            light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
+        else:
+            pairs, values = store.read(f"{start}pairs"), store.read(f"{start}values").astype(float)
+            share = values * means[0][pairs[:, 0]] * means[1][pairs[:, 1]]
+            light = np.array([share[a:b].sum(axis=0) for a, b in store.read(f"{start}spans")]).reshape(-1, 3)
+        total[worn == term["material"]] += light * of_term.scale * term["scale"]
+    return total
+
+
+def editables(scene: Scene) -> dict[str, Editable]:
+    return {name: of_material(material) for name, material in scene.materials.items()}
+
+
+def test_pictures_from_the_store_are_the_sum_over_its_lights(store: Store, scene: Scene) -> None:
+    """Half floats and pairs that are left out cost less than 1/1000 of a pixel."""
+    from lambent.bake.transport.view_tracer import ViewTracer
+
+    lights = ViewTracer(scene).lights(200)
+    assert 150 < len(lights) <= 200
+    assert 60 < np.count_nonzero(lights.near) <= 100
+    assert store.artefact(name("visibility", "200")).meta["lights"] == len(lights)
+    whole = view(scene, lights, SIZE)
+    expected = np.zeros((len(whole.points), 3))
+    for number, o in enumerate(scene.objects):
+        mine = whole.points.object == number
+        expected[mine] = whole.picture(of_material(scene.materials[o.material]), 64, 16)[mine]
+    found = picture(store, 200, editables(scene))
+    diffuse = picture(store, 200, {n: _of_diffuse(e) for n, e in editables(scene).items()})
+    assert (found > diffuse).any(), "the highlight is there"
+    assert np.abs(found - expected).max() < 1e-3 * expected.max()
+    assert np.allclose(found, expected, rtol=3e-3, atol=1e-4 * expected.max())
+
+
+def _of_diffuse(editable: Editable) -> Editable:
+    terms = [replace(t, scale=(0.0, 0.0, 0.0)) if t.name != "diffuse" else t for t in editable.terms]
+    return replace(editable, terms=tuple(terms))
+
+
+def test_few_lights_come_first_and_more_change_the_picture_little(store: Store, scene: Scene) -> None:
+    assert transport_lights(store, CAMERA, *SIZE) == [60, 200]
+    assert transport_lights(store, CAMERA, 7, 7) == []
+    few, many = (picture(store, n, editables(scene)) for n in (60, 200))
+    assert np.abs(few - many).mean() < 0.1 * many.mean()
+    assert list(baked_views(store)) == [name("", "").split("/")[1]]
+
+
+def test_the_backdrop_is_what_shines_by_itself(store: Store, scene: Scene) -> None:
+    seen = store.read(name("view_points", "backdrop")).reshape(-1, 3)
+    pixel, objects = (store.read(name("view_points", part)) for part in ("pixel", "object"))
+    assert np.allclose(seen[pixel[objects == 2]], (5.0, 4.0, 3.0))
+    assert (objects == 2).any()
+    assert not seen[pixel[objects != 2]].any()
+    assert (np.delete(seen, pixel, axis=0) >= 0.29).all()
+
+
+def test_an_interrupted_bake_goes_on_and_ends_with_the_same_arrays(
+    store: Store, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from lambent.bake.artefacts import transport, visibility
+
+    for module, constant in ((transport, "POINTS"), (visibility, "POINTS")):
+        monkeypatch.setattr(module, constant, 6)
+    monkeypatch.setattr(transport, "ENTRIES", 1000)
+    steps, starts = iter(range(10_000)), 0
+
+    def stop_often(done: float, total: float, what: str) -> None:
+        if next(steps) % 23 == 22:
+            raise Cancelled
+
+    found: Store | None = None
+    while found is None:
+        starts += 1
+        try:
+            found = bake_view(scene, tmp_path / "s", progress=stop_often)
+        except Cancelled:
+            states = {a.name: a.complete for a in Store.open(tmp_path / "s").artefacts()}
+            assert not all(states.values()) or name("transport", "200/terms") not in states
+    assert starts > 3
+    assert np.allclose(picture(found, 200, editables(scene)), picture(store, 200, editables(scene)), rtol=1e-4)
+    for part in ("200/glossy/0/rows", "60/grey/0/rows"):
+        assert np.array_equal(found.read(name("transport", part)), store.read(name("transport", part)))
+
+
+def test_nothing_is_baked_twice_and_scales_and_curves_are_no_inputs(store: Store, scene: Scene) -> None:
+    before = {a.name: (a.key, a.done) for a in store.artefacts()}
+    bright = GLOSSY.model_copy(update={"kd": (0.1, 0.1, 0.1)})
+    again = bake_view(replace(scene, materials={**scene.materials, "glossy": bright}), store.folder)
+    assert {a.name: (a.key, a.done) for a in again.artefacts()} == before
+
+
+def test_materials_may_be_edited_as_something_else(scene: Scene, tmp_path: Path) -> None:
+    plain = of_material(Material(kd=0.5))
+    other = bake_view(scene, tmp_path / "s", editables={"glossy": plain})
+    terms = other.artefact(name("transport", "60/terms")).meta["terms"]
+    assert [(t["material"], t["term"], t["curves"]) for t in terms] == [
+        ("grey", 0, [["diffuse", 16]]),
+        ("glossy", 0, [["diffuse", 16]]),
+    ]
+
+
+def test_textures_are_in_the_transport(tmp_path: Path) -> None:
+    """A floor whose texture halves green, under even light: radiance kd texture."""
+    texels = np.broadcast_to(np.array([1.0, 0.5, 1.0], np.float16), (2, 2, 3))
+    floor = SceneObject("floor", patch((-9, 0, 9), (18, 0, 0), (0, 0, -18)), "grey")
+    textures = {"grey": MaterialTextures(diffuse=Texture(texels))}
+    even = ConstantEnvironment((1.0, 1.0, 1.0))
+    store = bake_view(Scene("floor", (floor,), {"grey": GREY}, even, textures=textures), tmp_path / "s")
+    found = picture(store, 200, {"grey": of_material(GREY)})
+    assert np.allclose(found, 0.5 * np.array([1.0, 0.5, 1.0]), rtol=0.01)
+
+
+def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, tmp_path: Path) -> None:
+    behind = SceneObject("behind", patch((-1, 0, 8), (1, 0, 0), (0, 1, 0)), "other")
+    more = replace(scene, objects=(*scene.objects, behind), materials={**scene.materials, "other": GLOSSY})
+    store = bake_view(more, tmp_path / "s")
+    assert store.read(name("transport", "60/other/0/rows")).shape == (16, 3, 0)
+    assert store.read(name("transport", "60/other/1/spans")).shape == (0, 2)
+    assert np.isfinite(picture(store, 60, editables(more))).all()

@@ -1,0 +1,99 @@
+"""Incremental pictures: the published example, exactness after enough frames, no drift."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.wavelets import transformed
+from lambent.editing.incremental import IncrementalPicture
+from lambent.editing.products import add_rows
+
+
+def random_transport(bands: int = 64, pixels: int = 5000) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return (rng.random((bands, 3, pixels)) * rng.random((bands, 1, 1))).astype(np.float16)
+
+
+def dense(transport: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    return np.einsum("jc,jcp->cp", coefficients, transport.astype(float))
+
+
+def test_the_published_example() -> None:
+    """Ben-Artzi 2007, table 7.1: T = (3, 5, 2), one multiplication a frame."""
+    picture = IncrementalPicture(np.array([3, 5, 2], np.float16).reshape(3, 1, 1))
+    shown, perfect = [], []
+    for curve in ([4, 2, 1], [4, 3, 1], [4, 2, 0]):
+        picture.want(np.array(curve, float)[:, None])
+        picture.step(terms=1)
+        shown.append(picture.picture.item())
+        perfect.append(float(dense(picture.transport, picture.wanted).item()))
+    assert perfect == [24, 29, 22]
+    assert shown == [12, 27, 22]
+    assert picture.is_exact
+
+
+@pytest.mark.parametrize("pixels", [1, 7, 2048, 5001])
+def test_sum_of_rows_is_numpys(pixels: int) -> None:
+    transport = random_transport(16, pixels)
+    transport[3] *= np.float16(-1e-7)  # subnormal halves
+    rows, weights = np.array([3, 0, 15]), np.random.default_rng(4).normal(size=(3, 3))
+    picture = np.ones((3, pixels), np.float32)
+    add_rows(picture, transport, rows, weights)
+    assert np.allclose(picture, 1 + np.einsum("kc,kcp->cp", weights, transport[rows].astype(float)), atol=1e-6)
+
+
+def test_frames_finish_a_large_edit() -> None:
+    transport = random_transport()
+    picture = IncrementalPicture(transport)
+    picture.want(np.random.default_rng(5).normal(size=(64, 3)))
+    errors = []
+    for _ in range(3):
+        assert not picture.is_exact
+        picture.step(terms=30)
+        errors.append(np.abs(picture.picture - dense(transport, picture.wanted)).max())
+    assert picture.is_exact
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-5
+
+
+def test_incremental_picture_is_the_dense_one() -> None:
+    transport = random_transport()
+    incremental, whole = IncrementalPicture(transport), IncrementalPicture(transport)
+    curve = np.random.default_rng(6).random((64, 3))
+    incremental.want(curve)
+    while not incremental.is_exact:
+        incremental.step(terms=5)
+    whole.want(curve)
+    whole.draw()
+    assert np.allclose(incremental.picture, whole.picture, rtol=1e-6, atol=1e-6 * whole.picture.max())
+
+
+def test_wavelets_draw_the_picture_of_the_bands() -> None:
+    """In float32, which tells the transform from the rounding of halves."""
+    transport = random_transport().astype(np.float32)
+    curve = np.random.default_rng(7).random((64, 3)).astype(np.float32)
+    bands = np.einsum("jc,jcp->cp", curve, transport)
+    wavelets = np.einsum("jc,jcp->cp", transformed(curve), transformed(transport))
+    assert np.allclose(wavelets, bands, rtol=1e-5)
+
+
+def test_ten_thousand_edits_do_not_drift() -> None:
+    transport = random_transport(32, 300)
+    picture, rng = IncrementalPicture(transport), np.random.default_rng(8)
+    curve = rng.random((32, 3))
+    for _ in range(10_000):
+        curve[rng.integers(32)] = rng.random(3) * 10.0 ** rng.integers(-2, 3)
+        picture.want(curve)
+        picture.step(terms=4)
+    while not picture.is_exact:
+        picture.step()
+    truth = dense(transport, curve)
+    assert np.allclose(picture.picture, truth, rtol=1e-5, atol=2e-7 * np.abs(truth).max())
+
+
+def test_no_edit_is_no_work() -> None:
+    picture = IncrementalPicture(random_transport())
+    picture.step()
+    assert picture.is_exact
+    assert not picture.picture.any()

@@ -1,0 +1,134 @@
+"""Transport in a store becomes the edited picture of a session; the example of the documentation runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.images import read_image
+from lambent.core.wavelets import transformed
+from lambent.editing.operators import Region
+from lambent.editing.session import Session
+from lambent.editing.stored import edited_picture
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.materials.models import model_named
+from lambent.store.contract import SceneRecord, view_artefact_name, view_meta, write_scene_record
+from lambent.store.store import Store
+
+CAMERA, SIZE, UNIT = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0)), (8, 6), 0.25
+MATERIALS = {
+    "tray": Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3),)),
+    "wall": Material(name="wall", kd=0.5),
+}
+SHOWN = {"tray": np.arange(3, 20), "wall": np.arange(20, 41)}
+COUNTS = {"diffuse": 4, "highlight": 16, "fresnel": 8}
+LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
+
+
+def bands_of(material: str) -> list[np.ndarray]:
+    """Transport (J, K, 3, P) by bands of each term, in halves."""
+    rng = np.random.default_rng(len(material))
+    shapes = [[COUNTS[f.curve] for f in term.factors] for term in of_material(MATERIALS[material]).terms]
+    return [rng.random((*s, *[1] * (2 - len(s)), 3, len(SHOWN[material]))).astype(np.float16) for s in shapes]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    store, meta = Store.create(tmp_path / "room", {}), view_meta(CAMERA, *SIZE)
+
+    def put(kind: str, part: str, array: np.ndarray, **more: object) -> None:
+        name = view_artefact_name(CAMERA, *SIZE, kind, part)
+        store.put(name, kind, array, key="k", meta={**meta, **more})
+
+    worn = np.concatenate([np.full(len(pixel), k) for k, pixel in enumerate(SHOWN.values())])
+    put("view_points", "pixel", np.concatenate(list(SHOWN.values())).astype(np.uint32))
+    put("view_points", "object", worn.astype(np.uint32), objects=[["a", "tray"], ["b", "wall"]])
+    put("view_points", "theta_o", np.zeros(len(worn), np.float32))
+    put("view_points", "backdrop", np.full((SIZE[1], SIZE[0], 3), 0.125, np.float16))
+    said = []
+    for name, material in MATERIALS.items():
+        for k, (term, light) in enumerate(zip(of_material(material).terms, bands_of(name), strict=True)):
+            curves = [[f.curve, COUNTS[f.curve]] for f in term.factors]
+            said.append({"material": name, "term": k, "fixed": term.fixed, "scale": UNIT, "curves": curves})
+            if len(term.factors) == 1:
+                put("transport", f"200/{name}/{k}/rows", transformed(light[:, 0].astype(np.float32)).astype(np.float16))
+                continue
+            j, n, _, points = light.shape
+            pairs = np.tile(np.stack(np.divmod(np.arange(j * n), n), axis=1), (points, 1))
+            begin = np.arange(points) * j * n
+            put("transport", f"200/{name}/{k}/spans", np.stack([begin, begin + j * n], axis=1).astype(np.uint32))
+            put("transport", f"200/{name}/{k}/pairs", pairs.astype(np.uint8))
+            put("transport", f"200/{name}/{k}/values", np.moveaxis(light, 3, 0).reshape(-1, 3))
+    put("transport", "200/terms", np.ones(len(said), np.uint32), terms=said)
+    record = SceneRecord(name="room", objects=(), materials=MATERIALS, cameras=(CAMERA,), bounds=((0, 0, 0), (1, 1, 1)))
+    write_scene_record(store, record)
+    return store
+
+
+def expected(name: str, made: Editable) -> np.ndarray:
+    """(P, 3) of a material."""
+    total = np.zeros((len(SHOWN[name]), 3))
+    for term, light in zip(made.terms, bands_of(name), strict=True):
+        means = [made.curves[f.curve].band_means(n) for f, n in zip(term.factors, light.shape, strict=False)]
+        means += [np.ones((1, 3))] * (2 - len(means))
+        total += UNIT * np.array(term.scale) * np.einsum("jkcp,jc,kc->pc", light.astype(float), *means)
+    return total
+
+
+def new_session(**materials: object) -> Session:
+    return Session.new("room", CAMERA, materials or {"tray": MATERIALS["tray"]}, size=SIZE)
+
+
+def test_the_picture_is_the_sum_of_what_is_stored(store: Store) -> None:
+    session = new_session()
+    session.pull("tray", "highlight", LOW, y=1.0)
+    session.pull("tray", "fresnel", LOW, y=0.5)
+    picture = edited_picture(store, session)
+    image = picture.image().reshape(-1, 3)
+    rest = np.setdiff1d(np.arange(len(image)), np.concatenate(list(SHOWN.values())))
+    assert np.allclose(image[rest], 0.125)
+    assert np.allclose(image[SHOWN["tray"]], expected("tray", session.editable("tray")), rtol=3e-3)
+    assert np.allclose(image[SHOWN["wall"]], expected("wall", of_material(MATERIALS["wall"])), rtol=3e-3)
+    assert picture.is_settled
+
+
+def test_what_the_store_does_not_have_is_said(store: Store) -> None:
+    with pytest.raises(UserError, match="200"):
+        edited_picture(store, new_session(), lights=400)
+    other = Session.new("room", CAMERA, {}, size=(9, 9))
+    with pytest.raises(UserError, match="no transport of camera view, 9 x 9"):
+        edited_picture(store, other)
+    with pytest.raises(UserError, match="other terms"):
+        edited_picture(store, new_session(tray=model_named("phong")()))
+    with pytest.raises(UserError, match="unknown material"):
+        edited_picture(store, new_session(pot=MATERIALS["tray"]))
+    changed = new_session()
+    assert not changed.become(
+        "tray", MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.3, my=0.3, alpha=0.5),)})
+    )
+    with pytest.raises(UserError, match="other terms"):
+        edited_picture(store, changed)
+    changed.undo()
+    assert changed.become("tray", MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.5, my=0.5),)}))
+    assert edited_picture(store, changed).is_exact
+
+
+def test_the_documented_example_runs(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "editing.md").read_text("utf-8")
+    code = re.search(r"```python\n(.*?)```", page, re.DOTALL)
+    assert code is not None
+    assert len([line for line in code[1].splitlines() if line and not line.startswith("from")]) <= 10
+    monkeypatch.chdir(tmp_path)
+    store.close()
+    exec(code[1], {"SIZE": SIZE})
+    session = Session.open(tmp_path / "tray.edits.json")
+    image = read_image(tmp_path / "tray.exr").reshape(-1, 3)[SHOWN["tray"]]
+    assert np.allclose(image, expected("tray", session.editable("tray")), rtol=3e-3)
+    assert session.document.materials["tray"].curves

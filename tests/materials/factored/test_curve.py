@@ -1,0 +1,43 @@
+"""Curves: exact band means, values at angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
+
+
+def test_band_means_are_integrals() -> None:
+    bands = 128
+    edges = np.linspace(0, END_RAD, bands + 1)
+    means = Curve.of(np.cos).band_means(bands)
+    exact = (np.sin(edges[1:]) - np.sin(edges[:-1])) / (edges[1] - edges[0])
+    assert np.allclose(means, exact[:, None], rtol=1e-6)
+
+
+def test_a_moving_peak_does_not_pop() -> None:
+    """A peak narrower than a band keeps its sum over the bands wherever it is."""
+    sums = [
+        Curve.of(lambda x, at=at: np.exp(-(((x - at) / 0.004) ** 2))).band_means(64).sum() * END_RAD / 64
+        for at in np.linspace(0.5, 0.55, 41)
+    ]
+    assert np.ptp(sums) < 1e-6 * np.mean(sums)
+
+
+def test_channels_and_constant_ends() -> None:
+    curve = Curve.through(np.array([0.2, 0.4]), np.array([[1, 2, 3], [3, 2, 1.0]]))
+    assert np.allclose(curve.at(np.array([0.0, 0.3, 1.0])), [[1, 2, 3], [2, 2, 2], [3, 2, 1]], atol=1e-3)
+    assert np.array_equal(curve.at(np.array([1.6])), [[0, 0, 0]])
+
+
+def test_values_are_checked_and_read_only() -> None:
+    with pytest.raises(ValueError, match="finite RGB"):
+        Curve(np.zeros((7, 3)))
+    with pytest.raises(ValueError, match="finite RGB"):
+        Curve.constant(np.nan)
+    with pytest.raises(ValueError, match="do not divide"):
+        Curve.constant().band_means(100)
+    with pytest.raises(ValueError, match="read-only"):
+        Curve.constant().values[0] = 2
+    assert len(angles_rad()) == KNOTS + 1
