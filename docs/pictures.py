@@ -1,6 +1,7 @@
-"""Makes the pictures of the README from what the demo wrote.
+"""Makes the pictures of the README from what the demo wrote, and those of the built-in table scenes by path tracing.
 
 python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
+.venv/bin/python docs/pictures.py scenes
 """
 
 from __future__ import annotations
@@ -28,6 +29,19 @@ def main(demo: Path) -> None:
     save("fit.jpg", shown(demo / "materials" / "brushed_aluminium_polar.png"), width=1400)
 
 
+def scenes(samples: int = 1024) -> None:
+    """Path trace the scenes for editing by their cameras, 512x512."""
+    from lambent.bake.engine import engine
+    from lambent.bake.reference.path_traced import render_reference
+    from lambent.scenes import load_scene
+
+    engine()
+    for name in ("teatray", "earrings"):
+        scene = load_scene(f"builtin:{name}")
+        image, _ = render_reference(scene, scene.cameras[0], 512, 512, samples)
+        save(f"{name}.jpg", to_bytes(srgb_encode(filmic(image, scene.exposure_ev))), width=512)
+
+
 def shown(path: Path) -> np.ndarray:
     return to_bytes(read_encoded(path)[..., :3])
 
@@ -46,4 +60,7 @@ def save(name: str, picture: np.ndarray, width: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))
+    if sys.argv[1:] == ["scenes"]:
+        scenes()
+    else:
+        main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))

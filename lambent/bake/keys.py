@@ -10,7 +10,8 @@ from dataclasses import asdict
 import numpy as np
 
 from lambent.core.inputs import sha256_of
-from lambent.scenes.scene import Environment, ImageEnvironment, Scene
+from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene
 from lambent.scenes.textures import digest, parts
 
 
@@ -61,10 +62,12 @@ def light_inputs(scene: Scene) -> object:
 
 
 def environment_inputs(environment: Environment | None) -> object:
-    """The environment; an image counts by its content, wherever its file is."""
+    """The environment; an image counts by its content, wherever it comes from."""
     if environment is None:
         return None
     values: Mapping[str, object] = asdict(environment)
     if isinstance(environment, ImageEnvironment):
         values = {**values, "file": sha256_of(environment.file)}
+    elif isinstance(environment, ComputedEnvironment):
+        values = {**values, "image": key_of("computed", 1, lat_long_image(environment.name))}
     return [type(environment).__name__, values]

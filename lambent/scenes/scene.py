@@ -122,6 +122,13 @@ class ConstantEnvironment:
 
 
 @dataclass(frozen=True)
+class ComputedEnvironment:
+    """An interior made by code, by its name in `scenes.interiors`."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class PointLight:
     """Radiant intensity W/sr; `direction` and cone half-angles make it a spot."""
 
@@ -141,7 +148,7 @@ class DirectionalLight:
 
 
 Light = PointLight | DirectionalLight
-Environment = SunSky | ImageEnvironment | ConstantEnvironment
+Environment = SunSky | ImageEnvironment | ConstantEnvironment | ComputedEnvironment
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import pytest
 
 from lambent.bake.surfaces.atlas import PIECE_FACES, merged, object_records, separated, unwrap
 from lambent.bake.surfaces.texels import chart_labels, texels_of
+from lambent.core.geometry import cross_2d
 from lambent.scenes.geometry import sphere
 from lambent.scenes.scene import Scene, SceneObject
 from tests.bake.small_scenes import plane, room_with_step
@@ -109,3 +110,16 @@ def test_charts_are_told_apart() -> None:
     labels = chart_labels(arrays, texels_of(arrays, atlas.width, atlas.height))
     assert labels.shape == (atlas.height, atlas.width) and (labels == -1).any()
     assert len(np.unique(labels)) > 13, "two boxes of six sides, the lamp and the ball"
+
+
+def test_small_scenes_are_unwrapped_like_large_ones() -> None:
+    """A fine ball of 3 mm has the light map of one of 3 m."""
+    atlases = [
+        unwrap(Scene("ball", (SceneObject("ball", sphere(radius, 48, 24), "grey"),), {}), 128)
+        for radius in (3.0, 0.003)
+    ]
+    shares = []
+    for atlas in atlases:
+        corners = atlas.uv2["ball"][atlas.scene.objects[0].mesh.faces]
+        shares.append(np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])).sum() / 2)
+    assert shares[1] == pytest.approx(shares[0], rel=0.1) and shares[0] > 0.3

@@ -25,6 +25,7 @@ from lambent.materials.factored.of_models import editable
 from lambent.materials.models.phong import Phong
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import (
+    ComputedEnvironment,
     ConstantEnvironment,
     DirectionalLight,
     ImageEnvironment,
@@ -310,7 +311,8 @@ def test_a_change_of_the_environment(
 
 
 def test_kinds_of_environments_differ(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
-    environments = (None, scene.environment, SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0)))
+    computed = (ComputedEnvironment("gallery"), ComputedEnvironment("nave"))
+    environments = (None, scene.environment, SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0)), *computed)
     some = [keys(replace(scene, environment=environment)) for environment in environments]
     for i, one in enumerate(some):
         assert all(stale(one, other) == starting(one, SKY) for other in some[:i])

@@ -44,11 +44,15 @@ def unwrap(scene: Scene, resolution: int, progress: Progress = silent) -> Atlas:
     """
     pieces = [(o, part) for o in scene.objects for part in _pieces(o.mesh)]
     atlas = xatlas.Atlas()
+    # xatlas ignores triangles below 1.2e-7 of its units squared: a scene of centimetres is enlarged, without rounding.
+    unit = 2.0 ** max(0, np.ceil(-np.log2(np.ptp(scene.bounds, axis=0).max())))
     for o, part in pieces:
         vertices, faces = np.unique(o.mesh.faces[part], return_inverse=True)
         faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.uint32)
         try:
-            atlas.add_mesh(o.mesh.positions[vertices] * o.light_map_scale, faces, o.mesh.normals[vertices])
+            atlas.add_mesh(
+                o.mesh.positions[vertices] * np.float32(unit * o.light_map_scale), faces, o.mesh.normals[vertices]
+            )
         except (RuntimeError, ValueError) as error:
             raise UserError(f"object cannot be unwrapped ({error})", field=o.name) from error
     progress(0, 1, "unwrapping")

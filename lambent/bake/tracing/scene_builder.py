@@ -19,7 +19,17 @@ from lambent.bake.sky.daylight import sky_image
 from lambent.core.arrays import Floats
 from lambent.core.images import read_image
 from lambent.materials.measured.patch_sheet import Lookup
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Environment, Light, Scene, SceneObject, SunSky
+from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.scene import (
+    ComputedEnvironment,
+    ConstantEnvironment,
+    DirectionalLight,
+    Environment,
+    Light,
+    Scene,
+    SceneObject,
+    SunSky,
+)
 
 UV2_ATTRIBUTE = "vertex_uv2"
 
@@ -182,6 +192,8 @@ def environment_dict(environment: Environment) -> dict[str, Any]:
         image, scale, rotation_deg = np.full((8, 16, 3), environment.radiance, np.float32), 1.0, 0.0
     elif isinstance(environment, SunSky):
         image, scale, rotation_deg = sky_image(environment), 1.0, 0.0
+    elif isinstance(environment, ComputedEnvironment):
+        image, scale, rotation_deg = lat_long_image(environment.name), 1.0, 0.0
     else:
         image = read_image(environment.file)[..., :3].astype(np.float32)
         scale, rotation_deg = environment.scale, environment.rotation_deg

@@ -13,10 +13,11 @@ from lambent.scenes.geometry.grid import (
     turn,
 )
 from lambent.scenes.geometry.shapes import box, cushion, cylinder, extrusion, fan, lathe, patch, sphere, tube
-from lambent.scenes.geometry.teapot import teapot
+from lambent.scenes.geometry.teapot import teapot, teapot_parts
 
 __all__ = [
     "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
     "patch", "placed", "positions_under", "signed_volume", "smooth_curve", "sphere", "tangents_along", "teapot",
+    "teapot_parts",
     "transformed", "tube", "turn",
 ]  # fmt: skip

@@ -109,12 +109,18 @@ def teapot(length: float = 0.25, steps: int = 12) -> Mesh:
 
     `steps` quads along each side of a patch. Brushed round the body, and along handle and spout.
     """
-    sheets = []
+    return merge(teapot_parts(length, steps).values())
+
+
+def teapot_parts(length: float = 0.25, steps: int = 12) -> dict[str, Mesh]:
+    """The parts of `teapot`: rim, body, knob, lid, bottom, handle, spout."""
+    parts: dict[str, list[Mesh]] = {}
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, steps + 1)] * 2, indexing="ij"), axis=-1)
     for part, members in patches().items():
-        for points in members:
+        for i, points in enumerate(members):
             positions, normals, along, across = evaluate(points, steps)
-            sheets.append(grid(positions, normals, across if part in TURNED else along, uv))
+            name = "knob" if part == "lid" and i < 4 else part
+            parts.setdefault(name, []).append(grid(positions, normals, across if part in TURNED else along, uv))
     matrix = np.eye(4)
     matrix[:3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) * length / LENGTH  # z up to y up
-    return transformed(merge(sheets), matrix)
+    return {name: transformed(merge(sheets), matrix) for name, sheets in parts.items()}

@@ -18,11 +18,12 @@ from types import ModuleType
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes
+from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
-from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.scene import MaterialTextures, Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
@@ -65,7 +66,13 @@ def read_geometry(name: str, scene_file: Path, scene_files: SceneFiles) -> Conte
     if name.startswith(BUILTIN_PREFIX):
         module = import_module(f"{builtin.__name__}.{_builtin_name(name)}")
         make: Callable[[], tuple[SceneObject, ...]] = module.objects
-        return Contents(make())
+        textured: Callable[[], dict[str, tuple[Material, MaterialTextures]]] = getattr(module, "textured", dict)
+        surfaces = textured()
+        return Contents(
+            make(),
+            materials={name: material for name, (material, _) in surfaces.items()},
+            textures={name: textures for name, (_, textures) in surfaces.items()},
+        )
     path = scene_files.path(name, scene_file, "geometry")
     return _contents(path, scene_files.root)
 
@@ -97,6 +104,9 @@ def _format_of(path: Path) -> ModuleType:
 
 
 def _builtin_name(text: str) -> str:
-    """The name behind "builtin:"; a built-in scene is a .toml and a module with `objects()` in `scenes/builtin`."""
+    """The name behind "builtin:"; a built-in scene is a .toml and a module in `scenes/builtin`.
+
+    The module has `objects()`, and `textured()` if some of its materials have textures.
+    """
     names = sorted(Path(f.name).stem for f in files(builtin).iterdir() if f.name.endswith(TOML))
     return known("built-in scene", text.removeprefix(BUILTIN_PREFIX), names)

@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple, triple
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, PointLight, SunSky
+from lambent.scenes.interiors import INTERIORS
+from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
 
 FORMAT = "lambent-scene"
 
@@ -80,6 +81,23 @@ class ConstantSection(Section):
 
     def environment(self) -> ConstantEnvironment:
         return ConstantEnvironment(self.radiance)
+
+
+class ComputedSection(Section):
+    """An interior of `scenes.interiors`."""
+
+    kind: Literal["computed"]
+    name: str
+
+    @field_validator("name")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        if name not in INTERIORS:
+            raise ValueError(f"there is no computed environment {name!r}, but {', '.join(sorted(INTERIORS))}")
+        return name
+
+    def environment(self) -> ComputedEnvironment:
+        return ComputedEnvironment(self.name)
 
 
 class ObjectSection(Section):
@@ -185,6 +203,9 @@ class ReflectorSection(Section):
         return plane
 
 
+EnvironmentSection = SunSkySection | ImageSection | ConstantSection | ComputedSection
+
+
 class SceneDocument(Section):
     """A whole scene.toml."""
 
@@ -193,7 +214,7 @@ class SceneDocument(Section):
     name: str = "scene"
     geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] = 0.0
-    environment: Annotated[SunSkySection | ImageSection | ConstantSection, Field(discriminator="kind")] | None = None
+    environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
     measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table it scatters by in bakes

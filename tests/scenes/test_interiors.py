@@ -1,0 +1,72 @@
+"""Computed environments: images of rooms, with small bright lights, that scenes name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.latlong import lat_long_direction, lat_long_directions
+from lambent.scenes import load_scene
+from lambent.scenes.interiors import HEIGHT, INTERIORS, lat_long_image
+from lambent.scenes.scene import ComputedEnvironment
+
+HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
+
+
+@pytest.mark.parametrize("name", INTERIORS)
+def test_interiors_are_lit_by_small_bright_lights(name: str) -> None:
+    image = lat_long_image(name)
+    assert image.shape == (HEIGHT, 2 * HEIGHT, 3) and image.dtype == np.float32
+    assert np.isfinite(image).all() and image.min() > 0
+    theta = (np.arange(HEIGHT) + 0.5) / HEIGHT * np.pi
+    weight = np.broadcast_to(np.sin(theta)[:, None], image.shape[:2])
+    bright = image.mean(axis=-1) > 5
+    light = image.mean(axis=-1) * weight
+    assert light[bright].sum() > 0.7 * light.sum()
+    assert weight[bright].sum() < 0.06 * weight.sum()
+    assert image.max() > 1e4 * image.min()
+
+
+@pytest.mark.parametrize("name", INTERIORS)
+def test_the_image_is_the_mean_of_the_interior(name: str) -> None:
+    """Texels that no edge crosses are the radiance in their direction: the image is oriented as core.latlong."""
+    at_centre = INTERIORS[name](lat_long_directions(HEIGHT, 2 * HEIGHT))
+    near = np.isclose(lat_long_image(name), at_centre, rtol=0.05, atol=1e-3).all(axis=-1)
+    assert near.mean() > 0.95
+
+
+def test_every_direction_meets_a_wall() -> None:
+    axes = np.concatenate([np.eye(3), -np.eye(3), lat_long_direction([0, 1.0, np.pi], [0.0, 2.0, 1.0])])
+    for interior in INTERIORS.values():
+        assert np.isfinite(interior(axes)).all() and interior(axes).shape == axes.shape
+
+
+def test_a_scene_names_an_interior(tmp_path: Path) -> None:
+    file = tmp_path / "scene.toml"
+    materials = "[materials]\n" + "".join(
+        f"{n} = {{ kd = 0.5 }}\n" for n in ("white", "red", "green", "black", "metal")
+    )
+    file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "nave"\n{materials}')
+    assert load_scene(file).environment == ComputedEnvironment("nave")
+    file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "crypt"\n{materials}')
+    with pytest.raises(UserError, match=r"crypt.*gallery, nave"):
+        load_scene(file)
+
+
+def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
+    from lambent.bake.sky.cube import environment_cube
+    from lambent.core.cubemap import face_directions
+    from lambent.core.directions import normalize
+
+    n = 48
+    cube = environment_cube(ComputedEnvironment("gallery"), n).astype(float)
+    w = normalize(face_directions(n))
+    brightest = w.reshape(-1, 3)[np.argmax(cube.sum(axis=-1))]
+    assert brightest @ normalize(np.array([0.72, 0.64, -0.28])) > 0.995  # the skylight
+    windows = (w[..., 0] < -0.8) & (np.abs(w[..., 1]) < 0.3)
+    opposite = (w[..., 0] > 0.8) & (np.abs(w[..., 1]) < 0.3)
+    assert cube[windows].mean() > 10 * cube[opposite].mean()
