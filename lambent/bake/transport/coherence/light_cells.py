@@ -1,0 +1,54 @@
+"""Cells of distant lights: each is the directions that are nearest to its light, a Voronoi cell on the sphere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats, Indices
+
+TABLE = 512  # texels of an edge of the octahedral map by which cells are looked up
+
+
+def neighbours(directions: Floats) -> NDArray[np.int64]:
+    """Lights whose cells touch that of each light, (M, K): a light itself fills the places that are left in its row.
+
+    Two cells touch where the Delaunay triangulation, of points on a sphere their convex hull, has an edge.
+
+    Parameters
+    ----------
+    directions : (M, 3)
+        Unit directions of the lights, all different; at least four, not all in one plane.
+    """
+    from scipy.spatial import ConvexHull
+
+    corners = ConvexHull(np.asarray(directions, float)).simplices
+    both = np.concatenate([corners[:, [i, j]] for i in range(3) for j in range(3) if i != j])
+    edges = np.unique(both, axis=0)
+    count = np.bincount(edges[:, 0], minlength=len(directions))
+    table = np.repeat(np.arange(len(directions))[:, None], count.max(), axis=1)
+    place = np.arange(len(edges)) - np.repeat(np.cumsum(count) - count, count)
+    table[edges[:, 0], place] = edges[:, 1]
+    return table
+
+
+class CellTable:
+    """Which light's cell a direction lies in, by an octahedral map."""
+
+    def __init__(self, directions: Floats) -> None:
+        from scipy.spatial import cKDTree
+
+        u, v = np.meshgrid(*[(np.arange(TABLE) + 0.5) / TABLE * 2 - 1] * 2)
+        z = 1 - np.abs(u) - np.abs(v)
+        fold = np.maximum(-z, 0)
+        texels = np.stack([u - np.copysign(fold, u), v - np.copysign(fold, v), z], axis=-1).reshape(-1, 3)
+        unit = texels / np.linalg.norm(texels, axis=1, keepdims=True)
+        self._cell = cKDTree(directions).query(unit)[1]
+
+    def at(self, w: Floats) -> Indices:
+        """Lights (n,) in whose cells the directions w (n, 3), of any length, lie."""
+        x, y, z = (w / np.abs(w).sum(axis=1, keepdims=True)).T
+        fold = np.maximum(-z, 0)
+        u, v = x + np.copysign(fold, x), y + np.copysign(fold, y)
+        column, row = (np.clip(((c + 1) / 2 * TABLE).astype(np.int64), 0, TABLE - 1) for c in (u, v))
+        return np.asarray(self._cell[row * TABLE + column])

@@ -1,0 +1,56 @@
+"""The order in which pixels are evaluated, and from which evaluated pixels each of them is predicted.
+
+Pixels of one pass do not depend on each other (Ben-Artzi 2007, section 8.6.1 and figure 8.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from lambent.core.arrays import Indices
+
+SPACING = 16  # pixels of the coarsest grid
+OUTSIDE = -1
+
+
+@dataclass(frozen=True)
+class Pass:
+    """Pixels (n,), row * width + column, and those that inform them (n, k), OUTSIDE where there is none; k may be 0."""
+
+    pixels: Indices
+    informers: Indices
+    finest: bool = False  # whether the grid ends here
+
+
+def scanline(width: int, height: int) -> Iterator[Pass]:
+    """Informed by the left, the upper and the upper left pixel: by diagonals, whose pixels are independent."""
+    row, column = np.divmod(np.arange(width * height), width)
+    yield _pass(np.flatnonzero((row == 0) | (column == 0)), (), width, height)
+    for diagonal in range(2, width + height - 1):
+        r = np.arange(max(1, diagonal - width + 1), min(height, diagonal))
+        yield _pass(r * width + diagonal - r, ((0, -1), (-1, -1), (-1, 0)), width, height)
+
+
+def grid(width: int, height: int) -> Iterator[Pass]:
+    """From coarse to fine: the centres of squares of evaluated pixels, then the middles of their sides."""
+    row, column = np.divmod(np.arange(width * height), width)
+    yield _pass(np.flatnonzero((row % SPACING == 0) & (column % SPACING == 0)), (), width, height)
+    step = SPACING // 2
+    while step:
+        r, c = row % (2 * step), column % (2 * step)
+        diagonal = ((-step, -step), (-step, step), (step, -step), (step, step))
+        yield _pass(np.flatnonzero((r == step) & (c == step)), diagonal, width, height)
+        straight = ((-step, 0), (0, -step), (0, step), (step, 0))
+        sides = np.flatnonzero(((r == 0) & (c == step)) | ((r == step) & (c == 0)))
+        yield _pass(sides, straight, width, height, finest=step == 1)
+        step //= 2
+
+
+def _pass(pixels: Indices, offsets: tuple[tuple[int, int], ...], width: int, height: int, finest: bool = False) -> Pass:
+    shift = np.array(offsets, np.int64).reshape(-1, 2)
+    row, column = pixels[:, None] // width + shift[:, 0], pixels[:, None] % width + shift[:, 1]
+    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    return Pass(pixels, np.where(inside, row * width + column, OUTSIDE), finest)

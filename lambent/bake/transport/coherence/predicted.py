@@ -1,0 +1,175 @@
+"""Visibility of distant lights, predicted from pixels nearby, and shadow rays where the prediction is in doubt.
+
+Ben-Artzi 2007, chapter 8 (Ben-Artzi, Ramamoorthi and Agrawala 2006). It traces few rays, but a ray of a modern tracer
+costs less than a prediction (docs/performance.md): `bands.visibility` traces all of them. Lights are at infinity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.transport.coherence.light_cells import neighbours
+from lambent.bake.transport.coherence.order import OUTSIDE, Pass, grid, scanline
+from lambent.bake.transport.coherence.shadow_rays import ShadowRays
+from lambent.bake.transport.coherence.votes import Same, Votes, Warped
+from lambent.bake.transport.view_points import ViewPoints
+from lambent.core.arrays import Flags, Floats, Indices
+
+FEWEST_INFORMERS = 3  # that a prediction needs
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How visibility is predicted and corrected.
+
+    Attributes
+    ----------
+    grid : bool
+        Order of the pixels: coarse to fine, or by scanlines.
+    warp : bool
+        Whether blockers are turned to where they stand for the next pixel, or stay in the same light's cell.
+    boundary : bool
+        What is traced first: lights next to one of other visibility, or those on which informing pixels disagree.
+    sparing : bool
+        Whether tracing spreads only to neighbours predicted otherwise, and not at all on the finest grid.
+    """
+
+    grid: bool
+    warp: bool
+    boundary: bool
+    sparing: bool = False
+
+
+VARIANTS = {
+    "SWB": Variant(grid=False, warp=True, boundary=True),
+    "GWB": Variant(grid=True, warp=True, boundary=True),
+    "GNB": Variant(grid=True, warp=False, boundary=True),
+    "GWU": Variant(grid=True, warp=True, boundary=False),
+    "GNU": Variant(grid=True, warp=False, boundary=False),
+    "OPT": Variant(grid=True, warp=False, boundary=False, sparing=True),
+}
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Visibility of M lights from P points.
+
+    Attributes
+    ----------
+    seen : (P, M) bool
+        False also where a light is behind the surface.
+    facing : (P, M) bool
+        Pairs that count: the light is before the surface.
+    traced : int
+        Shadow rays, all of them of pairs that count.
+    ray_seconds : float
+        That those rays took.
+    """
+
+    seen: Flags
+    facing: Flags
+    traced: int
+    ray_seconds: float
+
+    @property
+    def traced_percent(self) -> float:
+        return 100 * self.traced / max(1, int(self.facing.sum()))
+
+    def wrong_percent(self, truth: Flags) -> float:
+        """Per cent of the pairs that count whose visibility is not that of (P, M) `truth`."""
+        return 100 * int((self.facing & (self.seen != truth)).sum()) / max(1, int(self.facing.sum()))
+
+
+def predicted_visibility(
+    scene: Any, points: ViewPoints, directions: Floats, width: int, height: int, variant: Variant
+) -> Predicted:
+    """Visibility of lights of unit `directions` (M, 3) from the points of a view of `width` x `height` pixels."""
+    run = _Run(scene, points, directions, width * height, variant)
+    for step in grid(width, height) if variant.grid else scanline(width, height):
+        run.evaluate(step)
+    return Predicted(run.seen, run.rays.facing, run.rays.count, run.rays.seconds)
+
+
+class _Run:
+    def __init__(self, scene: Any, points: ViewPoints, directions: Floats, pixels: int, variant: Variant) -> None:
+        self.rays = ShadowRays(scene, points, directions)
+        self.seen = np.zeros(self.rays.facing.shape, bool)
+        self._variant, self._object, self._neighbours = variant, points.object, neighbours(directions)
+        self._point = np.full(pixels + 1, OUTSIDE)  # the last one is of pixels outside the picture
+        self._point[points.pixel] = np.arange(len(points))
+        self._votes: Votes = Warped(points.p, directions) if variant.warp else Same()
+
+    def evaluate(self, step: Pass) -> None:
+        """Find the visibility of the pixels of a pass."""
+        point, informers = self._point[step.pixels], self._point[step.informers]
+        shown = point != OUTSIDE
+        point, informers = point[shown], informers[shown]
+        alike = (step.informers[shown] == OUTSIDE) | (
+            (informers != OUTSIDE) & (self._object[informers] == self._object[point][:, None])
+        )
+        informed = alike.all(axis=1) & ((informers != OUTSIDE).sum(axis=1) >= FEWEST_INFORMERS)
+        self._trace_all(point[~informed])
+        if informed.any():
+            self._predict(point[informed], informers[informed], floods=not (self._variant.sparing and step.finest))
+
+    def _trace_all(self, point: Indices) -> None:
+        row, light = np.nonzero(self.rays.facing[point])
+        self._trace(point[row], light)
+
+    def _trace(self, point: Indices, light: Indices) -> Flags:
+        """Whether lights are seen, (n,), kept for the pixels that follow."""
+        if self._variant.warp:
+            blocked, place = self.rays.blockers(point, light)
+            self._votes.keep(point[blocked], light[blocked], place[blocked])
+        else:
+            blocked = self.rays.blocked(point, light)
+        self.seen[point, light] = ~blocked
+        return ~blocked
+
+    def _predict(self, point: Indices, informers: Indices, floods: bool) -> None:
+        facing = self.rays.facing[point]
+        votes, voters = self._votes.count(self.seen, self.rays.facing, point, informers)
+        if self._variant.boundary:
+            estimate = facing & (votes == 0)
+            doubted = facing & self._at_boundary(estimate, facing)
+            uncertain = np.zeros_like(doubted)
+        else:
+            estimate = facing & (votes < voters)
+            agreed = ((votes == 0) | (votes >= voters)) & (voters >= FEWEST_INFORMERS)
+            doubted = uncertain = facing & ~agreed
+        self.seen[point] = estimate
+        self._correct(point, facing, estimate, uncertain, doubted, floods)
+
+    def _at_boundary(self, estimate: Flags, facing: Flags) -> Flags:
+        """Lights beside one of the other visibility; in scanlines also beside one behind the surface (8.7.4)."""
+        found = np.zeros_like(estimate)
+        for beside in self._neighbours.T:
+            if self._variant.grid:
+                found |= (estimate != estimate[:, beside]) & facing[:, beside]
+            else:
+                found |= (estimate != estimate[:, beside]) | ~facing[:, beside]
+        return found
+
+    def _correct(
+        self, point: Indices, facing: Flags, estimate: Flags, uncertain: Flags, doubted: Flags, floods: bool
+    ) -> None:
+        """Trace doubted lights, and on from each that is not as estimated, or had no estimate, to its neighbours."""
+        left = facing.copy()
+        row, light = np.nonzero(doubted)
+        while len(row):
+            left[row, light] = False
+            seen = self._trace(point[row], light)
+            if not floods:
+                return
+            wrong = uncertain[row, light] | (seen != estimate[row, light])
+            row, light, seen = row[wrong], light[wrong], seen[wrong]
+            beside = self._neighbours[light]
+            next_to = left[row[:, None], beside]
+            if self._variant.sparing:
+                next_to &= estimate[row[:, None], beside] != seen[:, None]
+            at, k = np.nonzero(next_to)
+            keys = np.unique(row[at] * estimate.shape[1] + beside[at, k])
+            row, light = np.divmod(keys, estimate.shape[1])

@@ -1,0 +1,183 @@
+"""Visibility by coherence: its order, its cells, and its predictions against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.bake.transport.coherence.light_cells import CellTable, neighbours
+from lambent.bake.transport.coherence.order import OUTSIDE, grid, scanline
+from lambent.core.arrays import Flags
+from lambent.core.camera import Camera
+from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_directions
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.triangle_lights import TriangleLights, environment_triangles
+from tests.bake.small_scenes import GREY
+
+SIZE = 65
+# Most per cent of wrong predictions, and of rays traced, where 65 pixels show a ball and a box on a floor.
+LIMITS = {
+    "SWB": (0.005, 50), "GWB": (0.1, 33), "GNB": (0.15, 33), "GWU": (0.02, 28), "GNU": (0.01, 28), "OPT": (0.02, 20),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [grid, scanline])
+@pytest.mark.parametrize(("width", "height"), [(65, 33), (50, 37), (3, 40), (1, 1)])
+def test_every_pixel_is_evaluated_once_after_its_informers(order: Any, width: int, height: int) -> None:
+    done = np.zeros(width * height, int)
+    for step in order(width, height):
+        inside = step.informers[step.informers != OUTSIDE]
+        assert done[inside].all()
+        at, of = (np.stack(np.divmod(pixels, width)) for pixels in (step.pixels, step.informers))
+        if width == 65 and order is grid and step.informers.size:
+            middle = (step.informers != OUTSIDE).all(axis=1)
+            assert (of[:, middle].mean(axis=-1) == at[:, middle]).all()
+        done[step.pixels] += 1
+    assert (done == 1).all()
+
+
+def test_the_finest_grid_has_half_of_the_pixels() -> None:
+    steps = list(grid(65, 65))
+    assert [step.finest for step in steps] == [False] * (len(steps) - 1) + [True]
+    assert len(steps[-1].pixels) == 65 * 65 // 2
+    assert len(steps[0].pixels) == 25 and steps[0].informers.shape == (25, 0)
+
+
+def some_directions(count: int) -> np.ndarray:
+    return normalize(np.random.default_rng(3).normal(size=(count, 3)))
+
+
+def test_neighbours_are_the_cells_that_touch() -> None:
+    """A triangulation of a sphere has 3 M - 6 edges; cells side by side in the table are joined by one of them."""
+    directions = some_directions(80)
+    table, cells = neighbours(directions), CellTable(directions)
+    joined = np.zeros((80, 80), bool)
+    joined[np.arange(80)[:, None], table] = True
+    assert (joined == joined.T).all()
+    np.fill_diagonal(joined, False)
+    assert joined.sum() == 2 * (3 * 80 - 6)
+    assert (cells.at(3 * directions) == np.arange(80)).all()
+    cell = cells.at(lat_long_directions(720, 1440).reshape(-1, 3)).reshape(720, 1440)
+    for a, b in ((cell[1:], cell[:-1]), (cell[:, 1:], cell[:, :-1])):
+        assert (joined[a, b] | (a == b)).mean() > 0.9999  # cells that meet in a point excepted
+    touching = np.zeros_like(joined)
+    touching[cell[1:], cell[:-1]] = touching[cell[:, 1:], cell[:, :-1]] = True
+    assert ((touching | touching.T) & joined).sum() > 0.97 * joined.sum()  # others share less than a texel
+
+
+def test_cells_are_those_of_the_nearest_light() -> None:
+    directions, w = some_directions(80), some_directions(5000)
+    nearest = np.argmax(w @ directions.T, axis=1)
+    assert (CellTable(directions).at(w) == nearest).mean() > 0.97
+
+
+def ball_and_box() -> Scene:
+    objects = {
+        "floor": patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)),
+        "ball": placed(sphere(0.5, 96, 48), (0.3, 0.5, 0)),
+        "box": placed(box((0.5, 0.5, 0.5)), (-0.6, 0.25, 0.4)),
+    }
+    return Scene("still life", tuple(SceneObject(n, mesh, "grey") for n, mesh in objects.items()), {"grey": GREY})
+
+
+@pytest.fixture(scope="module")
+def view() -> tuple[Any, Any, TriangleLights, Flags]:
+    """The traced scene, the points of its view, whose corners show no surface, the lights, and which are seen."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+    from lambent.bake.transport.bands import visibility
+    from lambent.bake.transport.view_points import view_points
+
+    w = lat_long_directions(48, 96).reshape(-1, 3)
+    weight = np.repeat(-np.diff(np.cos(np.linspace(0, np.pi, 49))), 96) * np.pi / 48
+    lights = environment_triangles(w, weight, 1 + np.clip(w @ [[2.0], [3.0], [1.0]], 0, None) * [1, 1, 1], 100)
+    builder = SceneBuilder(ball_and_box())
+    traced = builder.build()
+    points = view_points(builder, traced, Camera("above", (0.5, 3.6, 3.4), (0, 0.2, 0)), SIZE, SIZE)
+    assert 0.8 * SIZE**2 < len(points) < SIZE**2
+    words, m = visibility(traced, points, lights), np.arange(len(lights))
+    truth = ((words[m // 32] >> (m % 32)[:, None].astype(np.uint32)) & 1 == 1).T
+    return traced, points, lights, truth
+
+
+def test_rays_are_those_of_the_transport(view: Any) -> None:
+    from lambent.bake.transport.coherence.shadow_rays import ShadowRays
+
+    traced, points, lights, truth = view
+    rays = ShadowRays(traced, points, lights.centres)
+    point, light = np.nonzero(rays.facing)
+    blocked, place = rays.blockers(point, light)
+    assert (blocked == ~truth[rays.facing]).all() and blocked.mean() > 0.05
+    assert (rays.blocked(point, light) == blocked).all()
+    assert rays.count == 2 * rays.facing.sum()
+    offset = place[blocked] - points.p[point[blocked]]
+    far = np.linalg.norm(offset, axis=1) > 0.01
+    assert np.allclose(normalize(offset[far]), lights.centres[light[blocked]][far], atol=5e-3)
+    towards = points.flat * np.sign((points.flat * points.n).sum(axis=1))[:, None]
+    assert (rays.facing == (towards @ lights.centres.T.astype(np.float32) > 0)).all()
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_predictions_are_wrong_no_more_often_than_stated(view: Any, name: str) -> None:
+    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
+
+    traced, points, lights, truth = view
+    found = predicted_visibility(traced, points, lights.centres, SIZE, SIZE, VARIANTS[name])
+    most_wrong, most_traced = LIMITS[name]
+    assert not (found.seen & ~found.facing).any()
+    assert found.wrong_percent(truth) < most_wrong
+    assert 5 < found.traced_percent < most_traced
+    assert found.wrong_percent(~truth) > 90
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_where_no_pixel_informs_another_all_is_traced_and_exact(view: Any, name: str) -> None:
+    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
+
+    traced, points, lights, truth = view
+    alone = replace(points, object=np.arange(len(points)))
+    found = predicted_visibility(traced, alone, lights.centres, SIZE, SIZE, VARIANTS[name])
+    assert (found.traced_percent, found.wrong_percent(truth)) == (100.0, 0.0)
+
+
+def test_sparing_saves_rays_and_flooding_finds_what_no_informer_knows(view: Any) -> None:
+    """With `sparing` fewer rays; without neighbours to go on to, fewer still, and more errors."""
+    from lambent.bake.transport.coherence import predicted
+    from lambent.bake.transport.coherence.predicted import VARIANTS, predicted_visibility
+
+    traced, points, lights, truth = view
+
+    def of(name: str) -> Any:
+        return predicted_visibility(traced, points, lights.centres, SIZE, SIZE, VARIANTS[name])
+
+    full, sparing = of("GNU"), of("OPT")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(predicted, "neighbours", lambda w: np.arange(len(w))[:, None])
+        stopped = of("GNU")
+    assert stopped.traced < sparing.traced < full.traced
+    assert full.wrong_percent(truth) < sparing.wrong_percent(truth) < stopped.wrong_percent(truth)
+
+
+def test_warped_blockers_stand_where_the_next_point_sees_them() -> None:
+    """A blocker one metre above a point is at 45 degrees for a point one metre aside."""
+    from lambent.bake.transport.coherence.votes import Warped
+
+    directions = normalize(np.array([[0, 1, 0], [-1, 1, 0], [1, 1, 0], [0, -1, 0], [0, 0.3, 1], [0, 0.3, -1.0]]))
+    p = np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 0, 0]], np.float32)
+    seen, facing = np.ones((4, 6), bool), np.ones((4, 6), bool)
+    warped = Warped(p, directions)
+    warped.keep(np.array([0]), np.array([0]), np.array([[0, 1, 0]], np.float32))
+    seen[0, 0] = False
+    votes, voters = warped.count(seen, facing, np.array([1, 2, 3]), np.array([[0, 3], [0, OUTSIDE], [0, 0]]))
+    assert votes.tolist() == [[0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [2, 0, 0, 0, 0, 0]]
+    assert voters[:, 0].tolist() == [2, 1, 2]
+    seen[1, 1] = False  # a point that has been told of a blocker tells of it, from where it really stands
+    votes, _ = warped.count(seen, facing, np.array([2]), np.array([[1]]))
+    assert votes.tolist() == [[0, 0, 1, 0, 0, 0]]
