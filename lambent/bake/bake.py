@@ -85,6 +85,9 @@ def bake(
     for kind in quality.changes:
         known("kind of artefact", kind, kinds)
     order = in_order(kinds, kinds if only is None else only)
+    of_views = [kind for kind in only or () if getattr(kinds[kind], "OF_VIEWS", False)]
+    if of_views and not views:
+        raise UserError("is baked for views alone", field=of_views[0], hint="give `views` to bake() in Python")
     if not scene.objects:
         raise UserError("scene has no objects", field=scene.name)
     scene = replace(scene, textures=prepared(scene.textures))

@@ -7,6 +7,7 @@ A kind of artefact is a module of `artefacts/`, found by its file:
     SETTINGS = {...}             optional: a dataclass for each QualityName
     def keys(context)            {array name: key} of every array it writes, samples kept for a later bake included
     def bake(context)            writes the stale arrays
+    OF_VIEWS = True              optional: nothing is baked without views
     def describe(context)        optional: writes documents, which have no keys; called by every bake
 """
 

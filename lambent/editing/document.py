@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError, invalid
-from lambent.core.files import read_bytes
+from lambent.core.inputs import read_bytes
 from lambent.editing.operators import Operator, Region
 from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad

@@ -66,8 +66,8 @@ def _fold(out, spans, pairs, values, idle, edited, taps):  # type: ignore[no-unt
             for n in range(spans[first + i, 0], spans[first + i, 1]):
                 j, k = pairs[n, edited], pairs[n, 1 - edited]
                 row[j, 0] += idle[k, 0] * float_of_half(values[n, 0])  # type: ignore[call-arg]
-                row[j, 1] += idle[k, 1] * float_of_half(values[n, 1])  # type: ignore[call-arg]
-                row[j, 2] += idle[k, 2] * float_of_half(values[n, 2])  # type: ignore[call-arg]
+                row[j, 1] += idle[k, 1] * float_of_half(values[n, 1])
+                row[j, 2] += idle[k, 2] * float_of_half(values[n, 2])
             _to_wavelets(row, before, taps)
         for j in range(bands):
             for c in range(3):

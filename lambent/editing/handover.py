@@ -20,7 +20,7 @@ from lambent.materials.factored.of_lobes import lobe_terms, of_material, prefixe
 from lambent.materials.factored.terms import Editable
 from lambent.materials.fitting.account import evaluate
 from lambent.materials.fitting.fit import fit
-from lambent.materials.fitting.metrics import errors_and_shares, light_ratios
+from lambent.materials.measured.metrics import errors_and_shares, light_ratios
 from lambent.materials.measured.protocol import MeasuredSamples
 from lambent.materials.models import model_named
 from lambent.materials.models.kurt import Kurt

@@ -23,7 +23,8 @@ from pydantic import BaseModel, ValidationError
 from lambent.core.camera import Camera
 from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
-from lambent.core.files import sha256_of, write_text
+from lambent.core.files import write_text
+from lambent.core.inputs import sha256_of
 from lambent.core.plain import Triple, triple
 from lambent.editing.document import (
     LARGEST,

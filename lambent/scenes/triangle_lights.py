@@ -59,8 +59,11 @@ def joined(parts: Sequence[TriangleLights]) -> TriangleLights:
     if not parts:
         return TriangleLights(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
     cones = [p.cones if len(p.cones) else np.tile(EVERYWHERE, (len(p), 1)) for p in parts]
-    arrays = [np.concatenate([getattr(p, name) for p in parts]) for name in ("corners", "centres", "light", "near")]
-    return TriangleLights(*arrays, np.concatenate(cones) if any(len(p.cones) for p in parts) else np.zeros((0, 5)))
+    corners, centres, light, near = (
+        np.concatenate([getattr(p, name) for p in parts]) for name in ("corners", "centres", "light", "near")
+    )
+    with_cones = any(len(p.cones) for p in parts)
+    return TriangleLights(corners, centres, light, near, np.concatenate(cones) if with_cones else np.zeros((0, 5)))
 
 
 def small_lights(lights: Sequence[Light]) -> TriangleLights:
@@ -68,13 +71,17 @@ def small_lights(lights: Sequence[Light]) -> TriangleLights:
     places, values, near, cones = [], [], [], []
     for light in lights:
         here = isinstance(light, PointLight)
-        places.append(light.position if isinstance(light, PointLight) else -normalize(np.asarray(light.direction, float)))
+        places.append(
+            light.position if isinstance(light, PointLight) else -normalize(np.asarray(light.direction, float))
+        )
         values.append(light.intensity if isinstance(light, PointLight) else light.irradiance)
         near.append(here)
         cones.append(_cone(light) if isinstance(light, PointLight) else EVERYWHERE)
     centres = np.array(places, float).reshape(-1, 3)
     corners = np.repeat(centres[:, None], 3, axis=1)
-    return TriangleLights(corners, centres, np.array(values, float).reshape(-1, 3), np.array(near, bool), np.array(cones))
+    return TriangleLights(
+        corners, centres, np.array(values, float).reshape(-1, 3), np.array(near, bool), np.array(cones)
+    )
 
 
 def _cone(light: PointLight) -> tuple[float, ...]:

@@ -32,7 +32,7 @@ To edit the materials of a view, with the image's size in its key:
     view/KEY/view_points/theta_o           (P,) float32, angle between the viewer and the shading normal, radians
     view/KEY/view_points/backdrop          (height, width, 3) float16, W/(sr m^2), what is seen without reflection: the
                                            environment, and what surfaces emit
-    view/KEY/visibility/LIGHTS             (ceil(M / 32), P) uint32, bit m % 32 of word m // 32: whether light m is seen.
+    view/KEY/visibility/LIGHTS             (ceil(M / 32), P) uint32, bit m % 32 of word m // 32: is light m seen?
                                            LIGHTS is the number of lights asked for, meta["lights"] that found, M
     view/KEY/transport/LIGHTS/MATERIAL/TERM/rows    (J, 3, Q) float16: direct light of one term of a material by wavelet
                                            (core.wavelets) of its curve, at the Q points of the material in their order.
@@ -187,7 +187,9 @@ def baked_views(store: Store) -> dict[str, ViewRecord]:
 def transport_lights(store: Store, camera: Camera, width: int, height: int) -> list[int]:
     """Numbers of lights, rising, for which the whole transport of a view is in the store."""
     start = f"{VIEW}/{view_key(camera, width, height)}/transport/"
-    names = [a.name.removeprefix(start) for a in store.artefacts("transport") if a.name.startswith(start) and a.complete]
+    names = [
+        a.name.removeprefix(start) for a in store.artefacts("transport") if a.name.startswith(start) and a.complete
+    ]
     return sorted(int(name.removesuffix("/terms")) for name in names if name.endswith("/terms"))
 
 

@@ -62,7 +62,6 @@ def of_terms(*terms: str) -> tuple[str, ...]:
     return tuple(SEEN.name("transport", f"{n}/{part}") for n in (400,) for part in ("terms", *terms))
 
 
-
 Answers = dict[str, tuple[Any, tuple[str, ...]]]  # by field: a value that it has not yet, and prefixes of stale arrays
 VIEW = Camera("view", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
 
@@ -101,9 +100,7 @@ LOBE: Answers = {
 IN_VIEWS = {part: POINTS if part in ("normal", "direction", "opacity") else () for part in CHANNELS}
 IN_VIEWS["diffuse"] = IN_VIEWS["specular"] = (SEEN.name("transport", "400/worn/"), *of_terms())
 TEXTURES: Answers = {
-    **{
-        part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), (*LIT, *IN_VIEWS[part])) for part in CHANNELS
-    },
+    **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), (*LIT, *IN_VIEWS[part])) for part in CHANNELS},
     "cutoff": (0.25, LOOK),
 }
 TEXTURE: Answers = {
@@ -201,7 +198,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "sharp": (512, NOTHING),  # no term has one narrow curve alone; see below
         "sharp_of_two": (64, of_terms("mirror/0/", "sheet/2/")),
         "smooth": (32, of_terms("grey/0/", "sheet/0/", "sheet/1/", "worn/0/")),
-        "smooth_of_two": (16, of_terms("mirror/0/", "sheet/2/")),
+        "smooth_of_two": (8, of_terms("mirror/0/", "sheet/2/")),
     },
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
 }
@@ -365,4 +362,8 @@ def test_every_input_is_answered_for() -> None:
     kinds = found()
     assert kinds.keys() == SETTINGS.keys()
     for kind, of in SETTINGS.items():
-        assert {field.name for field in fields(kinds[kind].SETTINGS["preview"])} == of.keys() if of else not hasattr(kinds[kind], "SETTINGS"), kind
+        assert (
+            {field.name for field in fields(kinds[kind].SETTINGS["preview"])} == of.keys()
+            if of
+            else not hasattr(kinds[kind], "SETTINGS")
+        ), kind

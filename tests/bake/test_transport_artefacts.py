@@ -12,6 +12,7 @@ from lambent.bake.artefacts.transport import Settings
 from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
 from lambent.bake.view import View
+from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.core.progress import Cancelled
 from lambent.core.wavelets import transformed
@@ -183,3 +184,8 @@ def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, t
     assert store.read(name("transport", "60/other/0/rows")).shape == (16, 3, 0)
     assert store.read(name("transport", "60/other/1/spans")).shape == (0, 2)
     assert np.isfinite(picture(store, 60, editables(more))).all()
+
+
+def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="transport: is baked for views alone"):
+        bake(scene, tmp_path / "s", only={"transport"})

@@ -71,7 +71,7 @@ def test_curves_without_light_give_none() -> None:
 
 @pytest.mark.slow
 def test_a_switch_is_quick() -> None:
-    """20,000 points with 1400 pairs each, as many as the views of decisions.md have, in less than 0.1 s on two cores."""
+    """20,000 points with 1400 pairs each: less than 0.1 s on two cores that are free."""
     transport, idle = sparse(20_000, (128, 128), 1867), np.random.default_rng(3).random((128, 3))
     folded(*transport, idle, 0, 128)
     seconds = []

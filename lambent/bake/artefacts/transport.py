@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 KIND = "transport"
 NEEDS = ("view_points", "visibility")
+OF_VIEWS = True
 REVISION = 1
 POINTS, BYTES = 1 << 15, 1 << 31  # a chunk, and the memory that pairs of bands may take meanwhile
 ENTRIES = 1 << 16  # of pairs, a chunk
@@ -41,9 +42,9 @@ class Settings:
 
 
 SETTINGS = {
-    QualityName.preview: Settings(256, 64, 128, 32),
-    QualityName.normal: Settings(256, 64, 128, 32),
-    QualityName.final: Settings(256, 128, 256, 64),
+    QualityName.preview: Settings(256, 64, 128, 16),
+    QualityName.normal: Settings(256, 64, 128, 16),
+    QualityName.final: Settings(256, 128, 256, 32),
 }
 
 
@@ -171,7 +172,13 @@ class _Baking:
         return (self.points.diffuse if is_diffuse else self.points.specular)[some]
 
     def _begin(
-        self, store: Store, array: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: str, growing: bool = False
+        self,
+        store: Store,
+        array: str,
+        shape: tuple[int, ...],
+        chunks: tuple[int, ...],
+        dtype: str,
+        growing: bool = False,
     ) -> Writer:
         meta = {**self.part.view.meta, **self.part.said(self.scale)}
         name = self.part.name(array)
@@ -187,7 +194,7 @@ class _Baking:
 
 
 def _points_at_once(bands: list[Any]) -> int:
-    return max(1, min(POINTS, BYTES // (12 * bands[0].count * bands[1].count)))
+    return max(1, min(POINTS, BYTES // (12 * int(bands[0].count) * int(bands[1].count))))
 
 
 def _append(writer: Writer, begin: int, entries: np.ndarray) -> None:

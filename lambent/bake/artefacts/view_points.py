@@ -11,6 +11,7 @@ from lambent.bake.view import View
 
 KIND = "view_points"
 NEEDS = ()
+OF_VIEWS = True
 REVISION = 1
 PARTS = ("pixel", "object", "theta_o")
 BACKDROP = "backdrop"
@@ -25,7 +26,7 @@ def points_key(context: BakeContext, view: View) -> str:
 
 
 def keys(context: BakeContext) -> dict[str, str]:
-    found = {}
+    found: dict[str, str] = {}
     for view in context.views:
         key = points_key(context, view)
         found |= {view.name(KIND, part): key for part in PARTS}
@@ -40,7 +41,8 @@ def bake(context: BakeContext) -> None:
         context.progress(i, len(context.views), f"view {view.camera.name}")
         points = context.view_tracer.points(view)
         theta_o = np.arctan2(np.hypot(points.wo[:, 0], points.wo[:, 1]), points.wo[:, 2])
-        for part, array in zip(PARTS, (points.pixel.astype(np.uint32), points.object.astype(np.uint32), theta_o)):
+        arrays = points.pixel.astype(np.uint32), points.object.astype(np.uint32), theta_o
+        for part, array in zip(PARTS, arrays, strict=True):
             context.put(KIND, view.name(KIND, part), array, {**view.meta, "objects": objects})
         backdrop = np.minimum(context.view_tracer.backdrop(view), np.finfo(np.float16).max).astype(np.float16)
         context.put(KIND, view.name(KIND, BACKDROP), backdrop, view.meta)

@@ -101,7 +101,12 @@ def transport(
 
 
 def pair_transport(
-    points: ViewPoints, lights: TriangleLights, seen: NDArray[np.uint32], term: Term, bands: Sequence[Bands], least: float
+    points: ViewPoints,
+    lights: TriangleLights,
+    seen: NDArray[np.uint32],
+    term: Term,
+    bands: Sequence[Bands],
+    least: float,
 ) -> Pairs:
     """Transport of a term with two curves as `transport`, without the entries of a sum below `least`.
 
@@ -114,7 +119,7 @@ def pair_transport(
     kept = dr.compress(values.x + values.y + values.z > dr.opaque(mi.Float, least))
     point, pair = np.divmod(np.array(kept), np.uint32(counts[0] * counts[1]))
     entries = np.stack(np.divmod(pair, np.uint32(counts[1])), axis=1).astype(np.uint8)
-    return Pairs(np.bincount(point, minlength=len(points)), entries, array_of(dr.gather(mi.Vector3f, values, kept)))
+    return Pairs(np.bincount(point, minlength=len(points)), entries, array_of(dr.gather(mi.Vector3f, total, kept)))
 
 
 def _traced(
@@ -125,11 +130,11 @@ def _traced(
     total = dr.zeros(mi.Float, int(np.prod(counts)) * 3 * pixels)
     axes = [vectors(mi.Vector3f, axis) for axis in (points.t, points.b, points.n)]
     wo = tuple(vectors(mi.Vector3f, points.wo))
-    mirrored = -1.0 if term.side == "transmission" else 1.0
+    mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
 
     # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
     def local(w: Any) -> Any:
-        return dr.dot(w, axes[0]), dr.dot(w, axes[1]), dr.dot(w, axes[2]) * mirrored
+        return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
 
     def steps(w: Any) -> list[Any]:
         """The angles of a direction, in bands."""
@@ -170,7 +175,10 @@ def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
     if len(lights.cones):
         inner, outer = lights.cones[:, 3], lights.cones[:, 4]
         arrays["axes"] = vectors(mi.Vector3f, lights.cones[:, :3])
-        arrays["cone"] = [mi.Float(outer.astype(np.float32)), mi.Float(np.maximum(outer - inner, 1e-4).astype(np.float32))]
+        arrays["cone"] = [
+            mi.Float(outer.astype(np.float32)),
+            mi.Float(np.maximum(outer - inner, 1e-4).astype(np.float32)),
+        ]
     return arrays
 
 

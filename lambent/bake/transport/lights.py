@@ -11,7 +11,14 @@ from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats
 from lambent.core.geometry import triangle_areas
 from lambent.core.latlong import lat_long_directions
-from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, joined, small_lights, surface_triangles
+from lambent.scenes.scene import Scene
+from lambent.scenes.triangle_lights import (
+    TriangleLights,
+    environment_triangles,
+    joined,
+    small_lights,
+    surface_triangles,
+)
 
 ROWS = 256  # of the environment's samples; the bright ones are replaced by the finer ones within them
 LEAST_FINE, MOST_FINE = 4, 32  # rows of these in one of those: as many as the environment's picture has
@@ -53,12 +60,12 @@ def environment_samples(environment: Any) -> Samples:
         light[row] = np.einsum("rcgx,r->cx", found.reshape(n, 2 * ROWS, n, 3), weight[fine])
     bright = light.sum(axis=-1) > BRIGHT * light.sum()
     parts = [(lat_long_directions(ROWS, 2 * ROWS)[~bright], np.repeat(coarse_weight, (~bright).sum(axis=1)))]
-    for row in np.flatnonzero(bright.any(axis=1)):
+    for row in map(int, np.flatnonzero(bright.any(axis=1))):
         fine = slice(row * n, (row + 1) * n)
         inside = np.broadcast_to(bright[row].repeat(n), (n, columns))
         parts.append((_directions(rows, columns, fine)[inside], np.repeat(weight[fine], inside.sum(axis=1))))
     w, weights = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    many = np.count_nonzero(~bright)
+    many = int(np.count_nonzero(~bright))
     fine_radiance = radiance_from(environment, w[many:]) if len(w) > many else np.zeros((0, 3))
     return w, weights, np.concatenate([light[~bright] / weights[:many, None], fine_radiance])
 
@@ -73,7 +80,7 @@ def _directions(rows: int, columns: int, some: slice) -> Floats:
     theta = (np.arange(some.start, some.stop) + 0.5) / rows * np.pi
     phi = (np.arange(columns) + 0.5) / columns * (2 * np.pi) - np.pi
     across = np.stack([np.sin(phi), np.zeros(columns), -np.cos(phi)], axis=-1)
-    return across * np.sin(theta)[:, None, None] + np.cos(theta)[:, None, None] * np.array([0.0, 1.0, 0.0])
+    return np.asarray(across * np.sin(theta)[:, None, None] + np.cos(theta)[:, None, None] * np.array([0.0, 1.0, 0.0]))
 
 
 def lamp_triangles(corners: Floats, radiance: Floats, count: int) -> TriangleLights:

@@ -14,7 +14,7 @@ HALF_MAX = float(np.finfo(np.float16).max)
 
 
 def scale_of(lights: TriangleLights) -> float:
-    """What stored values are multiples of, W/(sr m^2): half floats reach from 1e-9 to 250 times all the light there is."""
+    """What stored values are multiples of, W/(sr m^2): half floats reach from 1e-9 to 250 times all the light."""
     most = lights.light.max(axis=1, initial=0.0) * np.where(lights.near, 2 * np.pi, 1.0)
     return max(float(most.sum()), 1e-30) / STEPS
 

@@ -56,7 +56,7 @@ def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str
 
     def term(name: str, scale: Floats, factors: tuple[Factor, ...], *, grazing: bool = False) -> Term:
         quotient = Microfacets(1.0, lobe.alpha, highlight.cos_h, grazing)
-        return Term(f"{prefix}{name}", quotient, triple(scale), factors, side=lobe.side)
+        return Term(f"{prefix}{name}", quotient, triple(scale), factors, side=lobe.kind)
 
     if len(highlight.factors) == 2:
         sign = -1 if across else 1

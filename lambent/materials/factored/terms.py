@@ -16,7 +16,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
 from lambent.materials.bsdf import components
-from lambent.materials.document import Side
+from lambent.materials.document import Kind
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.lobes import NUMPY, Vector
@@ -44,7 +44,7 @@ class Factor:
 class Term:
     """One product. `scale` is f_q; `factors` are f_A and f_B; `viewer` is f_o, over theta_o.
 
-    Directions of a transmission term are on both sides; wi is mirrored at the surface before anything is evaluated.
+    Before anything is evaluated, wi of a transmission term is mirrored at the surface, that of a retro term about n.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Term:
     scale: Triple = (1.0, 1.0, 1.0)
     factors: tuple[Factor, ...] = ()
     viewer: str | None = None  # name of its curve
-    side: Side = "reflection"
+    side: Kind = "reflection"
 
     def __post_init__(self) -> None:
         assert len(self.factors) <= MOST_CURVES, "a term has one curve or two besides that of the viewer"
@@ -103,10 +103,11 @@ class Editable:
         return np.where(seen[..., None], value, 0.0)
 
 
-def upper_pair(wi: Vector, wo: Vector, side: Side, ops: Any) -> tuple[tuple[Vector, Vector], Any]:
-    """wi and wo on the upper side, and whether they are on the sides of the surface that `side` scatters between."""
+def upper_pair(wi: Vector, wo: Vector, side: Kind, ops: Any) -> tuple[tuple[Vector, Vector], Any]:
+    """wi, as a term of this side sees it, and wo on the upper side; and whether it scatters between them."""
     seen = wi[2] * wo[2] < 0 if side == "transmission" else wi[2] * wo[2] > 0
-    return ((wi[0], wi[1], ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2]))), seen
+    x, y = (-wi[0], -wi[1]) if side == "retro" else wi[:2]
+    return ((x, y, ops.abs(wi[2])), (wo[0], wo[1], ops.abs(wo[2]))), seen
 
 
 def _rgb(value: Any) -> Floats:
