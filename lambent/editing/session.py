@@ -44,6 +44,7 @@ from lambent.materials.document import Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import editable, same_quotients
+from lambent.materials.factored.opening import editable_of
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
 from lambent.materials.models.model import Model
@@ -51,6 +52,10 @@ from lambent.materials.models.model import Model
 Factorise = Callable[[Path], Editable]
 Start = Material | Model | Path  # a material document, a model with its parameters, or a table to factorise
 ALL: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)
+
+
+def _curves_of(file: Path) -> Editable:
+    return editable_of(file).editable
 
 
 class Session:
@@ -66,13 +71,13 @@ class Session:
     folder
         Where its relative file names begin.
     factorise
-        Makes the terms and curves of a table's file; needed where a material begins as a table.
+        Makes the terms and curves of a table's file; by default `editable_of`.
     """
 
     def __init__(self, document: SessionDocument, folder: Path = Path(), factorise: Factorise | None = None) -> None:
         self.history = History(document)
         self.folder = folder
-        self._factorise = factorise
+        self._factorise = factorise or _curves_of
         self._originals: dict[str, tuple[BaseModel, Editable]] = {}
 
     @classmethod
@@ -275,8 +280,6 @@ class Session:
         if isinstance(source, OfModel):
             return editable(model_named(source.model)(**source.parameters))
         file = self.path(source.file)
-        if self._factorise is None:
-            raise UserError("nothing here makes curves of a table", file=file, hint="fit it with lobes first")
         if not file.is_file():
             raise UserError("no such file", file=file, field="source.file")
         if sha256_of(file) != source.sha256:

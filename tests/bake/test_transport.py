@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
 
@@ -194,3 +194,17 @@ def test_light_through_a_sheet_comes_from_behind_it() -> None:
 def test_solid_angles_of_small_triangles_do_not_cancel() -> None:
     corners = normalize(np.array([[1, 0, 0], [1, 1e-4, 0], [1, 0, 1e-4]], float))
     assert solid_angles(corners) == pytest.approx(0.5e-8, rel=1e-6)
+
+
+def test_retro_lobes_see_the_light_turned_about_the_normal() -> None:
+    """On a free floor a retro lobe shows what the same lobe about the mirror direction shows under turned light."""
+    floor = Scene("floor", (SceneObject("floor", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "grey"),), {"grey": GREY})
+    lights = environment_triangles(*environment(), 200)
+    half_turn = np.array([-1.0, 1.0, -1.0])
+    turned = replace(lights, corners=lights.corners * half_turn, centres=lights.centres * half_turn)
+    lobe = Lobe(mx=0.15, my=0.15, r0=0.5)
+    about_light = of_material(Material(lobes=(lobe.model_copy(update={"retro": True}),)))
+    about_mirror = of_material(Material(lobes=(lobe,)))
+    found = view(floor, lights).picture(about_light, 128, 32)
+    assert np.allclose(found, view(floor, turned).picture(about_mirror, 128, 32), rtol=1e-3, atol=1e-5)
+    assert not np.allclose(found, view(floor, lights).picture(about_mirror, 128, 32), rtol=0.1)

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from lambent.core import exr, rgbe
 from lambent.core.colour import luminance
@@ -58,6 +59,8 @@ def sound() -> tuple[Sound, ...]:
     """A sound folder for every reader and each of its forms."""
     found = [Sound(name, {"a": content}, "a", "a", use_table) for name, contents in measured_fuzz.seeds().items()
              for content in contents]  # fmt: skip
+    factors = _factors()
+    found += [Sound("homomorphic factors", factors, "alpha", file, use_table) for file in factors]
     found += [_alone("material document", _material(), use_material), _alone("published fits", _fits(), use_fits)]
     found += [_alone(name, content, use_picture) for name, content in _pictures().items()]
     scenes = {
@@ -90,6 +93,15 @@ def sound() -> tuple[Sound, ...]:
               "store journal": "geometry/faces/journal"}  # fmt: skip
     found += [Sound(name, store, "", file, use_store) for name, file in stores.items()]
     return tuple(found)
+
+
+def _factors() -> Files:
+    """The scales of homomorphic factors, and their two textures."""
+    across = np.linspace(0.1, 0.9, 16)
+    texels = np.round(255 * np.stack([np.add.outer(across, across) / 2] * 3, axis=-1)).astype(np.uint8)
+    stream = io.BytesIO()
+    Image.fromarray(texels).save(stream, "PNG")
+    return {"alpha": b"0.5\n.25\n1e-1\n", "velvetp.png": stream.getvalue(), "velvetq.png": stream.getvalue()}
 
 
 def scene_formats() -> set[str]:

@@ -26,8 +26,8 @@ import numpy as np
 
 from lambent.bake.bsdfs.material_plugin import Turned, brushing_angle
 from lambent.bake.engine import once_per_variant
+from lambent.bake.tracing.array_ops import array_ops
 from lambent.core.progress import Progress, silent
-from lambent.materials.lobes import ArrayOps
 from lambent.materials.measured.half_vector_grid import GridShape, HalfVectorGrid
 from lambent.materials.measured.patch_sheet import Lookup, PatchSheet, lookup_of
 from lambent.materials.measured.protocol import MeasuredTable
@@ -66,10 +66,7 @@ def _key(name: str) -> str:
 @once_per_variant
 def register_table_plugin() -> None:
     """Choose the engine and make `lambent_table` known to it; further calls cost nothing."""
-    ops = ArrayOps(
-        dr.exp, dr.log, dr.sqrt, dr.sin, dr.cos, dr.power, dr.abs, dr.maximum, dr.minimum, dr.select, dr.cbrt, dr.atan2,
-        dr.floor, lambda table, index: dr.gather(mi.Float, table, mi.UInt32(index)), mi.Int32,
-    )  # fmt: skip
+    ops = array_ops()
 
     class TableBSDF(mi.BSDF):  # type: ignore[misc]
         """Component 0 reflects; component 1, where the table has it, transmits."""

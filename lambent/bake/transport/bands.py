@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import array_of, has_holes, hidden, in_shadow, leaving, vectors
 from lambent.bake.transport.overlaps import in_order, share_below
 from lambent.bake.transport.view_points import ViewPoints
@@ -129,7 +130,7 @@ def _traced(
     counts, pixels = [b.count for b in bands], len(points)
     total = dr.zeros(mi.Float, int(np.prod(counts)) * 3 * pixels)
     axes = [vectors(mi.Vector3f, axis) for axis in (points.t, points.b, points.n)]
-    wo = tuple(vectors(mi.Vector3f, points.wo))
+    wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
     mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
 
     # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
@@ -148,7 +149,7 @@ def _traced(
     def weight(w: Any) -> Any:
         """rho_q cos of a direction on the side that the term scatters from."""
         wi = local(w)
-        quotient = term.quotient.evaluate(wi, wo, dr)
+        quotient = term.quotient.evaluate(wi, wo, ops)
         value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
         return value * wi[2]
 
