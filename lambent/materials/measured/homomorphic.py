@@ -33,11 +33,8 @@ NAME = "homomorphic factors"
 LIMIT_BYTES = 1 << 16
 KINDS = ("P and Q", "P, Q and a highlight", "a highlight alone")
 EVEN = 0.02  # of the textures' range: how far they may be from round and still count as isotropic
-_NUMBER = rb"[ \t]*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?[ \t]*"
-_ALPHA = re.compile(rb"\s*" + rb"\n".join([_NUMBER] * 3) + rb"\s*\Z")
-_FULL = re.compile(
-    rb"[^\n]*[A-Za-z][^\n]*\n[ \t]*[0-2][ \t]*\n" + rb"[ \t]".join([_NUMBER] * 3) + rb"\n" + _NUMBER + rb"\s*\Z"
-)
+_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_LONGEST_NUMBER = 40  # characters: the pattern takes the square of them to refuse one
 _SAMPLES = 20_000
 
 
@@ -47,7 +44,21 @@ def recognise(head: bytes, size: int) -> bool:
     if text is None or size > LIMIT_BYTES:
         return False
     text = without_comments(text)
-    return _ALPHA.match(text) is not None or _FULL.match(text) is not None
+    return [_numbers(line) for line in text.strip().split(b"\n")] == [1, 1, 1] or _is_titled(text)
+
+
+def _is_titled(text: bytes) -> bool:
+    lines = text.strip().split(b"\n")
+    titled = (
+        len(lines) == 4 and re.search(rb"[A-Za-z]", lines[0]) is not None and lines[1].strip() in (b"0", b"1", b"2")
+    )
+    return titled and [_numbers(line) for line in lines[2:]] == [3, 1]
+
+
+def _numbers(line: bytes) -> int:
+    """How many numbers a line has; 0 where it has anything else."""
+    words = line.split()
+    return len(words) * all(len(word) <= _LONGEST_NUMBER and _NUMBER.fullmatch(word) is not None for word in words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +131,8 @@ def read(path: Path) -> HomomorphicTable:
     path = Path(path)
     text = without_comments(read_text(path, LIMIT_BYTES))
     notes: tuple[str, ...] = ("the absolute scale is the file's alpha",)
-    if _FULL.match(text):
-        lines = shown(text).split("\n")
+    if _is_titled(text):
+        lines = shown(text.strip()).split("\n")
         kind, alpha = int(lines[1]), np.array([float(word) for word in lines[2].split()])
         if kind == 2:
             raise UserError("holds no factors", file=path, field="line 2", got="kind 2, a highlight alone",
