@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import cast
 
 from lambent.bake import artefacts
+from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
 from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
@@ -49,6 +50,7 @@ def bake(
     probes: str | None = None,
     views: Sequence[View] = (),
     editables: Mapping[str, Editable] | None = None,
+    bounces: Bounces | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -70,6 +72,8 @@ def bake(
         alone, without light map and probes, `only` is {"transport"}.
     editables : mapping, optional
         Terms and curves of materials, by name, that are to be edited as something else than their documents say.
+    bounces : Bounces, optional
+        Of "interreflection": its series of bands, samples, and the materials that are not edited.
 
     Returns
     -------
@@ -107,8 +111,9 @@ def bake(
         if not resume:
             store.forget_all()
         context = BakeContext(
-            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {}
-        )
+            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
+            bounces or Bounces(),
+        )  # fmt: skip
         for kind in order:
             if context.stale(kind):
                 with _timed(context, kind):

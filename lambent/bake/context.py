@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
+from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
@@ -51,7 +52,8 @@ class BakeContext:
     """One bake: the scene as it is baked, the store that it goes to, and what several artefacts share.
 
     `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
-    them whole, as views show them. `editables` are terms of materials that are not those of their documents.
+    them whole, as views show them. `editables` are terms of materials that are not those of their documents;
+    `bounces` says what interreflections are baked for.
     """
 
     scene: Scene
@@ -64,6 +66,7 @@ class BakeContext:
     undivided: Scene | None = None
     views: Sequence[View] = ()
     editables: Mapping[str, Editable] = field(default_factory=dict)
+    bounces: Bounces = field(default_factory=Bounces)
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

@@ -31,6 +31,11 @@ class ViewTracer:
         self.points = cache(self._points)
         self.lights = cache(self._lights)
 
+    @property
+    def object_numbers(self) -> Any:
+        """mi.UInt32: number of the object by that of Mitsuba's shape."""
+        return self._builder.object_numbers()
+
     def _points(self, view: View) -> ViewPoints:
         """What the pixels of a view show."""
         return view_points(self._builder, self.scene, view.camera, view.width, view.height)

@@ -1,0 +1,50 @@
+"""What the interreflections of an edited view are baked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lambent.core.errors import UserError
+
+MOST_HITS = 6
+
+
+@dataclass(frozen=True)
+class Bounces:
+    """Series of bands, samples and materials of the interreflections of a view.
+
+    Attributes
+    ----------
+    series : tuple of int
+        Bands of curves with narrow peaks at the surface that a pixel shows, at the next one, ... (Ben-Artzi 2007,
+        section 5.2); 1 stands for the equivalent albedo. Its length is the number of surfaces on the longest path.
+    samples : int
+        Paths per pixel. More can be added to a store later.
+    fixed : frozenset of str
+        Materials that are not edited. They scatter as they are, and need neither bands nor tails of their own.
+    """
+
+    series: tuple[int, ...] = (64, 1, 1, 1)
+    samples: int = 1024
+    fixed: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        said = ",".join(map(str, self.series))
+        if not 2 <= len(self.series) <= MOST_HITS:
+            raise UserError("not a series of bounces", field="series", got=said, expected=f"2 to {MOST_HITS} numbers")
+        if any(n < 1 or n > 256 or n & (n - 1) for n in self.series):
+            raise UserError("not a series of bounces", field="series", got=said, expected="powers of two up to 256")
+        if any(n > 1 for n in self.series[2:]):
+            raise UserError(
+                "bands beyond the second surface", field="series", got=said, expected="1 from the third number on"
+            )
+        if self.samples < 1:
+            raise UserError("no samples", field="samples", got=self.samples, expected="at least 1")
+
+    @classmethod
+    def of_text(cls, text: str) -> tuple[int, ...]:
+        """The series of "64,1,1,1"."""
+        try:
+            return tuple(int(part) for part in text.split(","))
+        except ValueError:
+            raise UserError("not a series of bounces", field="series", got=text, expected="as in 64,1,1,1") from None

@@ -1,0 +1,127 @@
+"""Paths sorted into the bands of a term: T_jz of every point (Ben-Artzi 2007, eqs 6.1, 6.2).
+
+One thread is one point, which walks through its samples: no two threads add to one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.interreflection.paths import Paths
+from lambent.bake.tracing.array_ops import array_ops
+from lambent.bake.tracing.rays import array_of, vectors
+from lambent.bake.transport.bands import Bands
+from lambent.bake.transport.view_points import ViewPoints
+from lambent.materials.factored.albedo import is_flat
+from lambent.materials.factored.curve import END_RAD, KNOTS
+from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.terms import Editable, Term, upper_pair
+
+CHANNELS = 3
+
+
+class Sums:
+    """Sums over samples for a block of points: (points, tails, bands, 3) on the device."""
+
+    def __init__(self, points: int, tails: int, bands: int) -> None:
+        self.points, self.tails, self.bands = points, tails, bands
+        self.total = dr.zeros(mi.Float, points * tails * bands * CHANNELS)
+
+    def add(self, paths: Paths, points: ViewPoints, term: Term, bands: Sequence[Bands]) -> None:
+        """Add paths by the bands of a term's curves, numbered first curve first."""
+        wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
+        texture = vectors(mi.Vector3f, _texture(points, term))
+
+        def scattered(wi: Any) -> tuple[Any, Any]:
+            """rho_q cos of a direction in the local frame, and its band."""
+            (light, viewer), seen = upper_pair(tuple(wi), wo, term.side, ops)
+            quotient = term.quotient.evaluate(light, viewer, ops)
+            value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+            band = mi.UInt32(0)
+            for one in bands:
+                angle = angle_of(one.factor.over, light, viewer, one.factor.stretch, ops)
+                band = band * one.count + dr.minimum(mi.UInt32(angle * (one.count / END_RAD)), one.count - 1)
+            return dr.select(seen, value * texture * light[2], 0.0), band
+
+        self._add(paths, scattered)
+
+    def add_known(self, paths: Paths, points: ViewPoints, material: Editable) -> None:
+        """Add paths to the one band of a material whose curves stay as they are."""
+        wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
+        tables = {name: [mi.Float(column) for column in curve.values.T] for name, curve in material.curves.items()}
+
+        def scattered(wi: Any) -> tuple[Any, Any]:
+            total = mi.Vector3f(0.0)
+            for term in material.terms:
+                (light, viewer), seen = upper_pair(tuple(wi), wo, term.side, ops)
+                quotient = term.quotient.evaluate(light, viewer, ops)
+                value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+                value *= mi.Vector3f(*term.scale) * vectors(mi.Vector3f, _texture(points, term))
+                for factor in term.factors:
+                    value *= _looked_up(tables[factor.curve], angle_of(factor.over, light, viewer, factor.stretch, ops))
+                if term.viewer:
+                    value *= _looked_up(tables[term.viewer], angle_of("theta_o", light, viewer, 1.0, ops))
+                total += dr.select(seen, value * light[2], 0.0)
+            return total, mi.UInt32(0)
+
+        self._add(paths, scattered)
+
+    def _add(self, paths: Paths, scattered: Any) -> None:
+        assert paths.points == self.points
+        _sum(
+            self.total, paths.wi, paths.weight, paths.light, paths.tail, dr.opaque(mi.UInt32, paths.points),
+            dr.opaque(mi.UInt32, paths.samples), scattered, dr.arange(mi.UInt32, paths.points),
+            dr.opaque(mi.UInt32, self.tails), self.bands,
+        )  # fmt: skip
+        dr.eval(self.total)
+
+    def put(self, place: np.ndarray, light: np.ndarray) -> None:
+        """Begin with sums (N, 3) at places (point * tails + tail) * bands + band."""
+        at = mi.UInt32(place.astype(np.uint32)) * CHANNELS
+        for c in range(CHANNELS):
+            dr.scatter(self.total, mi.Float(np.ascontiguousarray(light[:, c], np.float32)), at + c)
+        dr.eval(self.total)
+
+    def entries(self, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (N,), numbers tail * bands + band (N,), and means (N, 3) where they are not 0, in this order."""
+        index = dr.arange(mi.UInt32, self.points * self.tails * self.bands)
+        value = dr.gather(mi.Vector3f, self.total, index)
+        kept = dr.compress(value.x + value.y + value.z > 0)
+        light = array_of(dr.gather(mi.Vector3f, self.total, kept)) / np.float32(samples)
+        point, code = np.divmod(np.array(kept), np.uint32(self.tails * self.bands))
+        return point, code, light
+
+
+def _texture(points: ViewPoints, term: Term) -> np.ndarray:
+    return points.diffuse if is_flat(term) else points.specular
+
+
+def _looked_up(table: Any, angle: Any) -> Any:
+    at = dr.clip(angle * (KNOTS / END_RAD), 0, KNOTS)
+    k = dr.minimum(mi.UInt32(at), KNOTS - 1)
+    share = at - mi.Float(k)
+    return mi.Vector3f(*(dr.gather(mi.Float, c, k) * (1 - share) + dr.gather(mi.Float, c, k + 1) * share for c in table))
+
+
+@dr.syntax
+def _sum(total, wi, weight, light, tail, points, samples, scattered, point, tails, bands):  # type: ignore[no-untyped-def]
+    s = mi.UInt32(0)
+    while s < samples:
+        at = s * points + point
+        one = dr.gather(mi.Float, weight, at)
+        if one > 0:
+            value, band = scattered(dr.gather(mi.Vector3f, wi, at))
+            value *= one
+            for arriving, number in zip(light, tail):
+                brought = value * mi.Vector3f(dr.gather(mi.Color3f, arriving, at))
+                z = dr.gather(mi.UInt32, number, at)
+                place = ((point * tails + z) * bands + band) * CHANNELS
+                some = dr.max(brought) > 0
+                for c in range(CHANNELS):
+                    dr.scatter_add(total, brought[c], place + c, some, mode=dr.ReduceMode.NoConflicts)
+        s += 1

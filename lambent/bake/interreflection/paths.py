@@ -1,0 +1,222 @@
+"""Paths that do not know the BRDFs: what light they bring to the pixel's surface, and over which tail.
+
+A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos: they scatter by the
+cosine, which cancels, so the path carries 1 until a light is seen. Lights are sampled at every surface and met by the
+path as well, balanced (Veach 1997). Surfaces that are not edited scatter by their own BRDF, into a slot of albedo 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.interreflection import directions
+from lambent.bake.tracing import rays
+from lambent.bake.tracing.rays import vectors
+from lambent.bake.transport.view_points import ViewPoints
+from lambent.store.tails import FIXED, Tails
+
+NONE = 255  # slot of a side that scatters nothing
+WAYS = 2  # in which a path gets its light: from a light that was sampled, and from one that it met
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What the objects of a scene are to a path.
+
+    Attributes
+    ----------
+    scene : mi.Scene
+    object_numbers : mi.UInt32
+        Number of the object by that of Mitsuba's shape.
+    slots : (objects, 2) int
+        Slot of each object for light that is reflected and that is transmitted, or NONE.
+    fixed : bool
+        Whether some objects have the slot of materials that are not edited.
+    """
+
+    scene: Any
+    object_numbers: Any
+    slots: np.ndarray
+    fixed: bool
+
+    @classmethod
+    def of(cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails) -> Surfaces:
+        """Of objects by their materials."""
+        number = {slot: k for k, slot in enumerate(tails.slots)}
+        edited = {material for material, side in tails.slots if side != FIXED}
+        fixed = number.get(("", FIXED), NONE)
+        rows = [
+            [number.get((material, side), NONE) if material in edited else fixed for side in ("reflection", "transmission")]
+            for material in worn
+        ]
+        return cls(scene, object_numbers, np.array(rows, np.uint32), any(row[0] == fixed != NONE for row in rows))
+
+
+@dataclass
+class Paths:
+    """Samples of so many points, sample after sample: number s * points + p.
+
+    Attributes
+    ----------
+    wi : mi.Vector3f
+        Direction in the point's frame.
+    weight : mi.Float
+        1 / density of the direction; 0 where it is left out.
+    light : list of mi.Color3f
+        What arrives by paths that meet 2, 3, ... surfaces, in WAYS each.
+    tail : list of mi.UInt32
+        The tail that each has.
+    """
+
+    points: int
+    samples: int
+    wi: Any
+    weight: Any
+    light: list[Any]
+    tail: list[Any]
+
+
+def trace(
+    surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tails, samples: int, seed: int
+) -> Paths:
+    """`samples` paths of each point.
+
+    Parameters
+    ----------
+    sides : (2,)
+        Shares of the directions that go through the surface, and back.
+    seed
+        The same seed gives the same paths.
+    """
+    count = len(points)
+    width = count * samples
+    sampler = rays.independent(seed, width)
+    at = dr.arange(mi.UInt32, width) % dr.opaque(mi.UInt32, count)
+    p, flat, wo, t, b, n = (
+        dr.gather(mi.Vector3f, vectors(mi.Vector3f, array), at)
+        for array in (points.p, points.flat, points.wo, points.t, points.b, points.n)
+    )
+    shares = directions.Sides(*(dr.opaque(mi.Float, float(share)) for share in sides))
+    wi, pdf = directions.sampled(wo, shares, sampler.next_1d(), sampler.next_1d(), sampler.next_2d())
+    ray = rays.leaving(surfaces.scene, p, flat, wi.x * t + wi.y * b + wi.z * n)
+    # Normals that lean may send a direction through the surface that it should leave.
+    meant = dr.dot(flat, t * wo.x + b * wo.y + n * wo.z) * wo.z
+    passes = dr.dot(flat, ray.d) * meant * wi.z <= 0
+    lights = WAYS * (tails.most_hits - 1)
+    light = [dr.zeros(mi.Float, lights * width) for _ in range(3)]
+    tail = dr.zeros(mi.UInt32, lights * width)
+    orders = [tails.begin(hits) + tails.multisets(hits).number_of_order for hits in range(2, tails.most_hits + 1)]
+    begin = np.cumsum([0, *(len(order) for order in orders)])
+    _follow(
+        surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, tail, surfaces.object_numbers,
+        mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 0])), mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 1])),
+        mi.UInt32(np.concatenate(orders).astype(np.uint32)), mi.UInt32(begin.astype(np.uint32)),
+        dr.opaque(mi.UInt32, len(tails.slots)), dr.opaque(mi.UInt32, tails.most_hits),
+        rays.has_holes(surfaces.scene), surfaces.fixed, bool((surfaces.slots[:, 1] != NONE).any()),
+    )  # fmt: skip
+    weight = dr.select((pdf > 0) & ~passes, dr.rcp(dr.maximum(pdf, 1e-20)), 0.0)
+    dr.eval(wi, weight, light, tail)
+
+    def part(array: Any, k: int) -> Any:
+        return dr.gather(type(array), array, dr.arange(mi.UInt32, width) + dr.opaque(mi.UInt32, k * width))
+
+    parts = [mi.Color3f(*(part(channel, k) for channel in light)) for k in range(lights)]
+    return Paths(count, samples, wi, weight, parts, [part(tail, k) for k in range(lights)])
+
+
+@dr.syntax
+def _follow(  # type: ignore[no-untyped-def]
+    scene, sampler, ray, active, light, tail, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
+    sheets,
+):  # fmt: skip
+    """Write the light of all path lengths: entry WAYS (hits - 2) + way of each sample."""
+    width = dr.width(ray.o)
+    index = dr.arange(mi.UInt32, width)
+    throughput = mi.Color3f(1.0)
+    depth, order = mi.UInt32(1), mi.UInt32(0)
+    origin, pdf, direct = dr.zeros(mi.SurfaceInteraction3f, width), mi.Float(0), mi.Bool(False)
+    ctx = mi.BSDFContext()
+    while active:
+        si = rays.intersect(scene, ray, active, holes)
+        emitter = si.emitter(scene)
+        met = active & (depth > 1)
+        ds = mi.DirectionSample3f(scene, si, origin)
+        other = scene.pdf_emitter_direction(origin, ds, met & ~direct)
+        share = dr.select(direct | (other <= 0), 1.0, pdf / (pdf + other))
+        brought = throughput * emitter.eval(si, met) * share
+        _write(light, tail, brought, _number(numbers, begins, depth - 1, order, met), 2 * depth - 3, index, width, met)
+
+        active &= si.is_valid() & (depth < most)
+        shape = dr.gather(mi.UInt32, objects, dr.reinterpret_array(mi.UInt32, si.shape), active)
+        slot, slot_through = dr.gather(mi.UInt32, reflect, shape, active), mi.UInt32(NONE)
+        if dr.hint(sheets, mode="scalar"):
+            slot_through = dr.gather(mi.UInt32, transmit, shape, active)
+        at = mi.SurfaceInteraction3f(si)
+        at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)  # by which a guided sky is sampled
+        up = mi.Vector3f(si.sh_frame.n)
+        up = dr.select(dr.dot(up, ray.d) > 0, -up, up)
+        both = (slot != NONE) & (slot_through != NONE)
+        through = (slot == NONE) | (both & (sampler.next_1d(active) < 0.5))
+        is_fixed = mi.Bool(False)
+        if dr.hint(fixed, mode="scalar"):
+            is_fixed = slot == members - 1
+
+        # A light that is sampled.
+        lit, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, active)
+        cosine = dr.dot(lit.d, up)
+        behind = cosine < 0
+        slot_lit = dr.select(behind, slot_through, slot)
+        f = mi.Color3f(dr.select(slot_lit != NONE, dr.abs(cosine) / dr.pi, 0.0))
+        pdf_lit = dr.abs(cosine) / dr.pi * dr.select(both, 0.5, 1.0)
+        if dr.hint(fixed, mode="scalar"):
+            known, pdf_known = si.bsdf(ray).eval_pdf(ctx, si, si.to_local(lit.d), active & is_fixed)
+            f, pdf_lit = dr.select(is_fixed, known, f), dr.select(is_fixed, pdf_known, pdf_lit)
+            slot_lit = dr.select(is_fixed, slot, slot_lit)
+        wrong = (dr.dot(si.n, lit.d) * dr.dot(si.n, ray.d) > 0) != behind
+        shines = active & (lit.pdf > 0) & (dr.max(f) > 0) & (is_fixed | ~wrong)
+        value *= throughput * f * dr.select(lit.delta, 1.0, lit.pdf / (lit.pdf + pdf_lit))
+        shines &= dr.max(value) > 0
+        shines &= ~rays.hidden(scene, si.p, si.n, lit.p, shines, holes)
+        _write(
+            light, tail, value, _number(numbers, begins, depth, order * members + slot_lit, shines), 2 * depth - 2,
+            index, width, shines,
+        )
+
+        # Where the path goes on.
+        local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d(active))
+        pdf = local.z / dr.pi * dr.select(both, 0.5, 1.0)
+        down = dr.select(through, -1.0, 1.0)
+        d = mi.Frame3f(up).to_world(mi.Vector3f(local.x, local.y, local.z * down))
+        active &= is_fixed | ((slot != NONE) | (slot_through != NONE))
+        active &= is_fixed | (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * down < 0)
+        direct = mi.Bool(False)
+        throughput *= dr.select(both & ~is_fixed, 2.0, 1.0)
+        order = order * members + dr.select(through & ~is_fixed, slot_through, slot)
+        if dr.hint(fixed, mode="scalar"):
+            bs, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(), sampler.next_2d(), active & is_fixed)
+            d = dr.select(is_fixed, si.to_world(bs.wo), d)
+            pdf = dr.select(is_fixed, bs.pdf, pdf)
+            direct = is_fixed & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            throughput *= dr.select(is_fixed, weight, mi.Color3f(1.0))
+            active &= ~is_fixed | ((bs.pdf > 0) & (dr.max(weight) > 0))
+        origin = mi.SurfaceInteraction3f(at)
+        ray = rays.leaving(scene, si.p, si.n, d)
+        depth += 1
+
+
+def _number(numbers: Any, begins: Any, met: Any, order: Any, active: Any) -> Any:
+    """Number of the tail that met so many surfaces in this order."""
+    return dr.gather(mi.UInt32, numbers, dr.gather(mi.UInt32, begins, met - 1, active) + order, active)
+
+
+def _write(light: Any, tail: Any, value: Any, number: Any, entry: Any, index: Any, width: Any, active: Any) -> None:
+    at = entry * width + index
+    for c in range(3):
+        dr.scatter(light[c], value[c], at, active)
+    dr.scatter(tail, number, at, active)

@@ -1,0 +1,105 @@
+"""What light has met before it reaches the surface that a pixel shows: the tails of paths, by number.
+
+    B(x) = sum over bands j and tails z of  T_jz(x) c_j d_z        (Ben-Artzi 2007, eq. 6.6)
+
+A tail lists the surfaces beyond the first. Each is a slot, a side of a material, and counts by its equivalent albedo; the
+order does not matter, so a tail is a multiset of slots. In a slowly decaying series the surface next to the viewer's
+counts by bands of its curves instead: such a tail is a band of a term and the multiset of what follows (6.9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.core.multisets import Multisets
+
+FIXED = "fixed"  # side of the slot of all materials that are not edited: its albedo is 1, their light is in T
+Slot = tuple[str, str]  # material, and side: reflection, transmission or FIXED
+
+
+@dataclass(frozen=True)
+class SecondBands:
+    """Bands of a term's curves at the second surface: `counts` of each of its factors, numbered first factor first."""
+
+    material: str
+    term: int
+    counts: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        return int(np.prod(self.counts, dtype=int))
+
+
+@dataclass(frozen=True)
+class Tails:
+    """The tails of paths that meet 2 to `most_hits` surfaces, the shortest first.
+
+    Attributes
+    ----------
+    slots : tuple of (material, side)
+    most_hits : int
+        Surfaces on the longest path, that of the pixel included.
+    second : tuple of SecondBands
+        Empty where the second surface counts by its albedo as well. A term of no curves has one band; one of the
+        material "" stands for all that are not edited.
+    """
+
+    slots: tuple[Slot, ...]
+    most_hits: int
+    second: tuple[SecondBands, ...] = ()
+
+    def __len__(self) -> int:
+        return self.begin(self.most_hits + 1)
+
+    def multisets(self, hits: int) -> Multisets:
+        """The multisets of a tail of a path that meets `hits` surfaces."""
+        return Multisets(len(self.slots), hits - 2 if self.second else hits - 1)
+
+    def begin(self, hits: int) -> int:
+        """Number of the first tail of paths that meet `hits` surfaces."""
+        return sum(self.bands_of_second * len(self.multisets(n)) for n in range(2, hits))
+
+    @property
+    def bands_of_second(self) -> int:
+        return sum(one.size for one in self.second) if self.second else 1
+
+    @cached_property
+    def hits(self) -> NDArray[np.int64]:
+        """(Z,) surfaces on the path of each tail, that of the pixel included."""
+        numbers = range(2, self.most_hits + 1)
+        return np.repeat(numbers, [self.begin(n + 1) - self.begin(n) for n in numbers])
+
+    @cached_property
+    def band_of_second(self) -> NDArray[np.int64]:
+        """(Z,) number of the band of the second surface, of all terms' bands in their order; 0 where it has none."""
+        parts = [np.repeat(range(self.bands_of_second), len(self.multisets(n))) for n in range(2, self.most_hits + 1)]
+        return np.concatenate(parts)
+
+    @cached_property
+    def exponents(self) -> NDArray[np.int64]:
+        """(Z, slots): how often each slot counts by its albedo."""
+        numbers = range(2, self.most_hits + 1)
+        parts = [np.tile(self.multisets(n).exponents, (self.bands_of_second, 1)) for n in numbers]
+        return np.concatenate(parts)
+
+    def weights(self, albedos: Floats, second: Floats | None = None) -> Floats:
+        """(Z, 3) factor d_z of each tail: albedos (slots, 3) to their powers, times the bands' coefficients (W, 3)."""
+        powers = np.prod(np.asarray(albedos, float)[None] ** self.exponents[:, :, None], axis=1)
+        return np.asarray(powers if second is None else powers * second[self.band_of_second])
+
+    def said(self) -> dict[str, Any]:
+        """For JSON; `Tails.of` is the inverse."""
+        second = [[one.material, one.term, list(one.counts)] for one in self.second]
+        return {"slots": [list(slot) for slot in self.slots], "most_hits": self.most_hits, "second": second}
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any]) -> Tails:
+        second = tuple(SecondBands(name, term, tuple(counts)) for name, term, counts in said["second"])
+        return cls(tuple((name, side) for name, side in said["slots"]), int(said["most_hits"]), second)

@@ -1,0 +1,172 @@
+"""Interreflections by bands and tails: furnaces, known rooms, and the path tracer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bounces import Bounces
+from lambent.bake.view import View
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.shared_exponent import unpacked_rgb
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.store.store import Store
+from lambent.store.tails import FIXED, Tails
+from tests.bake.small_scenes import turned_inwards
+from tests.tools.z_test import assert_same_image
+
+SIZE = 12
+INSIDE = Camera("inside", (0.3, 0.2, 0.4), (-0.5, -0.3, -1.0), fov_y_deg=60.0)
+
+
+def furnace(albedo: float = 0.5) -> Scene:
+    """A closed diffuse box with emission 1."""
+    room = SceneObject("room", turned_inwards(box((2, 2, 2))), "grey", emission=(1.0, 1.0, 1.0))
+    return Scene("furnace", (room,), {"grey": Material(kd=albedo)})
+
+
+def corner(materials: dict[str, Material]) -> Scene:
+    """A floor, two walls and a ball, under a small lamp that the camera does not see."""
+    floor = SceneObject("floor", patch((-1, 0, 1), (2, 0, 0), (0, 0, -2)), "floor")
+    back = SceneObject("back", patch((-1, 0, -1), (2, 0, 0), (0, 2, 0)), "back")
+    side = SceneObject("side", patch((-1, 0, 1), (0, 0, -2), (0, 2, 0)), "side")
+    ball = SceneObject("ball", placed(sphere(0.3, 48, 24), (0.3, 0.31, -0.1)), "ball")
+    lamp = SceneObject("lamp", patch((-0.3, 1.8, -0.3), (0.6, 0, 0), (0, 0, 0.6)), "black", emission=(8.0, 7.0, 5.0))
+    return Scene("corner", (floor, back, side, ball, lamp), {**materials, "black": Material()})
+
+
+AT_BALL = Camera("ball", (0.4, 1.2, 2.2), (0.25, 0.35, -0.1), fov_y_deg=4.0)  # which fills the picture
+FROM_ABOVE = Camera("above", (0.4, 1.2, 2.2), (-0.3, 0.5, -0.6), fov_y_deg=38.0)
+
+
+def baked(scene: Scene, camera: Camera, folder: Path, bounces: Bounces, size: int = SIZE) -> tuple[Store, View]:
+    from lambent.bake.bake import bake
+
+    view = View(camera, size, size)
+    return bake(scene, folder, only={"interreflection"}, views=[view], bounces=bounces), view
+
+
+def picture(
+    store: Store, view: View, scene: Scene, materials: dict[str, Editable], hits: int | None = None
+) -> np.ndarray:
+    """(P, 3) interreflections with other curves, by plain sums over the stored tiles."""
+    tails = Tails.of(store.artefact(view.name("interreflection", "tails")).meta["tails"])
+    albedos = np.array([np.ones(3) if side == FIXED else albedo(materials[name], side) for name, side in tails.slots])
+    weights = tails.weights(albedos)
+    if hits is not None:
+        weights[tails.hits != hits] = 0
+    number = store.read(view.name("view_points", "object"))
+    worn = np.array([o.material for o in scene.objects])[number]
+    total = np.zeros((len(worn), 3))
+    tiles = [a for a in store.artefacts("interreflection") if a.name.count("/") > 3]
+    for tile in tiles:
+        *_, name, term, place = tile.name.split("/")
+        array, points = store.read(tile.name), tile.meta["points"]
+        counts, rest = array[:points], array[points:]
+        codes, light = rest[: len(rest) // 2], unpacked_rgb(rest[len(rest) // 2 :]) * tile.meta["unit"]
+        coefficients = np.ones((1, 3))
+        for curve, count in tile.meta["curves"]:
+            means = materials[name].curves[curve].band_means(count)
+            coefficients = (coefficients[:, None] * means[None]).reshape(-1, 3)
+        scale = np.ones(3) if tile.meta["term"] < 0 else np.array(materials[name].terms[int(term)].scale)
+        tail, band = np.divmod(codes, len(coefficients))
+        mine = np.flatnonzero(worn == name)
+        first = int(place) * points  # all tiles but the last are as long as the first
+        at = np.repeat(mine[first : first + points], counts)
+        np.add.at(total, at, light * weights[tail] * coefficients[band] * scale)
+    return total
+
+
+def of_scene(scene: Scene) -> dict[str, Editable]:
+    return {name: of_material(material) for name, material in scene.materials.items()}
+
+
+@pytest.mark.parametrize("grey", [0.5, 1.0])
+def test_a_furnace_adds_the_same_light_at_every_bounce(tmp_path: Path, grey: float) -> None:
+    """E a^(N - 1) arrives over N surfaces: exactly, path by path, but for the balance of the two ways."""
+    scene = furnace(grey)
+    store, view = baked(scene, INSIDE, tmp_path / "s", Bounces((64, 1, 1, 1), samples=512))
+    for hits in (2, 3, 4):
+        found = picture(store, view, scene, of_scene(scene), hits)
+        assert len(found) == SIZE * SIZE
+        assert abs(found.mean() - grey**hits) < 1e-3 * grey**hits * 3, hits
+    whole = picture(store, view, scene, of_scene(scene))
+    assert np.abs(whole / whole.mean() - 1).max() < 0.15
+
+
+def interior(store: Store, view: View) -> np.ndarray:
+    """(SIZE, SIZE) pixels whose neighbours show the same object: others show two, and the store has one point of them."""
+    number = store.read(view.name("view_points", "object")).reshape(view.height, view.width)
+    padded = np.pad(number, 1, mode="edge")
+    around = [np.roll(padded, (i, j), (0, 1))[1:-1, 1:-1] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    return np.asarray(np.ptp(around, axis=0) == 0)
+
+
+def path_traced(scene: Scene, hits: int, camera: Camera = FROM_ABOVE, spp: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+    """Light of paths that meet 2 to `hits` surfaces, and its variance."""
+    from lambent.bake.reference.path_traced import render_reference
+
+    (whole, noise), (direct, more) = (
+        render_reference(scene, camera, SIZE, SIZE, spp, max_depth=depth) for depth in (hits, 1)
+    )
+    return whole - direct, noise + more
+
+
+FIRST = {"floor": Material(kd=(0.5, 0.5, 0.5)), "back": Material(kd=0.5), "side": Material(kd=0.5), "ball": Material(kd=0.5)}
+
+
+def test_diffuse_rooms_are_those_of_the_path_tracer(tmp_path: Path) -> None:
+    """Albedos that the bake did not know; all lengths of paths; one material is not edited."""
+    later = {
+        "floor": Material(kd=(0.7, 0.6, 0.2)), "back": Material(kd=(0.1, 0.4, 0.8)), "side": Material(kd=0.9),
+        "ball": FIRST["ball"],
+    }  # fmt: skip
+    bounces = Bounces((16, 1, 1, 1), samples=4096, fixed=frozenset({"ball", "black"}))
+    store, view = baked(corner(FIRST), FROM_ABOVE, tmp_path / "s", bounces)
+    scene = corner(later)
+    found = picture(store, view, scene, of_scene(scene)).reshape(SIZE, SIZE, 3)
+    expected, noise = path_traced(scene, 4)
+    inner = interior(store, view)
+    assert 60 < inner.sum()
+    assert_same_image(found[inner], (0.03 * found[inner]) ** 2, expected[inner], noise[inner])
+    assert abs(found[inner].mean() / expected[inner].mean() - 1) < 0.01
+
+
+def test_a_glossy_ball_between_diffuse_walls(tmp_path: Path) -> None:
+    """Where the other surfaces are diffuse, bands of a glossy lobe are exact in their limit."""
+    glossy = Material(kd=0.1, lobes=(Lobe(mx=0.3, my=0.3, r0=0.4, k=(0.9, 0.5, 0.4)),))
+    store, view = baked(corner({**FIRST, "ball": glossy}), AT_BALL, tmp_path / "s", Bounces((128, 1), samples=4096))
+    later = {**FIRST, "ball": Material(kd=0.2, lobes=(Lobe(mx=0.2, my=0.2, r0=0.4, k=(0.3, 0.9, 0.9)),))}
+    scene = corner(later)
+    found = picture(store, view, scene, of_scene(scene)).reshape(SIZE, SIZE, 3)
+    expected, noise = path_traced(scene, 2, AT_BALL)
+    assert_same_image(found, (0.03 * found) ** 2, expected, noise)
+    assert abs(found.mean() / expected.mean() - 1) < 0.01
+
+
+def test_samples_are_added_to_a_finished_store(tmp_path: Path) -> None:
+    """Batch after batch: the same light with less noise; what is enough is not traced again."""
+    scene = corner(FIRST)
+    few, view = baked(scene, FROM_ABOVE, tmp_path / "s", Bounces((16, 1, 1), samples=32))
+    before = picture(few, view, scene, of_scene(scene))
+    more, _ = baked(scene, FROM_ABOVE, tmp_path / "s", Bounces((16, 1, 1), samples=2048))
+    whole, _ = baked(scene, FROM_ABOVE, tmp_path / "t", Bounces((16, 1, 1), samples=2048))
+    after, once = (picture(store, view, scene, of_scene(scene)) for store in (more, whole))
+    assert np.abs(after - once).mean() < 0.01 * once.mean()  # sums of rounded tiles
+    assert np.abs(before - once).mean() > 4 * np.abs(after - once).mean()
+    tiles = {a.name: a.meta["samples"] for a in more.artefacts("interreflection") if "samples" in a.meta}
+    assert set(tiles.values()) == {2048}
+
+
+@pytest.mark.parametrize("series", [(64,), (64, 3), (64, 1, 8), (512, 1), (1,) * 7, (0, 1)])
+def test_series_that_mean_nothing(series: tuple[int, ...]) -> None:
+    with pytest.raises(UserError, match="series"):
+        Bounces(series)
