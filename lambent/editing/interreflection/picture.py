@@ -1,0 +1,170 @@
+"""The interreflections of an edited view as a picture, to be added to its direct light.
+
+    B = sum over monomials q of  m_q(d_i)  sum over bands of  c_j F_jq        (Ben-Artzi 2007, eq. 6.8)
+
+One material i is edited; all others are frozen. Its own pixels are incremental pictures over its active curves, one for
+each monomial; of all other pixels, the inner sums do not change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from lambent.core.arrays import Image
+from lambent.editing.incremental import TERMS, IncrementalPicture
+from lambent.editing.interreflection.folding import pixels, rows
+from lambent.editing.interreflection.powers import Powers, bands_of, powers
+from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
+from lambent.editing.picture import _compose, _viewed
+from lambent.editing.products import Pixels
+from lambent.editing.rows import coefficients_of
+from lambent.materials.factored.curve import Curve
+from lambent.materials.factored.terms import Editable, Term
+
+ALL_HITS = (2, 99)
+
+
+class FrozenPicture:
+    """The interreflections while one material is edited.
+
+    Parameters
+    ----------
+    materials
+        All materials of the view, as they are now.
+    edited : str
+        The one that is edited.
+    active : str, optional
+        Its curve that is edited, in terms that have two.
+    hits : (int, int)
+        Least and most surfaces on the paths that are shown.
+    """
+
+    def __init__(
+        self,
+        light: Interreflections,
+        materials: Mapping[str, Editable],
+        edited: str,
+        active: str | None = None,
+        hits: tuple[int, int] = ALL_HITS,
+    ) -> None:
+        self.edited, self.active, self._light = edited, active, light
+        self._powers = powers(light.tails, materials, edited, hits)
+        self._others = {
+            name: frozen_light(part, materials[name], self._powers) for name, part in light.parts.items() if name != edited
+        }
+        self._terms: list[_TermPicture] = []
+        self._own = light.parts.get(edited)
+        if self._own is not None and self._own.edited:
+            pairs = zip(materials[edited].terms, self._own.terms, strict=True)
+            self._terms = [_TermPicture(*pair, self._own, materials[edited], self._powers, active) for pair in pairs]
+        elif self._own is not None:
+            self._others[edited] = frozen_light(self._own, materials[edited], self._powers)
+        self.show(materials[edited])
+        self.draw()
+
+    def serves(self, material: Editable, active: str | None) -> bool:
+        """Whether the edited material can be shown so: no idle curve of a term with two has changed."""
+        return all(term.serves(material, active) for term in self._terms)
+
+    def show(self, material: Editable) -> None:
+        """Let the picture go to the material as it is edited now."""
+        self._values = self._powers.values(material)
+        for term, now in zip(self._terms, material.terms, strict=bool(self._terms)):
+            term.show(material, now)
+
+    def step(self, terms: int = TERMS) -> None:
+        """One frame: the largest changes of each term."""
+        for term in self._terms:
+            term.step(terms)
+
+    def draw(self) -> None:
+        """The exact picture at once."""
+        for term in self._terms:
+            term.draw()
+
+    @property
+    def is_exact(self) -> bool:
+        return all(term.is_exact for term in self._terms)
+
+    def add_to(self, image: Image) -> None:
+        """Add the interreflections to an image (H, W, 3) of linear radiance, in place."""
+        flat, one = image.reshape(-1, 3), np.ones((3, 1), np.float32)
+        values = self._values.astype(np.float32)
+        for name, sums in self._others.items():
+            for value, picture in zip(values, sums, strict=True):
+                _compose(flat, self._light.parts[name].pixel, picture, value, one)
+        for term in self._terms:
+            assert self._own is not None
+            for value, picture in zip(values, term.pictures, strict=True):
+                _compose(flat, self._own.pixel, picture.picture, value * term.scale, term.multiplier)
+
+
+class _TermPicture:
+    """One term of the edited material: an incremental picture for each monomial, over its active curve."""
+
+    def __init__(
+        self, term: Term, light: TermLight, part: PartLight, material: Editable, power: Powers, active: str | None
+    ) -> None:
+        names = [factor.curve for factor in term.factors]
+        self._factors, self._counts, self._theta_o = term.factors, light.counts, part.theta_o
+        self._at = names.index(active) if active in names else 0
+        self._idle = {name: material.curves[name] for k, name in enumerate(names) if k != self._at}
+        idle = np.ones((1, 3))
+        row = np.zeros(1, np.int64)
+        for k, (factor, count) in enumerate(zip(term.factors, light.counts, strict=True)):
+            means = np.ones((count, 3)) if k == self._at else material.curves[factor.curve].band_means(count)
+            idle = (idle[:, None] * means[None]).reshape(-1, 3)
+            row = (row[:, None] + (np.arange(count) if k == self._at else np.zeros(count, np.int64))).reshape(-1)
+        count = light.counts[self._at] if light.counts else 1
+        found, self._unit = rows(light, idle, power.weight, power.power, len(power.exponents), row, count)
+        self.pictures = [IncrementalPicture(one) for one in found]
+        self._viewer: Curve | None = None
+        self.multiplier: Pixels = np.ones((3, 1), np.float32)
+
+    def serves(self, material: Editable, active: str | None) -> bool:
+        names = [factor.curve for factor in self._factors]
+        if active in names and names.index(active) != self._at:
+            return False
+        return all(material.curves[name] is curve or np.array_equal(material.curves[name].values, curve.values)
+                   for name, curve in self._idle.items())  # fmt: skip
+
+    def show(self, material: Editable, term: Term) -> None:
+        self.scale = np.asarray(np.multiply(term.scale, self._unit), np.float32)
+        viewer = material.curves[term.viewer] if term.viewer else None
+        if viewer is not self._viewer:
+            self._viewer, one = viewer, np.ones((3, 1), np.float32)
+            self.multiplier = one if viewer is None else _viewed(one, self._theta_o, viewer)
+        if self._factors:
+            wanted = coefficients_of(material.curves[self._factors[self._at].curve], self._counts[self._at])
+        else:
+            wanted = np.ones((1, 3))
+        for picture in self.pictures:
+            picture.want(wanted)
+
+    def step(self, terms: int) -> None:
+        for picture in self.pictures:
+            picture.step(terms)
+
+    def draw(self) -> None:
+        for picture in self.pictures:
+            picture.draw()
+
+    @property
+    def is_exact(self) -> bool:
+        return all(picture.is_exact for picture in self.pictures)
+
+
+def frozen_light(part: PartLight, material: Editable, power: Powers) -> Pixels:
+    """(Q, 3, P) light of a material that is frozen, by monomial."""
+    total = np.zeros((len(power.exponents), 3, len(part.pixel)), np.float32)
+    if not part.edited:
+        return total + pixels(part.terms[0], np.ones((1, 3)), power.weight, power.power, len(total))
+    for term, light in zip(material.terms, part.terms, strict=True):
+        found = pixels(light, bands_of(term.factors, light.counts, material), power.weight, power.power, len(total))
+        scale = np.asarray(term.scale, np.float32)[:, None]
+        if term.viewer:
+            scale = scale * _viewed(np.ones((3, 1), np.float32), part.theta_o, material.curves[term.viewer])
+        total += found * scale
+    return total
