@@ -12,6 +12,7 @@ from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.shared_exponent import unpacked_rgb
+from lambent.editing.interreflection.powers import second_coefficients
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.of_lobes import of_material
@@ -60,7 +61,7 @@ def picture(
     """(P, 3) interreflections with other curves, by plain sums over the stored tiles."""
     tails = Tails.of(store.artefact(view.name("interreflection", "tails")).meta["tails"])
     albedos = np.array([np.ones(3) if side == FIXED else albedo(materials[name], side) for name, side in tails.slots])
-    weights = tails.weights(albedos)
+    weights = tails.weights(albedos, second_coefficients(tails, materials) if tails.second else None)
     if hits is not None:
         weights[tails.hits != hits] = 0
     number = store.read(view.name("view_points", "object"))
@@ -79,7 +80,7 @@ def picture(
         scale = np.ones(3) if tile.meta["term"] < 0 else np.array(materials[name].terms[int(term)].scale)
         tail, band = np.divmod(codes, len(coefficients))
         mine = np.flatnonzero(worn == name)
-        first = int(place) * points  # all tiles but the last are as long as the first
+        first = int(place) * store.artefact(tile.name.rpartition("/")[0] + "/0").meta["points"]  # the last is shorter
         at = np.repeat(mine[first : first + points], counts)
         np.add.at(total, at, light * weights[tail] * coefficients[band] * scale)
     return total
@@ -150,6 +151,19 @@ def test_a_glossy_ball_between_diffuse_walls(tmp_path: Path) -> None:
     expected, noise = path_traced(scene, 2, AT_BALL)
     assert_same_image(found, (0.03 * found) ** 2, expected, noise)
     assert abs(found.mean() / expected.mean() - 1) < 0.01
+
+
+def test_two_glossy_surfaces(tmp_path: Path) -> None:
+    """Bands at the second surface too: a glossy ball shows glossy walls, and a material that is not edited."""
+    dull, shiny = (Material(kd=kd, lobes=(Lobe(mx=m, my=m, r0=0.5),)) for kd, m in ((0.1, 0.5), (0.3, 0.3)))
+    bounces = Bounces((64, 32), samples=8192, fixed=frozenset({"side"}))
+    first = {**FIRST, "side": shiny, "floor": dull, "back": dull, "ball": dull}
+    store, view = baked(corner(first), AT_BALL, tmp_path / "s", bounces)
+    scene = corner({**FIRST, "side": shiny, "floor": shiny, "back": shiny, "ball": shiny})
+    found = picture(store, view, scene, of_scene(scene)).reshape(SIZE, SIZE, 3)
+    expected, noise = path_traced(scene, 2, AT_BALL, 8192)
+    assert_same_image(found, (0.05 * found) ** 2, expected, noise)
+    assert abs(found.mean() / expected.mean() - 1) < 0.02
 
 
 def test_samples_are_added_to_a_finished_store(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 if TYPE_CHECKING:
-    from lambent.bake.interreflection.binning import Sums
+    from lambent.bake.interreflection.binning import SecondTerm, Sums
     from lambent.bake.transport.bands import Bands
 
 KIND = "interreflection"
@@ -72,8 +72,16 @@ def tails_of(context: BakeContext) -> Tails:
             slots += [(material, side) for side in sorted(sides)]
     if any(material in bounces.fixed for material in worn):
         slots.append(("", FIXED))
-    second: tuple[SecondBands, ...] = ()
-    return Tails(tuple(slots), len(bounces.series), second)
+    second: list[SecondBands] = []
+    if bounces.series[1] > 1:
+        for material in worn:
+            if material not in bounces.fixed:
+                for number, term in enumerate(context.editable(material).terms):
+                    counts = tuple(n for _, n in _factors(term, bounces.series[1]))
+                    second.append(SecondBands(material, number, counts))
+        if any(material in bounces.fixed for material in worn):
+            second.append(SecondBands("", 0, ()))
+    return Tails(tuple(slots), len(bounces.series), tuple(second))
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -121,6 +129,18 @@ class _Pass:
         worn = [o.material for o in objects]
         self.surfaces = Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails)
 
+        self.seconds = [self._second(one) for one in self.tails.second]
+
+    def _second(self, one: SecondBands) -> SecondTerm:
+        from lambent.bake.interreflection.binning import SecondTerm
+        from lambent.bake.interreflection.paths import NONE
+
+        if not one.material:
+            return SecondTerm(NONE, None, ())
+        term = self.context.editable(one.material).terms[one.term]
+        factors = tuple(zip(term.factors, one.counts, strict=True))
+        return SecondTerm(self.surfaces.worn.index(one.material), term, tuple(_bands(factors)))
+
     def run(self) -> None:
         jobs = [
             (part, tile, place)
@@ -161,7 +181,7 @@ class _Pass:
         """The sums of the samples that the store has."""
         from lambent.bake.interreflection.binning import Sums
 
-        total = Sums(points, len(self.tails), bands)
+        total = Sums(points, self.tails, bands, self.seconds)
         if before:
             artefact = self.context.store.artefact(name)
             counts, codes, light = unpacked(self.context.store.read(name), points)

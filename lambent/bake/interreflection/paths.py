@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE
 from lambent.bake.interreflection import directions
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import vectors
@@ -38,12 +39,16 @@ class Surfaces:
         Slot of each object for light that is reflected and that is transmitted, or NONE.
     fixed : bool
         Whether some objects have the slot of materials that are not edited.
+    worn, material : tuple of str, (objects,) int
+        Names of the materials, and which of them each object has.
     """
 
     scene: Any
     object_numbers: Any
     slots: np.ndarray
     fixed: bool
+    worn: tuple[str, ...]
+    material: np.ndarray
 
     @classmethod
     def of(cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails) -> Surfaces:
@@ -55,7 +60,27 @@ class Surfaces:
             [number.get((material, side), NONE) if material in edited else fixed for side in ("reflection", "transmission")]
             for material in worn
         ]
-        return cls(scene, object_numbers, np.array(rows, np.uint32), any(row[0] == fixed != NONE for row in rows))
+        names, material = np.unique(worn, return_inverse=True)
+        some_fixed = any(row[0] == fixed != NONE for row in rows)
+        return cls(scene, object_numbers, np.array(rows, np.uint32), some_fixed, tuple(map(str, names)), material)
+
+
+@dataclass
+class Second:
+    """The second surfaces of paths, where they count by bands.
+
+    Attributes
+    ----------
+    material : mi.UInt32
+        Number of the material among those of `Surfaces.worn`.
+    wo, wi_lit, wi : mi.Vector3f
+        In the surface's frame: where the path came from, the light that was sampled, and where the path goes on.
+    """
+
+    material: Any
+    wo: Any
+    wi_lit: Any
+    wi: Any
 
 
 @dataclass
@@ -71,7 +96,8 @@ class Paths:
     light : list of mi.Color3f
         What arrives by paths that meet 2, 3, ... surfaces, in WAYS each.
     tail : list of mi.UInt32
-        The tail that each has.
+        The tail that each has; where the second surface counts by bands, that of its first band.
+    second : Second or None
     """
 
     points: int
@@ -80,6 +106,7 @@ class Paths:
     weight: Any
     light: list[Any]
     tail: list[Any]
+    second: Second | None
 
 
 def trace(
@@ -112,28 +139,33 @@ def trace(
     light = [dr.zeros(mi.Float, lights * width) for _ in range(3)]
     tail = dr.zeros(mi.UInt32, lights * width)
     orders = [tails.begin(hits) + tails.multisets(hits).number_of_order for hits in range(2, tails.most_hits + 1)]
+    slow = bool(tails.second)
+    at_second = [dr.zeros(mi.Float, width if slow else 1) for _ in range(9)]
+    material = dr.full(mi.UInt32, NONE, width if slow else 1)
     begin = np.cumsum([0, *(len(order) for order in orders)])
     _follow(
         surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, tail, surfaces.object_numbers,
         mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 0])), mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 1])),
         mi.UInt32(np.concatenate(orders).astype(np.uint32)), mi.UInt32(begin.astype(np.uint32)),
         dr.opaque(mi.UInt32, len(tails.slots)), dr.opaque(mi.UInt32, tails.most_hits),
-        rays.has_holes(surfaces.scene), surfaces.fixed, bool((surfaces.slots[:, 1] != NONE).any()),
+        rays.has_holes(surfaces.scene), surfaces.fixed, bool((surfaces.slots[:, 1] != NONE).any()), slow,
+        mi.UInt32(surfaces.material.astype(np.uint32)), material, at_second,
     )  # fmt: skip
     weight = dr.select((pdf > 0) & ~passes, dr.rcp(dr.maximum(pdf, 1e-20)), 0.0)
-    dr.eval(wi, weight, light, tail)
+    dr.eval(wi, weight, light, tail, material, at_second)
 
     def part(array: Any, k: int) -> Any:
         return dr.gather(type(array), array, dr.arange(mi.UInt32, width) + dr.opaque(mi.UInt32, k * width))
 
     parts = [mi.Color3f(*(part(channel, k) for channel in light)) for k in range(lights)]
-    return Paths(count, samples, wi, weight, parts, [part(tail, k) for k in range(lights)])
+    second = Second(material, *(mi.Vector3f(*at_second[k : k + 3]) for k in (0, 3, 6))) if slow else None
+    return Paths(count, samples, wi, weight, parts, [part(tail, k) for k in range(lights)], second)
 
 
 @dr.syntax
 def _follow(  # type: ignore[no-untyped-def]
     scene, sampler, ray, active, light, tail, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
-    sheets,
+    sheets, slow, materials, material, at_second,
 ):  # fmt: skip
     """Write the light of all path lengths: entry WAYS (hits - 2) + way of each sample."""
     width = dr.width(ray.o)
@@ -167,6 +199,13 @@ def _follow(  # type: ignore[no-untyped-def]
         if dr.hint(fixed, mode="scalar"):
             is_fixed = slot == members - 1
 
+        by_bands = mi.Bool(False)
+        frame = mi.Frame3f(up)
+        if dr.hint(slow, mode="scalar"):
+            by_bands = (depth == 1) & ~is_fixed
+            frame = _brushed(si, up, active & by_bands)
+            sides = directions.Sides(dr.select(both, 0.5, dr.select(slot == NONE, 1.0, 0.0)), mi.Float(0.0))
+
         # A light that is sampled.
         lit, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, active)
         cosine = dr.dot(lit.d, up)
@@ -178,13 +217,22 @@ def _follow(  # type: ignore[no-untyped-def]
             known, pdf_known = si.bsdf(ray).eval_pdf(ctx, si, si.to_local(lit.d), active & is_fixed)
             f, pdf_lit = dr.select(is_fixed, known, f), dr.select(is_fixed, pdf_known, pdf_lit)
             slot_lit = dr.select(is_fixed, slot, slot_lit)
+        if dr.hint(slow, mode="scalar"):
+            back = frame.to_local(-ray.d)
+            seen = frame.to_local(lit.d)
+            f = dr.select(by_bands & (slot_lit != NONE), mi.Color3f(1.0), f)
+            pdf_lit = dr.select(by_bands, directions.density(seen, back, sides), pdf_lit)
+            dr.scatter(material, dr.gather(mi.UInt32, materials, shape), index, active & by_bands)
+            for c in range(3):
+                dr.scatter(at_second[c], back[c], index, active & by_bands)
+                dr.scatter(at_second[3 + c], seen[c], index, active & by_bands)
         wrong = (dr.dot(si.n, lit.d) * dr.dot(si.n, ray.d) > 0) != behind
         shines = active & (lit.pdf > 0) & (dr.max(f) > 0) & (is_fixed | ~wrong)
         value *= throughput * f * dr.select(lit.delta, 1.0, lit.pdf / (lit.pdf + pdf_lit))
         shines &= dr.max(value) > 0
         shines &= ~rays.hidden(scene, si.p, si.n, lit.p, shines, holes)
         _write(
-            light, tail, value, _number(numbers, begins, depth, order * members + slot_lit, shines), 2 * depth - 2,
+            light, tail, value, _number(numbers, begins, depth, _and(order, slot_lit, members, depth, slow), shines), 2 * depth - 2,
             index, width, shines,
         )
 
@@ -192,12 +240,23 @@ def _follow(  # type: ignore[no-untyped-def]
         local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d(active))
         pdf = local.z / dr.pi * dr.select(both, 0.5, 1.0)
         down = dr.select(through, -1.0, 1.0)
-        d = mi.Frame3f(up).to_world(mi.Vector3f(local.x, local.y, local.z * down))
+        d = frame.to_world(mi.Vector3f(local.x, local.y, local.z * down))
         active &= is_fixed | ((slot != NONE) | (slot_through != NONE))
-        active &= is_fixed | (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * down < 0)
+        active &= is_fixed | by_bands | (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * down < 0)
         direct = mi.Bool(False)
         throughput *= dr.select(both & ~is_fixed, 2.0, 1.0)
-        order = order * members + dr.select(through & ~is_fixed, slot_through, slot)
+        order = _and(order, dr.select(through & ~is_fixed, slot_through, slot), members, depth, slow)
+        if dr.hint(slow, mode="scalar"):
+            wi, density = directions.sampled(
+                back, sides, sampler.next_1d(active), sampler.next_1d(active), sampler.next_2d(active)
+            )
+            d = dr.select(by_bands, frame.to_world(wi), d)
+            goes = (density > 0) & (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * wi.z < 0)
+            pdf = dr.select(by_bands, density, pdf)
+            throughput *= dr.select(by_bands, dr.rcp(dr.maximum(density, 1e-20)) * dr.select(both, 0.5, 1.0), 1.0)
+            active &= ~by_bands | goes
+            for c in range(3):
+                dr.scatter(at_second[6 + c], wi[c], index, active & by_bands)
         if dr.hint(fixed, mode="scalar"):
             bs, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(), sampler.next_2d(), active & is_fixed)
             d = dr.select(is_fixed, si.to_world(bs.wo), d)
@@ -208,6 +267,23 @@ def _follow(  # type: ignore[no-untyped-def]
         origin = mi.SurfaceInteraction3f(at)
         ray = rays.leaving(scene, si.p, si.n, d)
         depth += 1
+
+
+def _and(order: Any, slot: Any, members: Any, depth: Any, slow: bool) -> Any:
+    """The order with one slot more; a second surface that counts by bands has none."""
+    longer = order * members + slot
+    return dr.select(depth == 1, order, longer) if slow else longer
+
+
+def _brushed(si: Any, up: Any, active: Any) -> Any:
+    """The shading frame of interactions, turned to the viewer's side."""
+    t = si.bsdf().eval_attribute_3(TANGENT_ATTRIBUTE, si, active)
+    t = mi.Vector3f(t.x, t.y, t.z)
+    t -= up * dr.dot(up, t)
+    frame = mi.Frame3f(up)
+    t = dr.select(dr.squared_norm(t) > 1e-8, dr.normalize(t), frame.s)
+    frame.s, frame.t = t, dr.cross(up, t)
+    return frame
 
 
 def _number(numbers: Any, begins: Any, met: Any, order: Any, active: Any) -> Any:
