@@ -36,7 +36,7 @@ ONLY_IN = {
     "rich": {"cli"},
     "zarr": {"store"},
     "numcodecs": {"store"},
-    "numba": {"editing"},
+    "numba": {"bake", "editing"},
 }
 HEAVY = {
     "mitsuba", "drjit", "wgpu", "rendercanvas", "imgui_bundle", "scipy", "matplotlib", "skimage", "trimesh", "zarr",

@@ -121,7 +121,12 @@ def path_traced(scene: Scene, hits: int, camera: Camera = FROM_ABOVE, spp: int =
     return whole - direct, noise + more
 
 
-FIRST = {"floor": Material(kd=(0.5, 0.5, 0.5)), "back": Material(kd=0.5), "side": Material(kd=0.5), "ball": Material(kd=0.5)}
+FIRST = {
+    "floor": Material(kd=(0.5, 0.5, 0.5)),
+    "back": Material(kd=0.5),
+    "side": Material(kd=0.5),
+    "ball": Material(kd=0.5),
+}
 
 
 def test_diffuse_rooms_are_those_of_the_path_tracer(tmp_path: Path) -> None:

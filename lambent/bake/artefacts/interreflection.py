@@ -23,7 +23,8 @@ from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 if TYPE_CHECKING:
-    from lambent.bake.interreflection.binning import SecondTerm, Sums
+    from lambent.bake.interreflection.binning import SecondTerm
+    from lambent.bake.interreflection.sums import Sums
     from lambent.bake.transport.bands import Bands
 
 KIND = "interreflection"
@@ -32,8 +33,7 @@ OF_VIEWS = True
 REVISION = 1
 SMOOTH, SMOOTH_OF_TWO = 4, 8  # bands of curves over angles without narrow peaks
 SMOOTH_ANGLES = ("theta_i", "theta_o", "theta_d")
-BYTES = 1 << 29  # that the sums of a tile may take
-POINTS = 1 << 13  # most points of a tile
+POINTS = 1 << 12  # of a tile
 PATHS = 1 << 20  # at once
 FIRST_PASS = 16  # samples
 
@@ -68,7 +68,9 @@ def tails_of(context: BakeContext) -> Tails:
     slots = []
     for material in worn:
         if material not in bounces.fixed:
-            sides = {"transmission" if t.side == "transmission" else "reflection" for t in context.editable(material).terms}
+            sides = {
+                "transmission" if t.side == "transmission" else "reflection" for t in context.editable(material).terms
+            }
             slots += [(material, side) for side in sorted(sides)]
     if any(material in bounces.fixed for material in worn):
         slots.append(("", FIXED))
@@ -154,47 +156,46 @@ class _Pass:
         self.context.progress(len(jobs), len(jobs), what)
 
     def _tiles(self, part: Part) -> list[slice]:
-        return slices(np.count_nonzero(self.worn == part.material), points_of_tile(part, self.tails))
+        return slices(np.count_nonzero(self.worn == part.material), POINTS)
 
     def _tile(self, part: Part, tile: int, place: slice) -> None:
+        from lambent.bake.interreflection.binning import Sorting
         from lambent.bake.interreflection.paths import trace
+        from lambent.bake.interreflection.sums import Sums
 
         store, names = self.context.store, [part.name(k, tile) for k in range(len(part.bands))]
-        held = [_samples(store, name, part.key) for name in names]
-        before = min(held)
+        before = min(_samples(store, name, part.key) for name in names)
         if before >= self.samples:
             return
         points = self.points.where(np.flatnonzero(self.worn == part.material)[place])
-        sums = [self._begun(name, bands, len(points), before) for name, bands in zip(names, part.bands, strict=True)]
-        for first in range(before, self.samples, per := max(1, PATHS // len(points))):
-            count = min(per, self.samples - first)
+        sums = [self._begun(name, len(points), before) if before else Sums.none(len(points)) for name in names]
+        at_once = max(1, (PATHS >> 2 if self.seconds else PATHS) // len(points))
+        for first in range(before, self.samples, at_once):
+            count = min(at_once, self.samples - first)
             seed = seed_of(self.context.seed, names[0], first)
             paths = trace(self.surfaces, points, shares_of(part.editable), self.tails, count, seed)
-            if not part.terms:
-                sums[0].add_known(paths, points, part.editable)
-            for total, (term, factors) in zip(sums, part.terms, strict=False):
-                total.add(paths, points, term, _bands(factors))
+            sorting = Sorting(paths, points, self.tails, self.seconds)
+            found = (sorting.by_term(term, _bands(factors)) for term, factors in part.terms)
+            new = found if part.terms else [sorting.whole(part.editable)]
+            zipped = zip(sums, new, part.bands, strict=True)
+            sums = [total.and_of(more, bands, len(self.tails)) for total, more, bands in zipped]
         for k, (name, total) in enumerate(zip(names, sums, strict=True)):
-            self._write(part, name, k, total, points)
+            self._write(part, name, k, total)
 
-    def _begun(self, name: str, bands: int, points: int, before: int) -> Sums:
+    def _begun(self, name: str, points: int, before: int) -> Sums:
         """The sums of the samples that the store has."""
-        from lambent.bake.interreflection.binning import Sums
+        from lambent.bake.interreflection.sums import Sums
 
-        total = Sums(points, self.tails, bands, self.seconds)
-        if before:
-            artefact = self.context.store.artefact(name)
-            counts, codes, light = unpacked(self.context.store.read(name), points)
-            point = np.repeat(np.arange(points, dtype=np.uint32), counts)
-            total.put(point * np.uint32(len(self.tails) * bands) + codes, light * (artefact.meta["unit"] * before))
-        return total
+        counts, codes, light = unpacked(self.context.store.read(name), points)
+        unit = self.context.store.artefact(name).meta["unit"]
+        return Sums(np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]), codes, light * np.float32(unit * before))
 
-    def _write(self, part: Part, name: str, term: int, total: Sums, points: Any) -> None:
-        point, code, light = total.entries(self.samples)
+    def _write(self, part: Part, name: str, term: int, total: Sums) -> None:
+        light = total.light / np.float32(self.samples)
         unit = 2.0 ** np.ceil(np.log2(max(float(light.max(initial=0.0)), 1e-30) / (LARGEST / 4)))
-        counts = np.bincount(point, minlength=len(points)).astype(np.uint32)
-        array = np.concatenate([counts, code, packed_rgb(light / np.float32(unit))])
-        meta = {**self.view.meta, **said(part, term), "unit": unit, "points": len(points)}
+        counts = np.diff(total.ends).astype(np.uint32)
+        array = np.concatenate([counts, total.codes, packed_rgb(light / np.float32(unit))])
+        meta = {**self.view.meta, **said(part, term), "unit": unit, "points": len(counts)}
         writer = self.context.store.begin(name, KIND, array.shape, array.shape, "uint32", key=part.key, meta=meta)
         writer.write((0,), array)
         writer.finish(**meta, samples=self.samples)
@@ -236,14 +237,10 @@ def shares_of(editable: Editable) -> np.ndarray:
     return np.array([0.5 * ("transmission" in sides), 0.25 * ("retro" in sides)])
 
 
-def points_of_tile(part: Part, tails: Tails) -> int:
-    return max(1, min(POINTS, BYTES // (12 * len(tails) * sum(part.bands))))
-
-
 def _tile_count(context: BakeContext, part: Part) -> int:
     worn = np.array([o.material for o in context.in_views.objects])
     shown = np.count_nonzero(worn[context.view_tracer.points(part.view).object] == part.material)
-    return len(slices(shown, points_of_tile(part, tails_of(context))))
+    return len(slices(shown, POINTS))
 
 
 def _put_tails(context: BakeContext, view: View) -> None:
@@ -274,7 +271,11 @@ def _samples(store: Any, name: str, key: str) -> int:
 def _series_key(context: BakeContext, view: View) -> str:
     """The key of all that tiles depend on, but the material of their points."""
     scene, bounces = context.in_views, context.bounces
-    fixed = [[m, repr(context.editable(m)), scene.materials[m].model_dump_json()] for m in _worn(context) if m in bounces.fixed]
+    fixed = [
+        [m, repr(context.editable(m)), scene.materials[m].model_dump_json()]
+        for m in _worn(context)
+        if m in bounces.fixed
+    ]
     lights = light_inputs(scene)
     return key_of(
         KIND, REVISION, points_key(context, view), geometry_inputs(scene), lights, fixed, tails_of(context).said(),

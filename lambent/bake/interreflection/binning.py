@@ -1,7 +1,4 @@
-"""Paths sorted into the bands of a term: T_jz of every point (Ben-Artzi 2007, eqs 6.1, 6.2).
-
-One thread is one point, which walks through its samples: no two threads add to one place.
-"""
+"""Paths sorted into the bands of a term, and those of second surfaces (Ben-Artzi 2007, eqs 6.2, 6.4)."""
 
 from __future__ import annotations
 
@@ -13,9 +10,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.interreflection.paths import NONE, WAYS, Paths
+from lambent.bake.interreflection.paths import WAYS, Paths
+from lambent.bake.interreflection.sums import Sorted
 from lambent.bake.tracing.array_ops import array_ops
-from lambent.bake.tracing.rays import array_of, vectors
+from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.bands import Bands
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.materials.factored.albedo import is_flat
@@ -23,20 +21,6 @@ from lambent.materials.factored.curve import END_RAD, KNOTS
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Editable, Term, upper_pair
 from lambent.store.tails import Tails
-
-CHANNELS = 3
-
-
-def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any) -> tuple[Any, Any]:
-    """rho_q |cos| of directions in the local frame, and the band, of all curves together, that they are in."""
-    (light, viewer), seen = upper_pair(tuple(wi), tuple(wo), term.side, ops)
-    quotient = term.quotient.evaluate(light, viewer, ops)
-    value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
-    band = mi.UInt32(0)
-    for one in bands:
-        angle = angle_of(one.factor.over, light, viewer, one.factor.stretch, ops)
-        band = band * one.count + dr.minimum(mi.UInt32(angle * (one.count / END_RAD)), one.count - 1)
-    return dr.select(seen, value * light[2], 0.0), band
 
 
 @dataclass(frozen=True)
@@ -47,10 +31,6 @@ class SecondTerm:
     term: Term | None
     bands: tuple[Bands, ...]
 
-    @property
-    def size(self) -> int:
-        return int(np.prod([one.count for one in self.bands], dtype=int))
-
     def evaluate(self, wi: Any, wo: Any, ops: Any) -> tuple[Any, Any]:
         """Factor of the path's light, and its band."""
         if self.term is None:
@@ -58,125 +38,95 @@ class SecondTerm:
         return by_bands(self.term, self.bands, wi, wo, ops)
 
 
-class Sums:
-    """Sums over samples for a block of points: (points, tails, bands, 3) on the device."""
+class Sorting:
+    """Sorts the paths of some points; what all terms of a material share is made once."""
 
-    def __init__(self, points: int, tails: Tails, bands: int, seconds: Sequence[SecondTerm] = ()) -> None:
-        self.points, self.tails, self.bands, self.seconds = points, len(tails), bands, seconds
+    def __init__(self, paths: Paths, points: ViewPoints, tails: Tails, seconds: Sequence[SecondTerm] = ()) -> None:
+        self._paths, self._points, self._ops = paths, points, array_ops()
+        self._wo = dr.gather(mi.Vector3f, vectors(mi.Vector3f, points.wo), paths.at)
         hits = np.repeat(np.arange(2, tails.most_hits + 1), WAYS)
-        self._widths = [len(tails.multisets(n)) for n in hits]  # tails of each band of a second surface, by entry
-        self.total = dr.zeros(mi.Float, points * len(tails) * bands * CHANNELS)
+        self._widths = np.array([len(tails.multisets(n)) for n in hits])
+        width = dr.width(paths.wi)
+        self._second = np.zeros((0, 2, 3, width), np.float32), np.zeros((0, 2, width), np.uint32)
+        if paths.second is not None:
+            self._second = _second_surfaces(paths, tails, seconds, self._ops)
 
-    def add(self, paths: Paths, points: ViewPoints, term: Term, bands: Sequence[Bands]) -> None:
-        """Add paths by the bands of a term's curves, numbered first curve first."""
-        wo, ops = vectors(mi.Vector3f, points.wo), array_ops()
-        texture = vectors(mi.Vector3f, _texture(points, term))
+    def by_term(self, term: Term, bands: Sequence[Bands]) -> Sorted:
+        """By the bands of a term's curves, numbered first curve first."""
+        value, band = by_bands(term, bands, self._paths.wi, self._wo, self._ops)
+        return self._sorted(value * self._texture(term), band)
 
-        def scattered(wi: Any) -> tuple[Any, Any]:
-            value, band = by_bands(term, bands, wi, wo, ops)
-            return value * texture, band
-
-        self._add(paths, scattered)
-
-    def add_known(self, paths: Paths, points: ViewPoints, material: Editable) -> None:
-        """Add paths to the one band of a material whose curves stay as they are."""
-        wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
+    def whole(self, material: Editable) -> Sorted:
+        """Into the one band of a material whose curves stay as they are."""
+        ops, total = self._ops, mi.Vector3f(0.0)
         tables = {name: [mi.Float(column) for column in curve.values.T] for name, curve in material.curves.items()}
+        for term in material.terms:
+            (light, viewer), seen = upper_pair(tuple(self._paths.wi), tuple(self._wo), term.side, ops)
+            value = _quotient(term, light, viewer, ops) * mi.Vector3f(*term.scale) * self._texture(term)
+            for factor in term.factors:
+                value *= _looked_up(tables[factor.curve], angle_of(factor.over, light, viewer, factor.stretch, ops))
+            if term.viewer:
+                value *= _looked_up(tables[term.viewer], angle_of("theta_o", light, viewer, 1.0, ops))
+            total += dr.select(seen, value * light[2], 0.0)
+        return self._sorted(total, dr.zeros(mi.UInt32, dr.width(self._paths.wi)))
 
-        def scattered(wi: Any) -> tuple[Any, Any]:
-            total = mi.Vector3f(0.0)
-            for term in material.terms:
-                (light, viewer), seen = upper_pair(tuple(wi), wo, term.side, ops)
-                quotient = term.quotient.evaluate(light, viewer, ops)
-                value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
-                value *= mi.Vector3f(*term.scale) * vectors(mi.Vector3f, _texture(points, term))
-                for factor in term.factors:
-                    value *= _looked_up(tables[factor.curve], angle_of(factor.over, light, viewer, factor.stretch, ops))
-                if term.viewer:
-                    value *= _looked_up(tables[term.viewer], angle_of("theta_o", light, viewer, 1.0, ops))
-                total += dr.select(seen, value * light[2], 0.0)
-            return total, mi.UInt32(0)
+    def _texture(self, term: Term) -> Any:
+        texture = self._points.diffuse if is_flat(term) else self._points.specular
+        return dr.gather(mi.Vector3f, vectors(mi.Vector3f, texture), self._paths.at)
 
-        self._add(paths, scattered)
-
-    def _add(self, paths: Paths, scattered: Any) -> None:
-        assert paths.points == self.points
-        _sum(
-            self.total, paths.wi, paths.weight, paths.light, paths.tail, dr.opaque(mi.UInt32, paths.points),
-            dr.opaque(mi.UInt32, paths.samples), scattered, dr.arange(mi.UInt32, paths.points),
-            dr.opaque(mi.UInt32, self.tails), self.bands, self._second_surfaces(paths),
+    def _sorted(self, value: Any, band: Any) -> Sorted:
+        value = dr.select(self._paths.weight > 0, value * self._paths.weight, 0.0)
+        band = mi.UInt32(band) + dr.zeros(mi.UInt32, dr.width(value))
+        dr.eval(value, band)
+        return Sorted(
+            np.stack([np.array(value[c]) for c in range(3)]), np.array(band), self._paths.light, self._paths.tail,
+            *self._second, self._widths,
         )  # fmt: skip
-        dr.eval(self.total)
-
-    def _second_surfaces(self, paths: Paths) -> list[Any]:
-        """For each term of second surfaces: factors and offsets of the tail, of every entry of a path."""
-        if paths.second is None:
-            return [lambda at: [(None, mi.UInt32(0))] * len(self._widths)]
-        second, ops, begin, found = paths.second, array_ops(), 0, []
-        for one in self.seconds:
-
-            def scattered(at: Any, one: SecondTerm = one, begin: int = begin) -> list[tuple[Any, Any]]:
-                wo = dr.gather(mi.Vector3f, second.wo, at)
-                here = dr.gather(mi.UInt32, second.material, at) == one.material
-                ways = []
-                for wi in (second.wi_lit, second.wi):
-                    value, band = one.evaluate(dr.gather(mi.Vector3f, wi, at), wo, ops)
-                    ways.append((dr.select(here, value, 0.0), band + begin))
-                # The second surface's own light comes from the light that was sampled; all other, from where the path went.
-                return [
-                    (value, band * dr.opaque(mi.UInt32, width))
-                    for (value, band), width in zip([ways[0], *[ways[1]] * (len(self._widths) - 1)], self._widths, strict=True)
-                ]
-
-            found.append(scattered)
-            begin += one.size
-        return found
-
-    def put(self, place: np.ndarray, light: np.ndarray) -> None:
-        """Begin with sums (N, 3) at places (point * tails + tail) * bands + band."""
-        at = mi.UInt32(place.astype(np.uint32)) * CHANNELS
-        for c in range(CHANNELS):
-            dr.scatter(self.total, mi.Float(np.ascontiguousarray(light[:, c], np.float32)), at + c)
-        dr.eval(self.total)
-
-    def entries(self, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (N,), numbers tail * bands + band (N,), and means (N, 3) where they are not 0, in this order."""
-        index = dr.arange(mi.UInt32, self.points * self.tails * self.bands)
-        value = dr.gather(mi.Vector3f, self.total, index)
-        kept = dr.compress(value.x + value.y + value.z > 0)
-        light = array_of(dr.gather(mi.Vector3f, self.total, kept)) / np.float32(samples)
-        point, code = np.divmod(np.array(kept), np.uint32(self.tails * self.bands))
-        return point, code, light
 
 
-def _texture(points: ViewPoints, term: Term) -> np.ndarray:
-    return points.diffuse if is_flat(term) else points.specular
+def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any) -> tuple[Any, Any]:
+    """rho_q |cos| of directions in the local frame, and the band, of all curves together, that they are in."""
+    (light, viewer), seen = upper_pair(tuple(wi), tuple(wo), term.side, ops)
+    band = mi.UInt32(0)
+    for one in bands:
+        angle = angle_of(one.factor.over, light, viewer, one.factor.stretch, ops)
+        band = band * one.count + dr.minimum(mi.UInt32(angle * (one.count / END_RAD)), one.count - 1)
+    return dr.select(seen, _quotient(term, light, viewer, ops) * light[2], 0.0), band
+
+
+def _second_surfaces(
+    paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], ops: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Factors (terms, 2, 3, n) and bands (terms, 2, n) of the terms that the second surface of each path has."""
+    second, begin, turn = paths.second, 0, dict[int, int]()
+    assert second is not None
+    width = dr.width(paths.wi)
+    found: list[list[list[Any]]] = []
+    for one, size in zip(seconds, (each.size for each in tails.second), strict=True):
+        number = turn.setdefault(one.material, 0)
+        turn[one.material] += 1
+        if number == len(found):
+            found.append([[dr.zeros(mi.Vector3f, width), dr.zeros(mi.UInt32, width)] for _ in range(2)])
+        here = second.material == one.material
+        for way, wi in zip(found[number], (second.wi_lit, second.wi), strict=True):
+            value, band = one.evaluate(wi, second.wo, ops)
+            way[0] = dr.select(here, value, way[0])
+            way[1] = dr.select(here, band + begin, way[1])
+        begin += size
+    dr.eval(found)
+    factors = [[np.stack([np.array(value[c]) for c in range(3)]) for value, _ in term] for term in found]
+    return np.array(factors, np.float32), np.array([[np.array(band) for _, band in term] for term in found], np.uint32)
+
+
+def _quotient(term: Term, light: Any, viewer: Any, ops: Any) -> Any:
+    value = term.quotient.evaluate(light, viewer, ops)
+    return mi.Vector3f(*value) if isinstance(value, tuple) else mi.Vector3f(value)
 
 
 def _looked_up(table: Any, angle: Any) -> Any:
     at = dr.clip(angle * (KNOTS / END_RAD), 0, KNOTS)
     k = dr.minimum(mi.UInt32(at), KNOTS - 1)
     share = at - mi.Float(k)
-    return mi.Vector3f(*(dr.gather(mi.Float, c, k) * (1 - share) + dr.gather(mi.Float, c, k + 1) * share for c in table))
-
-
-@dr.syntax
-def _sum(total, wi, weight, light, tail, points, samples, scattered, point, tails, bands, seconds):  # type: ignore[no-untyped-def]
-    s = mi.UInt32(0)
-    while s < samples:
-        at = s * points + point
-        one = dr.gather(mi.Float, weight, at)
-        if one > 0:
-            value, band = scattered(dr.gather(mi.Vector3f, wi, at))
-            value *= one
-            for second in seconds:
-                for arriving, number, (factor, offset) in zip(light, tail, second(at)):
-                    brought = value * mi.Vector3f(dr.gather(mi.Color3f, arriving, at))
-                    if dr.hint(factor is not None, mode="scalar"):
-                        brought *= factor
-                    z = dr.gather(mi.UInt32, number, at) + offset
-                    place = ((point * tails + z) * bands + band) * CHANNELS
-                    some = dr.max(brought) > 0
-                    for c in range(CHANNELS):
-                        dr.scatter_add(total, brought[c], place + c, some, mode=dr.ReduceMode.NoConflicts)
-        s += 1
+    return mi.Vector3f(
+        *(dr.gather(mi.Float, c, k) * (1 - share) + dr.gather(mi.Float, c, k + 1) * share for c in table)
+    )

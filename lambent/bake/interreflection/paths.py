@@ -57,7 +57,10 @@ class Surfaces:
         edited = {material for material, side in tails.slots if side != FIXED}
         fixed = number.get(("", FIXED), NONE)
         rows = [
-            [number.get((material, side), NONE) if material in edited else fixed for side in ("reflection", "transmission")]
+            [
+                number.get((material, side), NONE) if material in edited else fixed
+                for side in ("reflection", "transmission")
+            ]
             for material in worn
         ]
         names, material = np.unique(worn, return_inverse=True)
@@ -85,33 +88,34 @@ class Second:
 
 @dataclass
 class Paths:
-    """Samples of so many points, sample after sample: number s * points + p.
+    """Samples of so many points, point after point: sample s of point p has the number p * samples + s.
 
     Attributes
     ----------
+    at : mi.UInt32
+        The point of each sample.
     wi : mi.Vector3f
         Direction in the point's frame.
     weight : mi.Float
         1 / density of the direction; 0 where it is left out.
-    light : list of mi.Color3f
+    light : (3, entries, n) float32
         What arrives by paths that meet 2, 3, ... surfaces, in WAYS each.
-    tail : list of mi.UInt32
+    tail : (entries, n) uint32
         The tail that each has; where the second surface counts by bands, that of its first band.
     second : Second or None
     """
 
     points: int
     samples: int
+    at: Any
     wi: Any
     weight: Any
-    light: list[Any]
-    tail: list[Any]
+    light: np.ndarray
+    tail: np.ndarray
     second: Second | None
 
 
-def trace(
-    surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tails, samples: int, seed: int
-) -> Paths:
+def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tails, samples: int, seed: int) -> Paths:
     """`samples` paths of each point.
 
     Parameters
@@ -124,7 +128,7 @@ def trace(
     count = len(points)
     width = count * samples
     sampler = rays.independent(seed, width)
-    at = dr.arange(mi.UInt32, width) % dr.opaque(mi.UInt32, count)
+    at = dr.arange(mi.UInt32, width) // dr.opaque(mi.UInt32, samples)
     p, flat, wo, t, b, n = (
         dr.gather(mi.Vector3f, vectors(mi.Vector3f, array), at)
         for array in (points.p, points.flat, points.wo, points.t, points.b, points.n)
@@ -154,12 +158,9 @@ def trace(
     weight = dr.select((pdf > 0) & ~passes, dr.rcp(dr.maximum(pdf, 1e-20)), 0.0)
     dr.eval(wi, weight, light, tail, material, at_second)
 
-    def part(array: Any, k: int) -> Any:
-        return dr.gather(type(array), array, dr.arange(mi.UInt32, width) + dr.opaque(mi.UInt32, k * width))
-
-    parts = [mi.Color3f(*(part(channel, k) for channel in light)) for k in range(lights)]
     second = Second(material, *(mi.Vector3f(*at_second[k : k + 3]) for k in (0, 3, 6))) if slow else None
-    return Paths(count, samples, wi, weight, parts, [part(tail, k) for k in range(lights)], second)
+    arrived = np.stack([np.array(channel) for channel in light]).reshape(3, lights, width)
+    return Paths(count, samples, at, wi, weight, arrived, np.array(tail).reshape(lights, width), second)
 
 
 @dr.syntax
@@ -232,8 +233,14 @@ def _follow(  # type: ignore[no-untyped-def]
         shines &= dr.max(value) > 0
         shines &= ~rays.hidden(scene, si.p, si.n, lit.p, shines, holes)
         _write(
-            light, tail, value, _number(numbers, begins, depth, _and(order, slot_lit, members, depth, slow), shines), 2 * depth - 2,
-            index, width, shines,
+            light,
+            tail,
+            value,
+            _number(numbers, begins, depth, _and(order, slot_lit, members, depth, slow), shines),
+            2 * depth - 2,
+            index,
+            width,
+            shines,
         )
 
         # Where the path goes on.

@@ -72,7 +72,7 @@ def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
     return types.float32(types.uint32), generate
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _pixels(out, ends, codes, values, units, band, tail, power):  # type: ignore[no-untyped-def]
     bands = np.uint32(len(band))
     for p in numba.prange(len(units)):
@@ -86,7 +86,7 @@ def _pixels(out, ends, codes, values, units, band, tail, power):  # type: ignore
             out[q, 2, p] += unit * np.float32(bits >> 18 & 511) * band[j, 2] * tail[z, 2]
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _rows(out, ends, codes, values, units, band, tail, power, row, taps):  # type: ignore[no-untyped-def]
     powers, count, _, points = out.shape
     bands = np.uint32(len(band))

@@ -52,7 +52,9 @@ class FrozenPicture:
         self.edited, self.active, self._light = edited, active, light
         self._powers = powers(light.tails, materials, edited, hits)
         self._others = {
-            name: frozen_light(part, materials[name], self._powers) for name, part in light.parts.items() if name != edited
+            name: frozen_light(part, materials[name], self._powers)
+            for name, part in light.parts.items()
+            if name != edited
         }
         self._terms: list[_TermPicture] = []
         self._own = light.parts.get(edited)

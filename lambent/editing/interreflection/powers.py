@@ -47,9 +47,7 @@ class Powers:
         return np.asarray(found)
 
 
-def powers(
-    tails: Tails, materials: Mapping[str, Editable], edited: str, hits: tuple[int, int] = (2, 99)
-) -> Powers:
+def powers(tails: Tails, materials: Mapping[str, Editable], edited: str, hits: tuple[int, int] = (2, 99)) -> Powers:
     """Freeze all materials but one.
 
     Parameters

@@ -42,20 +42,13 @@ class _Axis:
         return np.asarray(np.einsum("jgc,g->jc", curve.at(inner**2 * END_RAD), np.array([5, 8, 5]) / 18))
 
 
-def albedo(material: Editable, side: str, textures: tuple[Floats, Floats] | None = None) -> Floats:
-    """(3,) equivalent albedo of a material's terms of one side, reflection (with what it returns) or transmission.
+def albedo(material: Editable, side: str) -> Floats:
+    """(3,) equivalent albedo of a material's terms of one side, "reflection" (with what it returns) or "transmission".
 
-    Parameters
-    ----------
-    textures : (3,), (3,), optional
-        Means of the textures of diffuse and of other terms.
+    Textures have a mean of 1 and do not change it.
     """
-    total = np.zeros(3)
-    for term in material.terms:
-        if (term.side == "transmission") == (side == "transmission"):
-            share = np.ones(3) if textures is None else textures[0 if is_flat(term) else 1]
-            total += share * term_albedo(term, material.curves)
-    return total
+    mine = [term for term in material.terms if (term.side == "transmission") == (side == "transmission")]
+    return np.asarray(sum((term_albedo(term, material.curves) for term in mine), np.zeros(3)))
 
 
 def is_flat(term: Term) -> bool:
@@ -85,7 +78,9 @@ def _shares(term: Term, axes: list[_Axis]) -> Floats:
     """e (bands of each axis, 3)."""
     wi, wo, weight = _nodes(not is_flat(term), 1 if _is_isotropic(term, axes) else TURNS)
     quotient = term.quotient.evaluate(wi, wo, NUMPY)
-    value = np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]
+    value = (
+        np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]
+    )
     value = value * weight[:, None] / np.pi
     place = np.zeros(len(weight), np.int64)
     for axis in axes:
@@ -102,7 +97,9 @@ def _is_isotropic(term: Term, axes: list[_Axis]) -> bool:
     z, phi = rng.uniform(0.05, 1, (2, 64)), rng.uniform(0, 2 * np.pi, (2, 64))
     found = []
     for turn in (0.0, 0.7, 1.9):
-        wi, wo = ((np.sqrt(1 - c * c) * np.cos(a + turn), np.sqrt(1 - c * c) * np.sin(a + turn), c) for c, a in zip(z, phi))
+        wi, wo = (
+            (np.sqrt(1 - c * c) * np.cos(a + turn), np.sqrt(1 - c * c) * np.sin(a + turn), c) for c, a in zip(z, phi)
+        )
         quotient = term.quotient.evaluate(wi, wo, NUMPY)
         angles = [angle_of(axis.factor.over, wi, wo, axis.factor.stretch) for axis in axes]
         found.append(np.concatenate([*np.atleast_2d(quotient), *angles]))
