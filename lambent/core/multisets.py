@@ -38,4 +38,4 @@ class Multisets:
         orders = np.arange(self.members**self.size)
         digits = orders[:, None] // self.members ** np.arange(self.size)[::-1] % max(self.members, 1)
         counts = np.sort(digits, axis=1) @ self.members ** np.arange(self.size)[::-1]
-        return np.unique(counts, return_inverse=True)[1].reshape(-1)
+        return np.asarray(np.unique(counts, return_inverse=True)[1].reshape(-1))

@@ -2,9 +2,9 @@
 
     B(x) = sum over bands j and tails z of  T_jz(x) c_j d_z        (Ben-Artzi 2007, eq. 6.6)
 
-A tail lists the surfaces beyond the first. Each is a slot, a side of a material, and counts by its equivalent albedo; the
-order does not matter, so a tail is a multiset of slots. In a slowly decaying series the surface next to the viewer's
-counts by bands of its curves instead: such a tail is a band of a term and the multiset of what follows (6.9).
+A tail lists the surfaces beyond the first. Each is a slot, a side of a material, and counts by its equivalent albedo;
+the order does not matter, so a tail is a multiset of slots. In a slowly decaying series the surface next to that of the
+pixel counts by bands of its curves: such a tail is a band of a term and the multiset of what follows (6.9).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Interreflections of a view: light that met other surfaces first, by bands of the curves and by tails (`store.tails`).
 
-Passes over all points add samples, each as many as there are, so that a picture is soon there and its noise falls. A tile
-of points is one array, written whole: work that ends early loses at most one tile's pass.
+Passes over all points add samples, each as many as there are, so that a picture is soon there and its noise falls. A
+tile of points is one array, written whole: work that ends early loses at most one tile's pass.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class _Pass:
         self.context.progress(len(jobs), len(jobs), what)
 
     def _tiles(self, part: Part) -> list[slice]:
-        return slices(np.count_nonzero(self.worn == part.material), POINTS)
+        return slices(int(np.count_nonzero(self.worn == part.material)), POINTS)
 
     def _tile(self, part: Part, tile: int, place: slice) -> None:
         from lambent.bake.interreflection.binning import Sorting
@@ -167,7 +167,7 @@ class _Pass:
         before = min(_samples(store, name, part.key) for name in names)
         if before >= self.samples:
             return
-        points = self.points.where(np.flatnonzero(self.worn == part.material)[place])
+        points = self.points.where(self.worn == part.material).where(place)
         sums = [self._begun(name, len(points), before) if before else Sums.none(len(points)) for name in names]
         at_once = max(1, (PATHS >> 2 if self.seconds else PATHS) // len(points))
         for first in range(before, self.samples, at_once):
@@ -240,7 +240,7 @@ def shares_of(editable: Editable) -> np.ndarray:
 def _tile_count(context: BakeContext, part: Part) -> int:
     worn = np.array([o.material for o in context.in_views.objects])
     shown = np.count_nonzero(worn[context.view_tracer.points(part.view).object] == part.material)
-    return len(slices(shown, POINTS))
+    return len(slices(int(shown), POINTS))
 
 
 def _put_tails(context: BakeContext, view: View) -> None:

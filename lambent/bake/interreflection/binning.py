@@ -44,8 +44,8 @@ class Sorting:
     def __init__(self, paths: Paths, points: ViewPoints, tails: Tails, seconds: Sequence[SecondTerm] = ()) -> None:
         self._paths, self._points, self._ops = paths, points, array_ops()
         self._wo = dr.gather(mi.Vector3f, vectors(mi.Vector3f, points.wo), paths.at)
-        hits = np.repeat(np.arange(2, tails.most_hits + 1), WAYS)
-        self._widths = np.array([len(tails.multisets(n)) for n in hits])
+        numbers = range(2, tails.most_hits + 1)
+        self._widths = np.repeat([len(tails.multisets(n)) for n in numbers], WAYS)
         width = dr.width(paths.wi)
         self._second = np.zeros((0, 2, 3, width), np.float32), np.zeros((0, 2, width), np.uint32)
         if paths.second is not None:

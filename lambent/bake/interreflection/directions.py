@@ -1,7 +1,7 @@
-"""Directions of the first bounce, for BRDFs that are not known yet: a broad lobe and a narrow one (Ben-Artzi 2007, 6.1.1).
+"""Directions of the first bounce, for BRDFs that are not known yet: a broad and a narrow lobe (Ben-Artzi 2007, 6.1.1).
 
-Seven in ten are cosine distributed; the others follow a Blinn lobe about the mirror direction. A term that transmits, or
-reflects back, has both lobes on its own side.
+Seven in ten are cosine distributed; the others follow a Blinn lobe about the mirror direction. A term that transmits,
+or reflects back, has both lobes on its own side.
 """
 
 from __future__ import annotations

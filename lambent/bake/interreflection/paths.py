@@ -1,8 +1,8 @@
 """Paths that do not know the BRDFs: what light they bring to the pixel's surface, and over which tail.
 
-A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos: they scatter by the
-cosine, which cancels, so the path carries 1 until a light is seen. Lights are sampled at every surface and met by the
-path as well, balanced (Veach 1997). Surfaces that are not edited scatter by their own BRDF, into a slot of albedo 1.
+A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos: they scatter by
+the cosine, which cancels, so the path carries 1 until a light is seen. Lights are sampled at every surface and met by
+the path as well, balanced (Veach 1997). Surfaces that are not edited scatter by their own BRDF, in a slot of albedo 1.
 """
 
 from __future__ import annotations

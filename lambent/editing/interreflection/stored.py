@@ -103,7 +103,7 @@ def interreflections(
         is_edited = material in edited
         terms = []
         for k in range(len(start.terms) if is_edited else 1):
-            found, least = _term(store, name("interreflection", f"{material}/{k}"), np.count_nonzero(mine))
+            found, least = _term(store, name("interreflection", f"{material}/{k}"), int(np.count_nonzero(mine)))
             terms.append(found)
             samples.append(least)
             if is_edited:
@@ -115,7 +115,9 @@ def interreflections(
 def _term(store: Store, name: str, points: int) -> tuple[TermLight, int]:
     """The tiles of a term one after another, and the samples of the one that has the fewest."""
     counts, codes, values = np.zeros(points, np.int64), [], []
-    units, curves, samples, done = np.ones(points, np.float32), (), [], 0
+    units, done = np.ones(points, np.float32), 0
+    curves: tuple[int, ...] = ()
+    samples: list[int] = []
     while done < points:
         tile = f"{name}/{len(samples)}"
         if tile not in store:

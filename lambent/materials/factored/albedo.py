@@ -1,9 +1,9 @@
-"""Equivalent albedos: the diffuse surface that reflects as much of uniform light as a term does (Ben-Artzi 2007, 5.2.4).
+"""Equivalent albedos: the diffuse surface that reflects as much of uniform light (Ben-Artzi 2007, section 5.2.4).
 
     d = 1/pi  integral of f cos cos over both hemispheres = sum over bands of  c_j e_j        (5.21, 5.22)
 
-e_j depends on the quotient and the angles alone, and is integrated once for each. Terms over angles about the half vector
-are integrated over half vectors, so that the narrowest bands get as many nodes as the others.
+e_j depends on the quotient and the angles alone, and is integrated once for each. Terms over angles about the half
+vector are integrated over half vectors, so that the narrowest bands get as many nodes as the others.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.materials.factored.curve import END_RAD, Curve
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Editable, Factor, Term
@@ -32,9 +32,9 @@ class _Axis:
     factor: Factor
     bands: int
 
-    def band(self, angle_rad: Floats) -> Floats:
+    def band(self, angle_rad: Floats) -> Indices:
         """Number of the band of angles."""
-        return np.minimum((np.sqrt(angle_rad / END_RAD) * self.bands).astype(np.int64), self.bands - 1)
+        return np.asarray(np.minimum((np.sqrt(angle_rad / END_RAD) * self.bands).astype(np.int64), self.bands - 1))
 
     def means(self, curve: Curve) -> Floats:
         """(bands, 3) means of a curve over the bands."""
@@ -64,7 +64,7 @@ def term_albedo(term: Term, curves: Mapping[str, Curve]) -> Floats:
         _made[key] = _shares(term, axes)
     e = _made[key]
     for axis in axes:  # (J, K, ..., 3) -> (3,), curve by curve
-        e = np.einsum("j...c,jc->...c", e, axis.means(curves[axis.factor.curve]))
+        e = np.asarray(np.einsum("j...c,jc->...c", e, axis.means(curves[axis.factor.curve])))
     return np.asarray(term.scale) * e
 
 
@@ -82,13 +82,14 @@ def _shares(term: Term, axes: list[_Axis]) -> Floats:
         np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]
     )
     value = value * weight[:, None] / np.pi
-    place = np.zeros(len(weight), np.int64)
+    place: Indices = np.zeros(len(weight), np.int64)
     for axis in axes:
         angle = angle_of(axis.factor.over, wi, wo, axis.factor.stretch)
         place = place * axis.bands + axis.band(angle)
     shape = [axis.bands for axis in axes]
-    columns = [np.bincount(place, column, int(np.prod(shape))) for column in np.broadcast_to(value, (len(place), 3)).T]
-    return np.stack(columns, -1).reshape(*shape, 3)
+    size = int(np.prod(shape, dtype=int))
+    columns = [np.bincount(place, column, size) for column in np.broadcast_to(value, (len(place), 3)).T]
+    return np.asarray(np.stack(columns, -1).reshape(*shape, 3), float)
 
 
 def _is_isotropic(term: Term, axes: list[_Axis]) -> bool:
@@ -98,7 +99,8 @@ def _is_isotropic(term: Term, axes: list[_Axis]) -> bool:
     found = []
     for turn in (0.0, 0.7, 1.9):
         wi, wo = (
-            (np.sqrt(1 - c * c) * np.cos(a + turn), np.sqrt(1 - c * c) * np.sin(a + turn), c) for c, a in zip(z, phi)
+            (np.sqrt(1 - c * c) * np.cos(a + turn), np.sqrt(1 - c * c) * np.sin(a + turn), c)
+            for c, a in zip(z, phi, strict=True)
         )
         quotient = term.quotient.evaluate(wi, wo, NUMPY)
         angles = [angle_of(axis.factor.over, wi, wo, axis.factor.stretch) for axis in axes]

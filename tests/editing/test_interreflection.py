@@ -1,0 +1,131 @@
+"""Freezing: the polynomial in one material is the whole sum; incremental frames reach it; views are refused in words."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+import pytest
+
+from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.editing.interreflection.picture import FrozenPicture
+from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
+from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.curve import Curve
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.store.tails import FIXED, SecondBands, Tails
+
+SIZE = (7, 5)
+GLOSSY = of_material(Material(kd=(0.4, 0.3, 0.2), lobes=(Lobe(mx=0.3, my=0.3, r0=0.5),)))
+PAPER = of_material(Material(kd=(0.7, 0.6, 0.5), kt_d=0.2))
+KNOWN = of_material(Material(kd=0.3))
+START = {"glossy": GLOSSY, "paper": PAPER, "known": KNOWN}
+SLOTS = (("glossy", "reflection"), ("paper", "reflection"), ("paper", "transmission"), ("", FIXED))
+DIFFUSE = Tails(SLOTS, 4)
+SLOW = Tails(
+    SLOTS, 3,
+    (SecondBands("glossy", 0, (2,)), SecondBands("glossy", 1, (8, 2)), SecondBands("paper", 0, (2,)), SecondBands("paper", 1, (2,)), SecondBands("", 0, ())),
+)  # fmt: skip
+
+
+def light(tails: Tails, seed: int = 0) -> Interreflections:
+    """Random light of three materials, sparse."""
+    rng = np.random.default_rng(seed)
+    order, parts = rng.permutation(35), {}
+    for name, part in zip(START, np.split(order, [12, 24]), strict=True):
+        terms = []
+        for term in START[name].terms if name != "known" else (None,):
+            counts = tuple(16 if k == 0 else 4 for k in range(len(term.factors))) if term else ()
+            dense = rng.random((len(part), len(tails) * int(np.prod(counts, dtype=int)), 3)) ** 8
+            dense[rng.random(dense.shape[:2]) < 0.7] = 0
+            point, code = np.nonzero(dense.any(axis=2))
+            ends = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=len(part)))])
+            units = np.where(np.arange(len(part)) < 6, 2.0, 0.25).astype(np.float32)
+            values = packed_rgb((dense[point, code] / units[point, None]).astype(np.float32))
+            terms.append(TermLight(ends, code.astype(np.uint32), values, units, counts))
+        theta_o = rng.uniform(0, 1.5, len(part)).astype(np.float32)
+        parts[name] = PartLight(START[name], np.sort(part), theta_o, tuple(terms), name != "known")
+    return Interreflections(SIZE, tails, parts, 1)
+
+
+def expected(whole: Interreflections, materials: dict[str, Editable], hits: tuple[int, int] = (2, 99)) -> np.ndarray:
+    """(H, W, 3) by the sum over everything, entry by entry."""
+    tails = whole.tails
+    albedos = np.array([np.ones(3) if side == FIXED else albedo(materials[name], side) for name, side in tails.slots])
+    weights = tails.weights(albedos, second_coefficients(tails, materials) if tails.second else None)
+    weights[(tails.hits < hits[0]) | (tails.hits > hits[1])] = 0
+    image = np.zeros((SIZE[0] * SIZE[1], 3))
+    for name, part in whole.parts.items():
+        for k, term in enumerate(part.terms):
+            bands, scale = np.ones((1, 3)), np.ones(3)
+            if part.edited:
+                edited = materials[name].terms[k]
+                bands, scale = bands_of(edited.factors, term.counts, materials[name]), np.array(edited.scale)
+            tail, band = np.divmod(term.codes, len(bands))
+            point = np.repeat(np.arange(len(part.pixel)), np.diff(term.ends))
+            values = unpacked_rgb(term.values) * term.units[point, None]
+            np.add.at(image, part.pixel[point], values * weights[tail] * bands[band] * scale)
+    return image.reshape(*SIZE, 3)
+
+
+def shown(frozen: FrozenPicture) -> np.ndarray:
+    image = np.zeros((*SIZE, 3), np.float32)
+    frozen.add_to(image)
+    return image
+
+
+@pytest.mark.parametrize("tails", [DIFFUSE, SLOW], ids=["diffuse", "slow"])
+@pytest.mark.parametrize("edited", START)
+@pytest.mark.parametrize("hits", [(2, 99), (3, 3)])
+def test_frozen_pictures_are_the_whole_sum(tails: Tails, edited: str, hits: tuple[int, int]) -> None:
+    whole = light(tails)
+    frozen = FrozenPicture(whole, START, edited, hits=hits)
+    reference = expected(whole, START, hits)
+    assert np.abs(shown(frozen) - reference).max() < 2e-3 * reference.max()
+
+
+@pytest.mark.parametrize("tails", [DIFFUSE, SLOW], ids=["diffuse", "slow"])
+def test_edits_by_frames(tails: Tails) -> None:
+    """A highlight is moved, the diffuse colour is changed: frames reach the sum of everything, others answer as well."""
+    whole = light(tails)
+    frozen = FrozenPicture(whole, START, "glossy")
+    before = shown(frozen)
+    later = of_material(Material(kd=(0.1, 0.8, 0.4), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),)))
+    assert frozen.serves(later, None)
+    frozen.show(later)
+    frozen.step(2)
+    assert not frozen.is_exact
+    for _ in range(100):
+        frozen.step(2)
+    assert frozen.is_exact
+    reference = expected(whole, {**START, "glossy": later})
+    assert np.abs(shown(frozen) - reference).max() < 2e-3 * reference.max()
+    paper = whole.parts["paper"].pixel
+    change = np.abs(reference - before).reshape(-1, 3)[paper].max()
+    assert change > 100 * np.abs(shown(frozen) - reference).reshape(-1, 3)[paper].max()
+
+
+def test_the_idle_curve_wants_to_be_frozen_anew() -> None:
+    frozen = FrozenPicture(light(DIFFUSE), START, "glossy")
+    first, second = (factor.curve for factor in GLOSSY.terms[1].factors)
+    flat = GLOSSY.with_curve(second, Curve.constant(0.3))
+    assert frozen.serves(GLOSSY, first)
+    assert not frozen.serves(flat, None)
+    assert not frozen.serves(GLOSSY, second)
+    anew = FrozenPicture(light(DIFFUSE), {**START, "glossy": flat}, "glossy", active=second)
+    assert anew.serves(flat, second)
+    reference = expected(light(DIFFUSE), {**START, "glossy": flat})
+    assert np.abs(shown(anew) - reference).max() < 2e-3 * reference.max()
+
+
+def test_monomials_are_those_of_the_material_alone() -> None:
+    """Of 4 slots, paper has two: its monomials are d^a t^b with a + b up to 3, one for each other tail's rest."""
+    found = powers(DIFFUSE, START, "paper")
+    counts = {order for size in range(4) for order in combinations_with_replacement("dt", size)}
+    assert len(found.exponents) == len(counts)
+    assert found.values(PAPER).max() <= 1
+    lengths = sorted(found.exponents.sum(axis=1).tolist())
+    assert lengths == sorted(len(order) for order in counts)
