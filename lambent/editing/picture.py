@@ -159,11 +159,6 @@ class EditedPicture:
         return image
 
 
-def is_diffuse(term: Term) -> bool:
-    """Whether the texture of the diffuse colour multiplies a term: its curves know neither highlight nor Fresnel."""
-    return bool(term.factors) and all(factor.over in ("theta_i", "theta_o") for factor in term.factors)
-
-
 class _TermPicture:
     """One term: its incremental picture over the active curve, and what multiplies it."""
 
@@ -171,7 +166,7 @@ class _TermPicture:
         self.name, self._factors, self._start = term.name, term.factors, part.start.curves
         self._transport = transport
         self._counts = _counts(transport, len(term.factors))
-        texture = part.diffuse if is_diffuse(term) else part.specular
+        texture = part.diffuse if term.is_diffuse else part.specular
         self._texture = np.ascontiguousarray(np.ones((3, 1)) if texture is None else texture.T, np.float32)
         self._theta_o = np.asarray(part.theta_o, np.float32)
         self._viewer: Curve | None = None

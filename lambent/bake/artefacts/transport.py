@@ -167,9 +167,8 @@ class _Baking:
         return [Bands(*pair) for pair in self.part.bands or ((Factor("", "theta_i"), 1),)]
 
     def _texture(self, some: slice) -> np.ndarray:
-        """(points, 3) factors of textures: those of diffuse light where the curves say nothing of a highlight."""
-        is_diffuse = all(factor.over in ("theta_i", "theta_o") for factor in self.part.term.factors)
-        return (self.points.diffuse if is_diffuse else self.points.specular)[some]
+        """(points, 3) factors of textures."""
+        return (self.points.diffuse if self.part.term.is_diffuse else self.points.specular)[some]
 
     def _begin(
         self,
