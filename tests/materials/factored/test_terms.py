@@ -18,7 +18,9 @@ DIFFUSE_TERMS = {
 }
 
 
-@pytest.mark.parametrize("name", ["lambert", "oren-nayar", "ashikhmin-shirley", "phong", "ward", "ggx", "cook-torrance"])
+@pytest.mark.parametrize(
+    "name", ["lambert", "oren-nayar", "ashikhmin-shirley", "phong", "ward", "ggx", "cook-torrance"]
+)
 def test_terms_of_models(name: str) -> None:
     found = {term.name for term in editable(model_named(name)()).terms if term.is_diffuse}
     assert found == DIFFUSE_TERMS.get(name, set())
