@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Image
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.products import Halves
@@ -40,7 +41,9 @@ class StoredPairs:
         return Rows(rows, self.unit * scale, edited)
 
 
-def edited_picture(store: Store, session: Session, lights: int | None = None) -> EditedPicture:
+def edited_picture(
+    store: Store, session: Session, lights: int | None = None, canvas: Callable[[Image], Canvas] = HostCanvas
+) -> EditedPicture:
     """The picture of a session's view, drawn exactly as the session has edited it.
 
     Materials of the view that the session does not edit are drawn as the scene has them.
@@ -49,6 +52,8 @@ def edited_picture(store: Store, session: Session, lights: int | None = None) ->
     ----------
     lights
         Which of the stored transports to take; the one with the most lights where it is None.
+    canvas
+        As for `EditedPicture`.
 
     Raises
     ------
@@ -68,7 +73,7 @@ def edited_picture(store: Store, session: Session, lights: int | None = None) ->
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
-    picture = EditedPicture(backdrop.astype(np.float32), parts)
+    picture = EditedPicture(backdrop.astype(np.float32), parts, canvas)
     for name in view.materials:
         known("material", name, scene, file=store.folder, field="materials")
         if name in parts:
