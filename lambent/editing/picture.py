@@ -76,12 +76,16 @@ class EditedPicture:
         By name of the material.
     canvas
         Makes what holds the picture; by default in memory.
+
+    Attributes
+    ----------
+    canvas : Canvas
     """
 
     def __init__(
         self, background: Image, parts: Mapping[str, Part], canvas: Callable[[Image], Canvas] = HostCanvas
     ) -> None:
-        self._canvas = canvas(background)
+        self.canvas = canvas(background)
         self._covered = np.zeros(background.shape[0] * background.shape[1], np.int64)
         self._parts: dict[str, Part] = {}
         self._terms: dict[str, list[_TermPicture]] = {}
@@ -91,7 +95,7 @@ class EditedPicture:
     def put(self, material: str, part: Part) -> None:
         """Add a material, or replace its transport (of more lights, of another quotient), and draw `part.start`."""
         made = zip(part.start.terms, part.transport, strict=True)
-        terms = [_TermPicture(term, transport, part, self._canvas) for term, transport in made]
+        terms = [_TermPicture(term, transport, part, self.canvas) for term, transport in made]
         for term, start in zip(terms, part.start.terms, strict=True):
             term.show(part.start.curves, start)
             term.draw()
@@ -100,7 +104,7 @@ class EditedPicture:
             self._covered[before.pixel] -= 1
         self._covered[part.pixel] += 1
         assert self._covered.max(initial=0) <= 1, f"a pixel of {material} shows another material too"
-        self._canvas.clear(part.pixel)
+        self.canvas.clear(part.pixel)
         self._parts[material], self._terms[material] = part, terms
 
     def show(self, material: str, edited: Editable) -> None:
@@ -155,12 +159,12 @@ class EditedPicture:
 
     def compose(self) -> None:
         """Bring the canvas up to date: where it is shown from a GPU's memory, frames end with this."""
-        self._canvas.compose([(t.layer, t.scale) for terms in self._terms.values() for t in terms])
+        self.canvas.compose([(t.layer, t.scale) for terms in self._terms.values() for t in terms])
 
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""
         self.compose()
-        return self._canvas.image()
+        return self.canvas.image()
 
 
 def is_diffuse(term: Term) -> bool:
