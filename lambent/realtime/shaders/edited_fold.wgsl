@@ -8,7 +8,6 @@
 
 const LANES = 64u;
 const MOST = 256u;  // bands: pairs name them by bytes
-const EACH = MOST / LANES;
 
 struct Fold {
     edited: u32,  // 0 or 1: which of the two curves
@@ -43,7 +42,7 @@ fn value_of(entry: u32) -> vec3f {
 }
 
 fn sum_of(point: u32, lane: u32) {
-    var sums: array<vec3f, EACH>;
+    for (var i = lane; i < fold.bands; i += LANES) { row[i] = vec3f(0.0); }
     let span = select(vec2u(0u), spans[min(point, piece.pixels - 1u)], point < piece.pixels);
     for (var first = span.x; first < span.y; first += LANES) {
         let entry = first + lane;
@@ -54,14 +53,10 @@ fn sum_of(point: u32, lane: u32) {
         }
         workgroupBarrier();
         for (var k = 0u; k < min(LANES, span.y - first); k++) {
-            for (var i = 0u; i < EACH; i++) {
-                if (band[k] == i * LANES + lane) { sums[i] += light[k]; }
-            }
+            if (band[k] % LANES == lane) { row[band[k]] += light[k]; }  // this thread's bands alone
         }
         workgroupBarrier();
     }
-    for (var i = 0u; i < EACH; i++) { row[i * LANES + lane] = sums[i]; }
-    workgroupBarrier();
 }
 
 // `lambent.core.wavelets.transformed` of `row`, in place.
