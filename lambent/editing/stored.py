@@ -14,7 +14,6 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
-from lambent.editing.products import Halves
 from lambent.editing.rows import PairTransport, Rows
 from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
@@ -28,8 +27,8 @@ class StoredPairs:
     """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
-    pairs: NDArray[np.uint8]
-    values: Halves
+    pairs: NDArray[np.uint16]
+    values: NDArray[np.uint32]
     unit: float
     counts: tuple[int, int]
 

@@ -15,6 +15,7 @@ from lambent.bake.view import View
 from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.core.progress import Cancelled
+from lambent.core.shared_exponent import unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
@@ -68,8 +69,8 @@ def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.nda
         if len(means) == 1:
             light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
         else:
-            pairs, values = store.read(f"{start}pairs"), store.read(f"{start}values").astype(float)
-            share = values * means[0][pairs[:, 0]] * means[1][pairs[:, 1]]
+            j, k = np.divmod(store.read(f"{start}pairs"), len(means[1]))
+            share = unpacked_rgb(store.read(f"{start}values")) * means[0][j] * means[1][k]
             light = np.array([share[a:b].sum(axis=0) for a, b in store.read(f"{start}spans")]).reshape(-1, 3)
         total[worn == term["material"]] += light * of_term.scale * term["scale"]
     return total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.editing.folding import folded
 from lambent.editing.incremental import IncrementalPicture
@@ -19,8 +20,8 @@ def sparse(points: int, bands: tuple[int, int], per_point: int, seed: int = 0) -
     counts[-1] = 0
     begin = np.concatenate([[0], np.cumsum(counts + 3)[:-1]])
     entries = int(begin[-1]) + 3
-    pairs = np.stack([rng.integers(0, n, entries) for n in bands], axis=1).astype(np.uint8)
-    values = rng.random((entries, 3), np.float32).astype(np.float16)
+    pairs = rng.integers(0, bands[0] * bands[1], entries).astype(np.uint16)
+    values = packed_rgb(rng.random((entries, 3), np.float32))
     return np.stack([begin, begin + counts], axis=1).astype(np.uint32), pairs, values
 
 
@@ -29,7 +30,7 @@ def matrix(transport: Sparse, bands: tuple[int, int]) -> np.ndarray:
     spans, pairs, values = transport
     whole = np.zeros((len(spans), *bands, 3))
     for p, (begin, end) in enumerate(spans):
-        np.add.at(whole[p], tuple(pairs[begin:end].T), values[begin:end].astype(float))
+        np.add.at(whole[p], np.divmod(pairs[begin:end], bands[1]), unpacked_rgb(values[begin:end]))
     return whole
 
 
