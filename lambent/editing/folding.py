@@ -23,7 +23,7 @@ TOGETHER = 32  # points whose rows stay in the second-level cache
 
 def folded(
     spans: NDArray[np.uint32],
-    pairs: NDArray[np.uint16],
+    steps: NDArray[np.uint8],
     values: NDArray[np.uint32],
     idle: Floats,
     edited: int,
@@ -35,8 +35,9 @@ def folded(
     ----------
     spans : (P, 2)
         First entry of each point, and the one past its last.
-    pairs : (N,)
-        Bands j and k of the two curves, as j times the number of bands of the second, plus k.
+    steps : (N,)
+        From each entry's pair of bands to the next entry's. With K bands of the second curve, bands j and k are pair
+        j K + k; each point begins at -1.
     values : (N,)
         Transport by these, RGB9E5 (`core.shared_exponent`).
     idle : (K, 3)
@@ -55,8 +56,8 @@ def folded(
     """
     scale = float(np.abs(idle).max()) or 1.0
     out = np.empty((bands, 3, len(spans)), np.uint16)
-    second = np.uint16(bands if edited else len(idle))
-    _fold(out, spans, pairs, values, (idle / scale).astype(np.float32), edited, second, TAPS.astype(np.float32))
+    second = bands if edited else len(idle)
+    _fold(out, spans, steps, values, (idle / scale).astype(np.float32), edited, second, TAPS.astype(np.float32))
     return out.view(np.float16), scale
 
 
@@ -69,7 +70,7 @@ def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(parallel=True, fastmath=True, cache=True)
-def _fold(out, spans, pairs, values, idle, edited, second, taps):  # type: ignore[no-untyped-def]
+def _fold(out, spans, steps, values, idle, edited, second, taps):  # type: ignore[no-untyped-def]
     bands, _, points = out.shape
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
         first = block * TOGETHER
@@ -77,9 +78,10 @@ def _fold(out, spans, pairs, values, idle, edited, second, taps):  # type: ignor
         rows = np.zeros((TOGETHER, bands, 4), np.float32)
         before = np.empty((bands, 4), np.float32)
         for i in range(count):
-            row = rows[i]
+            row, pair = rows[i], -1
             for n in range(spans[first + i, 0], spans[first + i, 1]):
-                j, k = pairs[n] // second, pairs[n] % second
+                pair += steps[n]
+                j, k = pair // second, pair % second
                 if edited:
                     j, k = k, j
                 bits = values[n]

@@ -27,7 +27,7 @@ class StoredPairs:
     """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
-    pairs: NDArray[np.uint16]
+    steps: NDArray[np.uint8]
     values: NDArray[np.uint32]
     unit: float
     counts: tuple[int, int]
@@ -35,7 +35,7 @@ class StoredPairs:
     def fold(self, curve_index: int, means: Floats) -> Rows:
         """Rows over the other curve, see `rows.PairTransport`."""
         edited = 1 - curve_index
-        rows, scale = folded(self.spans, self.pairs, self.values, means, edited, self.counts[edited])
+        rows, scale = folded(self.spans, self.steps, self.values, means, edited, self.counts[edited])
         return Rows(rows, self.unit * scale, edited)
 
 
@@ -114,5 +114,5 @@ def _transport(store: Store, name: str, said: Mapping[str, Any]) -> Rows | PairT
     curves, unit = said["curves"], float(said["scale"])
     if len(curves) < 2:
         return Rows(store.read(f"{name}/rows"), unit)
-    spans, pairs, values = (store.read(f"{name}/{array}") for array in ("spans", "pairs", "values"))
-    return StoredPairs(spans, pairs, values, unit, (curves[0][1], curves[1][1]))
+    spans, steps, values = (store.read(f"{name}/{array}") for array in ("spans", "steps", "values"))
+    return StoredPairs(spans, steps, values, unit, (curves[0][1], curves[1][1]))

@@ -23,6 +23,7 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
 from tests.bake.small_scenes import GREY
+from tests.tools.pair_numbers import pair_numbers
 
 SIZE = 10
 CAMERA = Camera("front", (0.0, 1.6, 2.4), (0.0, 0.35, 0.0))
@@ -71,7 +72,7 @@ class View:
                 continue
             blocks = pair_transport(self.points, self.lights, self.seen, term, bands, 1 / 256)
             found = Pairs(*map(np.concatenate, zip(*blocks, strict=True)))
-            j, k = np.divmod(found.bands, counts[1])
+            j, k = np.divmod(pair_numbers(found.counts, found.steps), counts[1])
             share = unpacked_rgb(found.light) / 256 * means[0][j] * means[1][k]
             np.add.at(total, np.repeat(np.arange(len(total)), found.counts), share * term.scale)
         return total

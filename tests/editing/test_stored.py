@@ -62,10 +62,9 @@ def store(tmp_path: Path) -> Store:
                 put("transport", f"200/{name}/{k}/rows", transformed(light[:, 0].astype(np.float32)).astype(np.float16))
                 continue
             j, n, _, points = light.shape
-            pairs = np.tile(np.arange(j * n), points)
             begin = np.arange(points) * j * n
             put("transport", f"200/{name}/{k}/spans", np.stack([begin, begin + j * n], axis=1).astype(np.uint32))
-            put("transport", f"200/{name}/{k}/pairs", pairs.astype(np.uint16))
+            put("transport", f"200/{name}/{k}/steps", np.ones(points * j * n, np.uint8))
             values = packed_rgb(np.moveaxis(light, 3, 0).reshape(-1, 3))
             put("transport", f"200/{name}/{k}/values", values)
     put("transport", "200/terms", np.ones(len(said), np.uint32), terms=said)

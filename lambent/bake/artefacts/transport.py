@@ -27,6 +27,7 @@ NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
 REVISION = 2
 POINTS = 1 << 15  # a chunk
+LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
 ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk
 SMOOTH = ("theta_i", "theta_o", "theta_d")  # angles over which curves have no narrow peaks
 
@@ -65,7 +66,7 @@ class _Part:
 
     @property
     def arrays(self) -> tuple[str, ...]:
-        return ("spans", "pairs", "values") if len(self.bands) == 2 else ("rows",)
+        return ("spans", "steps", "values") if len(self.bands) == 2 else ("rows",)
 
     def said(self, scale: float) -> dict[str, Any]:
         curves = [[factor.curve, count] for factor, count in self.bands]
@@ -141,26 +142,27 @@ class _Baking:
         """Transport by pairs of bands: the entries of a block of points are written before its spans."""
         from lambent.bake.transport.bands import pair_transport
 
-        bands, many = self._bands(), len(self.points)
+        bands, many, term = self._bands(), len(self.points), self.part.term
+        least = LEAST if bands[1].factor.over in SMOOTH else 0.0
         spans = self._begin(store, "spans", (many, 2), (POINTS, 2), "uint32")
-        pairs = self._begin(store, "pairs", (0,), (ENTRIES,), "uint16", growing=True)
+        steps = self._begin(store, "steps", (0,), (ENTRIES,), "uint8", growing=True)
         values = self._begin(store, "values", (0,), (ENTRIES,), "uint32", growing=True)
         for chunk in self._missing(spans):
             some = spans.artefact.region(chunk)[0]
             begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
             begin = -(-begin // ENTRIES) * ENTRIES
             points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
-            streams, counts = [_Stream(writer, begin) for writer in (pairs, values)], []
-            for found in pair_transport(points, self.lights, seen, self.part.term, bands, self.scale, texture):
+            streams, counts = [_Stream(writer, begin) for writer in (steps, values)], []
+            for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
                 counts.append(found.counts)
-                streams[0].add(found.bands)
+                streams[0].add(found.steps)
                 streams[1].add(found.light)
             for stream in streams:
                 stream.end()
             many_each = np.concatenate(counts)
             ends = begin + np.cumsum(many_each)
             spans.write(chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
-        for writer in (pairs, values, spans):
+        for writer in (steps, values, spans):
             writer.finish()
 
     def _bands(self) -> list[Any]:

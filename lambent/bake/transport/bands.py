@@ -39,18 +39,19 @@ from lambent.scenes.triangle_lights import TriangleLights
 
 BLOCK = 1 << 14  # threads that Dr.Jit gives to one core together
 PAIRS_AT_ONCE = 1 << 24  # of points and pairs of bands: 128 MB
+LONGEST = 255  # step from an entry to the next
 OWN_PAIRS = 1 << 11  # of bands that threads hold at a time: 400 kB for 16 threads that run as one vector
 
 
 class Pairs(NamedTuple):
     """Transport by pairs of bands: of each point the number of its entries, and all entries, point after point.
 
-    counts (P,); bands (N,) uint16, j K + k of bands j and k of the two curves; light (N,) RGB9E5
-    (`core.shared_exponent`).
+    counts (P,). steps (N,) uint8 from one entry's pair to the next; pairs are numbered j K + k, each point's from -1 on.
+    light (N,) RGB9E5 (`core.shared_exponent`); black entries stand where a step would be too long.
     """
 
     counts: NDArray[np.int64]
-    bands: NDArray[np.uint16]
+    steps: NDArray[np.uint8]
     light: NDArray[np.uint32]
 
 
@@ -89,10 +90,12 @@ def pair_transport(
     bands: Sequence[Bands],
     unit: float,
     texture: NDArray[np.float32] | None = None,
+    least: float = 0.0,
 ) -> Iterator[Pairs]:
     """Transport of a term with two curves as `transport`, times `texture` (P, 3), in multiples of `unit`.
 
-    Entries that round to black are left out. The points come in blocks, so that little memory is needed.
+    Of each band of the first curve, entries of less than `least` of its light are added to the last larger one before
+    them, or to the first. What rounds to black is left out. The points come in blocks, so that little memory is needed.
     """
     size = bands[0].count * bands[1].count
     at_once = max(1, PAIRS_AT_ONCE // size)
@@ -102,7 +105,9 @@ def pair_transport(
         few = points.where(some)
         factor = np.full((len(few), 3), 1 / unit, np.float32) if texture is None else texture[some] / np.float32(unit)
         lit = _Lit(few, lights, seen[:, some], term, bands)
-        yield _joined([_pairs(lit, begin, min(own, bands[0].count), factor) for begin in range(0, bands[0].count, own)])
+        last = dr.full(mi.UInt32, 0xFFFFFFFF, len(few))
+        parts = range(0, bands[0].count, own)
+        yield _joined([_pairs(lit, begin, min(own, bands[0].count), factor, last, least) for begin in parts])
 
 
 def _joined(parts: list[Pairs]) -> Pairs:
@@ -114,27 +119,34 @@ def _joined(parts: list[Pairs]) -> Pairs:
     joined = Pairs(counts.sum(axis=1), *(np.empty(counts.sum(), part.dtype) for part in parts[0][1:]))
     for k, part in enumerate(parts):
         at = np.arange(len(part.light)) + np.repeat(begins[:, k] - (np.cumsum(part.counts) - part.counts), part.counts)
-        joined.bands[at], joined.light[at] = part.bands, part.light
+        joined.steps[at], joined.light[at] = part.steps, part.light
     return joined
 
 
-def _pairs(lit: _Lit, begin: int, count: int, factor: NDArray[np.float32]) -> Pairs:
-    """Pairs of `count` bands of the first curve from `begin`."""
-    second, points = lit.counts[1], len(lit)
-    size = count * second
+def _pairs(lit: _Lit, begin: int, count: int, factor: NDArray[np.float32], last: Any, least: float) -> Pairs:
+    """Pairs of `count` bands of the first curve from `begin`; `last` (P,) is each point's last entry."""
+    size, points = count * lit.counts[1], len(lit)
     row, pixel, active = lit.rows(begin, count)
-    codes, light = (dr.empty(mi.UInt32, size * points) for _ in range(2))
-    found = dr.empty(mi.UInt32, points)
     scale = dr.gather(mi.Vector3f, vectors(mi.Vector3f, factor), pixel, active)
-    _pack(codes, light, found, row, pixel, active, scale, dr.opaque(mi.UInt32, begin * second), size)
+    places = _entries(size * points)
+    found = dr.empty(mi.UInt32, points)
+    if least:
+        _merge(row, active, dr.opaque(mi.Float, least), lit.counts[1], size)
+    _pack(places, found, last, row, pixel, active, scale, dr.opaque(mi.UInt32, begin * lit.counts[1]), size)
+    dr.eval(places, found, last)
     ends = dr.cumsum(found)
     total = int(ends[points - 1])
-    dense = [dr.empty(mi.UInt32, max(total, 1)) for _ in range(2)]
+    dense = _entries(max(total, 1))
     pixel, active = _threads(points)
     own, to = (dr.gather(mi.UInt32, of, pixel, active) for of in (found, ends - found))
-    _move(dense, (codes, light), pixel, own, to, size)
+    _move(dense, places, pixel, own, to, size)
     dr.eval(dense)
-    return Pairs(found.numpy().astype(np.int64), dense[0].numpy()[:total].astype(np.uint16), dense[1].numpy()[:total])
+    return Pairs(found.numpy().astype(np.int64), *(one.numpy()[:total] for one in dense))
+
+
+def _entries(count: int) -> list[Any]:
+    """Memory for steps and light of so many entries."""
+    return [dr.empty(dr.uint8_array_t(mi.UInt32), count), dr.empty(mi.UInt32, count)]
 
 
 def _threads(points: int) -> tuple[Any, Any]:
@@ -314,28 +326,64 @@ def _write(total, row, pixel, pixels, active, count):  # type: ignore[no-untyped
 
 
 @dr.syntax
-def _pack(codes, light, counts, row, pixel, active, scale, first, size):  # type: ignore[no-untyped-def]
+def _merge(row, active, share, second, size):  # type: ignore[no-untyped-def]
+    """Add each band's small entries to the last large one before them, or to the first."""
+    begin = mi.UInt32(0)
+    while active & (begin < size):
+        light, k = mi.Float(0), mi.UInt32(0)
+        while k < second:
+            light += _sum(row, begin + k)
+            k += 1
+        least, to, k = share * light, mi.UInt32(0xFFFFFFFF), mi.UInt32(0)
+        before = mi.Vector3f(0)
+        while (k < second) & (light > 0):
+            at = begin + k
+            if _sum(row, at) >= least:
+                to = mi.UInt32(at)
+                _add(row, 3 * at, before)
+                before = mi.Vector3f(0)
+            else:
+                value = mi.Vector3f(row[3 * at], row[3 * at + 1], row[3 * at + 2])
+                if to == 0xFFFFFFFF:
+                    before += value
+                else:
+                    _add(row, 3 * to, value)
+                _add(row, 3 * at, -value)
+            k += 1
+        begin += second
+
+
+def _sum(row: Any, at: Any) -> Any:
+    return row[3 * at] + row[3 * at + 1] + row[3 * at + 2]
+
+
+@dr.syntax
+def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type: ignore[no-untyped-def]
     """Write those pairs of each thread that are not black at the beginning of its `size` places."""
     code, found = mi.UInt32(0), mi.UInt32(0)
+    before = dr.gather(mi.UInt32, last, pixel, active)
     while active & (code < size):
         rgb = [dr.clip(row[3 * code + c] * scale[c], 0, LARGEST) for c in range(3)]
         bits = packed(
             *rgb, lambda x: dr.reinterpret_array(mi.UInt32, x), lambda x: dr.reinterpret_array(mi.Float, x), dr
         )
-        kept = (bits & ONES) > 0
+        step = first + code - before
+        kept = ((bits & ONES) > 0) | (step == LONGEST)
         at = pixel * size + found
-        dr.scatter(codes, code + first, at, kept)
-        dr.scatter(light, bits, at, kept)
+        dr.scatter(places[0], type(places[0])(step), at, kept)
+        dr.scatter(places[1], bits, at, kept)
         found += dr.select(kept, 1, 0)
+        before = dr.select(kept, first + code, before)
         code += 1
     dr.scatter(counts, found, pixel, active)
+    dr.scatter(last, before, pixel, active)
 
 
 @dr.syntax
-def _move(to, sources, pixel, count, begin, size):  # type: ignore[no-untyped-def]
+def _move(to, places, pixel, count, begin, size):  # type: ignore[no-untyped-def]
     """Bring what each thread has at its places together, from `begin`."""
     i = mi.UInt32(0)
     while i < count:
         for k in range(2):
-            dr.scatter(to[k], dr.gather(mi.UInt32, sources[k], pixel * size + i), begin + i)
+            dr.scatter(to[k], dr.gather(type(places[k]), places[k], pixel * size + i), begin + i)
         i += 1
