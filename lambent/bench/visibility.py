@@ -50,7 +50,7 @@ def _rows(name: str, count: int, effort: Effort) -> list[dict[str, Any]]:
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.bands import visibility
+    from lambent.bake.transport.visibility import visibility
     from lambent.bake.transport.coherence.predicted import VARIANTS, Predicted, predicted_visibility
     from lambent.bake.transport.view_points import view_points
 

@@ -15,7 +15,6 @@ from lambent.core.errors import UserError
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
-from lambent.editing.products import Halves
 from lambent.editing.rows import PairTransport, Rows
 from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
@@ -29,15 +28,15 @@ class StoredPairs:
     """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
-    pairs: NDArray[np.uint8]
-    values: Halves
+    steps: NDArray[np.uint8]
+    values: NDArray[np.uint32]
     unit: float
     counts: tuple[int, int]
 
     def fold(self, curve_index: int, means: Floats) -> Rows:
         """Rows over the other curve, see `rows.PairTransport`."""
         edited = 1 - curve_index
-        rows, scale = folded(self.spans, self.pairs, self.values, means, edited, self.counts[edited])
+        rows, scale = folded(self.spans, self.steps, self.values, means, edited, self.counts[edited])
         return Rows(rows, self.unit * scale, edited)
 
 
@@ -120,5 +119,5 @@ def _transport(store: Store, name: str, said: Mapping[str, Any]) -> Rows | PairT
     curves, unit = said["curves"], float(said["scale"])
     if len(curves) < 2:
         return Rows(store.read(f"{name}/rows"), unit)
-    spans, pairs, values = (store.read(f"{name}/{array}") for array in ("spans", "pairs", "values"))
-    return StoredPairs(spans, pairs, values, unit, (curves[0][1], curves[1][1]))
+    spans, steps, values = (store.read(f"{name}/{array}") for array in ("spans", "steps", "values"))
+    return StoredPairs(spans, steps, values, unit, (curves[0][1], curves[1][1]))

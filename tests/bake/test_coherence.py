@@ -92,7 +92,7 @@ def view() -> tuple[Any, Any, TriangleLights, Flags]:
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.bands import visibility
+    from lambent.bake.transport.visibility import visibility
     from lambent.bake.transport.view_points import view_points
 
     w = lat_long_directions(48, 96).reshape(-1, 3)
