@@ -36,7 +36,7 @@ class _ShadedLayer(GpuLayer):
             rows = pairs.fold(idle, means)
             return self.hold(rows.values), rows.unit
         edited = 1 - idle
-        products, scale = self.fold_pairs(pairs.spans, pairs.pairs, pairs.values, means, edited, pairs.counts[edited])
+        products, scale = self.fold_pairs(pairs.spans, pairs.steps, pairs.values, means, edited, pairs.counts[edited])
         return products, pairs.unit * scale
 
 

@@ -109,7 +109,8 @@ def test_part_of_the_pixels_is_drawn_anew(device: Any) -> None:
 def test_folding_is_as_in_memory(
     device: Any, monkeypatch: pytest.MonkeyPatch, bands: tuple[int, int], edited: int, points: int
 ) -> None:
-    stored = sparse(points + 1, bands, 300)  # the last has none
+    stored = sparse(points + 1, bands, min(300, 2 * bands[0] * bands[1]))  # the last has none
+    stored[0][points // 2] = 0, 0  # nor has this one
     idle = np.random.default_rng(1).uniform(0, 3e4, (bands[1 - edited], 3))
     rows, scale = folded(*stored, idle, edited, bands[edited])
     pictures: list[list[np.ndarray]] = []

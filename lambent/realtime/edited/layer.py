@@ -14,7 +14,8 @@ from lambent.realtime.edited.commands import GROUP, Commands
 from lambent.realtime.edited.products import GpuProducts, Halves, Piece, new_piece, words_of
 
 POINTS_AT_ONCE = 2 * 65535  # of a fold: two for each workgroup
-PAIR_BYTES = 6  # of a pair's values; its bands have 2 in a buffer of their own
+PAIR_BYTES = 4  # of a pair's value; its step has one in a buffer of its own
+MOST_BANDS = 256  # that the shader has room for
 TEXTURE, CURVE = 1, 2
 
 
@@ -60,19 +61,26 @@ class GpuLayer:
         return self._show(transport.shape)
 
     def fold_pairs(
-        self, spans: NDArray[np.uint32], pairs: NDArray[np.uint8], values: Halves, idle: Floats, edited: int, bands: int
+        self,
+        spans: NDArray[np.uint32],
+        steps: NDArray[np.uint8],
+        values: NDArray[np.uint32],
+        idle: Floats,
+        edited: int,
+        bands: int,
     ) -> tuple[GpuProducts, float]:
         """Fold on the GPU; parameters, and the scale that is returned, as of `lambent.editing.folding.folded`.
 
         The pairs are sent once, and kept.
         """
-        if self._pairs is not pairs:
-            self._send(spans, pairs, values, max(bands, len(idle)))
-            self._pairs = pairs
+        assert max(bands, len(idle)) <= MOST_BANDS
+        if self._pairs is not values:
+            self._send(spans, steps, values, max(bands, len(idle)))
+            self._pairs = values
         scale = float(np.abs(idle).max()) or 1.0
         means = np.zeros((len(idle), 4), np.float32)
         means[:, :3] = idle / scale
-        head = np.array([edited, bands, 0, 0], np.uint32)
+        head = np.array([edited, bands, bands if edited else len(idle), 0], np.uint32)
         work = [(group, words_of(points), 1) for group, points in self._folds]
         self._commands.dispatch("fold", head.tobytes() + means.tobytes(), work)
         return self._show((bands, 3, len(spans))), scale
@@ -111,26 +119,36 @@ class GpuLayer:
             self._pieces.append(piece)
             self._composed.append((commands.group("compose", *buffers, self._curve, self._image), pixels))
 
-    def _send(self, spans: NDArray[np.uint32], pairs: NDArray[np.uint8], values: Halves, rows: int) -> None:
+    def _send(self, spans: NDArray[np.uint32], steps: NDArray[np.uint8], values: NDArray[np.uint32], rows: int) -> None:
         """Divide the points so that a shader sees all pairs of a piece and all of its rows, and upload them."""
         commands = self._commands
-        self._divide(list(self._parts(spans, rows)), rows)
+        begins, ends = _bounds(spans)
+        self._divide(list(self._parts(begins, ends, rows)), rows)
         for piece in self._pieces:
-            mine = spans[piece.first : piece.first + piece.pixels]
-            begin, end = int(mine[:, 0].min()), int(mine[:, 1].max())
-            arrays = (mine - np.uint32(begin)).astype(np.uint32), pairs[begin:end], values[begin:end]
-            buffers = [commands.buffer(array) for array in arrays]
+            mine = slice(piece.first, piece.first + piece.pixels)
+            begin = int(begins[mine].min())
+            part = slice(begin, max(begin, int(ends[mine].max())))
+            moved = np.where(begins[mine] < ends[mine], spans[mine].T - np.uint32(begin), 0).T.astype(np.uint32)
+            buffers = [commands.buffer(array) for array in (moved, steps[part], values[part])]
             self._folds.append((commands.group("fold", piece.about, *buffers, piece.transport), piece.pixels))
 
-    def _parts(self, spans: NDArray[np.uint32], rows: int) -> Iterator[tuple[int, int]]:
-        most = min(self._most(rows), POINTS_AT_ONCE)
+    def _parts(self, begins: Indices, ends: Indices, rows: int) -> Iterator[tuple[int, int]]:
+        """(first, pixels) of pieces."""
+        most, pairs = min(self._most(rows), POINTS_AT_ONCE), self._commands.largest // PAIR_BYTES
         first = 0
-        while first < len(spans):
-            few = spans[first : first + most].astype(np.int64)
-            taken = np.maximum.accumulate(few[:, 1]) - np.minimum.accumulate(few[:, 0])
-            count = max(1, int(np.searchsorted(taken, self._commands.largest // PAIR_BYTES, side="right")))
+        while first < len(begins):
+            few = slice(first, first + most)
+            taken = np.maximum.accumulate(ends[few]) - np.minimum.accumulate(begins[few])
+            count = max(1, int(np.searchsorted(taken, pairs, side="right")))
             yield first, count
             first += count
+
+
+def _bounds(spans: NDArray[np.uint32]) -> tuple[Indices, Indices]:
+    """First entries and those past the last; points without any bound nothing."""
+    begins, ends = spans.astype(np.int64).T
+    empty = begins >= ends
+    return np.where(empty, ends.max(initial=0), begins), np.where(empty, 0, ends)
 
 
 def texels(pixel: Indices, width: int, stride: int) -> NDArray[np.uint32]:

@@ -7,53 +7,56 @@
 #include "wavelet_taps.wgsl"
 
 const LANES = 64u;
-const MOST = 256u;  // bands: pairs name them by bytes
+const MOST = 256u;  // bands of a curve
 
 struct Fold {
     edited: u32,  // 0 or 1: which of the two curves
     bands: u32,   // of it, a power of two
+    second: u32,  // bands of the second curve, a power of two
     idle: array<vec4f>,  // means of the other curve over its bands
 }
 
 @group(0) @binding(0) var<storage, read> fold: Fold;
-@group(1) @binding(1) var<storage, read> spans: array<vec2u>;  // of the piece's points, in `pairs` and `values`
-@group(1) @binding(2) var<storage, read> pairs: array<u32>;
+@group(1) @binding(1) var<storage, read> spans: array<vec2u>;  // of the piece's points, in `steps` and `values`
+@group(1) @binding(2) var<storage, read> steps: array<u32>;
 @group(1) @binding(3) var<storage, read> values: array<u32>;
 @group(1) @binding(4) var<storage, read_write> transport: array<u32>;
 
-var<workgroup> band: array<u32, LANES>;
+var<workgroup> step: array<u32, LANES>;
 var<workgroup> light: array<vec3f, LANES>;
 var<workgroup> row: array<vec3f, MOST>;
 var<workgroup> before: array<vec3f, MOST>;
 var<workgroup> left: array<vec3f, MOST>;  // row of the first of both points
 
-// Bands of both curves of an entry: two bytes of each.
-fn bands_of(entry: u32) -> vec2u {
-    let both = pairs[entry / 2u] >> (16u * (entry % 2u));
-    return vec2u(both & 0xffu, (both >> 8u) & 0xffu);
+// From an entry's pair of bands to the next entry's: a byte of each.
+fn step_of(entry: u32) -> u32 {
+    return (steps[entry / 4u] >> (8u * (entry % 4u))) & 0xffu;
 }
 
-// Transport of an entry: three half floats of each.
+// Transport of an entry: RGB9E5, see `lambent.core.shared_exponent`.
 fn value_of(entry: u32) -> vec3f {
-    let word = 3u * entry / 2u;
-    let first = unpack2x16float(values[word]);
-    let second = unpack2x16float(values[word + 1u]);
-    return select(vec3f(first, second.x), vec3f(first.y, second), entry % 2u == 1u);
+    let bits = values[entry];
+    let unit = bitcast<f32>(((bits >> 27u) + 103u) << 23u);
+    return unit * vec3f(vec3u(bits, bits >> 9u, bits >> 18u) & vec3u(511u));
 }
 
 fn sum_of(point: u32, lane: u32) {
     for (var i = lane; i < fold.bands; i += LANES) { row[i] = vec3f(0.0); }
     let span = select(vec2u(0u), spans[min(point, piece.pixels - 1u)], point < piece.pixels);
+    let shift = firstTrailingBit(fold.second);
+    var pair = 0xffffffffu;  // -1
     for (var first = span.x; first < span.y; first += LANES) {
         let entry = first + lane;
         if (entry < span.y) {
-            let both = bands_of(entry);
-            band[lane] = both[fold.edited];
-            light[lane] = fold.idle[both[1u - fold.edited]].rgb * value_of(entry);
+            step[lane] = step_of(entry);
+            light[lane] = value_of(entry);
         }
         workgroupBarrier();
         for (var k = 0u; k < min(LANES, span.y - first); k++) {
-            if (band[k] % LANES == lane) { row[band[k]] += light[k]; }  // this thread's bands alone
+            pair += step[k];
+            var bands = vec2u(pair >> shift, pair & (fold.second - 1u));
+            if (fold.edited == 1u) { bands = bands.yx; }
+            if (bands.x % LANES == lane) { row[bands.x] += fold.idle[bands.y].rgb * light[k]; }  // this thread's alone
         }
         workgroupBarrier();
     }
