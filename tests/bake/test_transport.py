@@ -122,8 +122,8 @@ def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SI
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.visibility import visibility
     from lambent.bake.transport.view_points import view_points
+    from lambent.bake.transport.visibility import visibility
 
     builder = SceneBuilder(scene)
     traced = builder.build()

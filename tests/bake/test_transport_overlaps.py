@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.transport.overlaps import spread, share_below
+from lambent.bake.transport.overlaps import share_below, spread
 from lambent.materials.lobes import NUMPY
 
 

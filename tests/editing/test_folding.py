@@ -31,7 +31,9 @@ def matrix(transport: Sparse, bands: tuple[int, int]) -> np.ndarray:
     spans, steps, values = transport
     whole = np.zeros((len(spans), *bands, 3))
     for p, (begin, end) in enumerate(spans):
-        np.add.at(whole[p], np.divmod(np.cumsum(steps[begin:end].astype(int)) - 1, bands[1]), unpacked_rgb(values[begin:end]))
+        np.add.at(
+            whole[p], np.divmod(np.cumsum(steps[begin:end].astype(int)) - 1, bands[1]), unpacked_rgb(values[begin:end])
+        )
     return whole
 
 

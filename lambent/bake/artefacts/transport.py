@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bake.artefacts.visibility import lights_key, trace
+from lambent.bake.behind import Behind, behind
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import key_of, texture_inputs
@@ -132,10 +133,12 @@ class _Baking:
 
         bands, many = self._bands(), len(self.points)
         writer = self._begin(store, "rows", (bands[0].count, 3, many), (bands[0].count, 3, POINTS), "float16")
-        for chunk in self._missing(writer):
-            some = writer.artefact.region(chunk)[2]
-            found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
-            writer.write(chunk, wavelet_rows(found * self._texture(some).T, self.scale))
+        with behind() as after:
+            for chunk in self._missing(writer):
+                some = writer.artefact.region(chunk)[2]
+                found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
+                texture = self._texture(some).T
+                after.do(lambda c, light: writer.write(c, wavelet_rows(light, self.scale)), chunk, found * texture)
         writer.finish()
 
     def pairs(self, store: Store) -> None:
@@ -147,21 +150,25 @@ class _Baking:
         spans = self._begin(store, "spans", (many, 2), (POINTS, 2), "uint32")
         steps = self._begin(store, "steps", (0,), (ENTRIES,), "uint8", growing=True)
         values = self._begin(store, "values", (0,), (ENTRIES,), "uint32", growing=True)
-        for chunk in self._missing(spans):
-            some = spans.artefact.region(chunk)[0]
-            begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
-            begin = -(-begin // ENTRIES) * ENTRIES
-            points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
-            streams, counts = [_Stream(writer, begin) for writer in (steps, values)], []
-            for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
-                counts.append(found.counts)
-                streams[0].add(found.steps)
-                streams[1].add(found.light)
-            for stream in streams:
-                stream.end()
-            many_each = np.concatenate(counts)
-            ends = begin + np.cumsum(many_each)
-            spans.write(chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
+        begin = None
+        with behind() as after:
+            for chunk in self._missing(spans):
+                if begin is None:
+                    begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
+                begin = -(-begin // ENTRIES) * ENTRIES
+                some = spans.artefact.region(chunk)[0]
+                points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
+                streams, counts = [_Stream(writer, begin, after) for writer in (steps, values)], []
+                for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
+                    counts.append(found.counts)
+                    streams[0].add(found.steps)
+                    streams[1].add(found.light)
+                for stream in streams:
+                    stream.end()
+                many_each = np.concatenate(counts)
+                ends = begin + np.cumsum(many_each)
+                after.do(spans.write, chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
+                begin = int(ends[-1])
         for writer in (steps, values, spans):
             writer.finish()
 
@@ -200,8 +207,8 @@ class _Baking:
 class _Stream:
     """Writes entries into whole chunks from `begin`, the last one filled with zeros."""
 
-    def __init__(self, writer: Writer, begin: int) -> None:
-        self._writer, self._next = writer, begin // ENTRIES
+    def __init__(self, writer: Writer, begin: int, after: Behind) -> None:
+        self._writer, self._next, self._after = writer, begin // ENTRIES, after
         self._chunk, self._filled = np.zeros(ENTRIES, writer.artefact.dtype), 0
 
     def add(self, entries: np.ndarray) -> None:
@@ -211,19 +218,19 @@ class _Stream:
             self._chunk[self._filled : self._filled + len(here)] = here
             self._filled += len(here)
             if self._filled == ENTRIES:
-                self._write()
+                self.end()
 
     def end(self) -> None:
-        self._chunk[self._filled :] = 0
         if self._filled:
-            self._write()
+            self._after.do(self._write, self._next, self._chunk)
+            self._chunk, self._filled = np.zeros(ENTRIES, self._writer.artefact.dtype), 0
+            self._next += 1
 
-    def _write(self) -> None:
-        missing = (self._next + 1) * ENTRIES - self._writer.artefact.shape[0]
+    def _write(self, number: int, chunk: np.ndarray) -> None:
+        missing = (number + 1) * ENTRIES - self._writer.artefact.shape[0]
         if missing > 0:
             self._writer.extend(missing)
-        self._writer.write((self._next,), self._chunk)
-        self._next, self._filled = self._next + 1, 0
+        self._writer.write((number,), chunk)
 
 
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:

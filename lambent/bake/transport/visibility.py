@@ -52,7 +52,7 @@ def _seen(scene, p, flat, normal, both, first, lights, centres, near, any_near, 
         centre = dr.gather(mi.Vector3f, centres, m, here)
         is_near = dr.gather(mi.Bool, near, m, here) if dr.hint(any_near, mode="scalar") else mi.Bool(False)
         here &= both | (dr.dot(normal, centre - dr.select(is_near, mi.Vector3f(p), 0)) > 0)
-        blocked = in_shadow(scene, leaving(scene, p, flat, centre), here & ~is_near, holes)
+        blocked = in_shadow(scene, leaving(scene, p, flat, centre), here & ~is_near, holes, coherent=True)
         if dr.hint(any_near, mode="scalar"):
             blocked |= hidden(scene, p, flat, mi.Point3f(centre), here & is_near, holes) & is_near
         word |= dr.select(here & ~blocked, mi.UInt32(1) << i, 0)
