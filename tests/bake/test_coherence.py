@@ -92,8 +92,8 @@ def view() -> tuple[Any, Any, TriangleLights, Flags]:
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.bands import visibility
     from lambent.bake.transport.view_points import view_points
+    from lambent.bake.transport.visibility import visibility
 
     w = lat_long_directions(48, 96).reshape(-1, 3)
     weight = np.repeat(-np.diff(np.cos(np.linspace(0, np.pi, 49))), 96) * np.pi / 48

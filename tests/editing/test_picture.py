@@ -255,7 +255,7 @@ def test_no_edit_is_no_work(tray: Editable, monkeypatch: pytest.MonkeyPatch) -> 
     part, _ = part_of(tray, np.arange(40), 5)
     picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"tray": part})
     picture.show("tray", tray)
-    monkeypatch.setattr("lambent.editing.incremental.add_rows", None)
+    monkeypatch.setattr("lambent.editing.products.add_rows", None)
     picture.step()
     assert picture.is_settled
 
