@@ -9,17 +9,25 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.wavelets import TAPS
-from lambent.editing.products import Halves, float_of_half, half_of_float
+from lambent.editing.products import Halves, half_of_float
 
 TOGETHER = 32  # points whose rows stay in the second-level cache
 
 
 def folded(
-    spans: NDArray[np.uint32], pairs: NDArray[np.uint8], values: Halves, idle: Floats, edited: int, bands: int
+    spans: NDArray[np.uint32],
+    steps: NDArray[np.uint8],
+    values: NDArray[np.uint32],
+    idle: Floats,
+    edited: int,
+    bands: int,
 ) -> tuple[Halves, float]:
     """Transport of the edited one of two curves, with the other's coefficients folded in.
 
@@ -27,10 +35,11 @@ def folded(
     ----------
     spans : (P, 2)
         First entry of each point, and the one past its last.
-    pairs : (N, 2)
-        Bands of the two curves.
-    values : (N, 3)
-        Transport by these.
+    steps : (N,)
+        From each entry's pair of bands to the next entry's. With K bands of the second curve, bands j and k are pair
+        j K + k; each point begins at -1.
+    values : (N,)
+        Transport by these, RGB9E5 (`core.shared_exponent`).
     idle : (K, 3)
         Means of the curve that stays over its bands.
     edited : {0, 1}
@@ -47,14 +56,21 @@ def folded(
     """
     scale = float(np.abs(idle).max()) or 1.0
     out = np.empty((bands, 3, len(spans)), np.uint16)
-    _fold(
-        out, spans, pairs, values.view(np.uint16), (idle / scale).astype(np.float32), edited, TAPS.astype(np.float32)
-    )  # fmt: skip
+    second = bands if edited else len(idle)
+    _fold(out, spans, steps, values, (idle / scale).astype(np.float32), edited, second, TAPS.astype(np.float32))
     return out.view(np.float16), scale
 
 
+@intrinsic
+def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
+    def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
+        return builder.bitcast(args[0], ir.FloatType())
+
+    return types.float32(types.uint32), generate
+
+
 @numba.njit(parallel=True, fastmath=True, cache=True)
-def _fold(out, spans, pairs, values, idle, edited, taps):  # type: ignore[no-untyped-def]
+def _fold(out, spans, steps, values, idle, edited, second, taps):  # type: ignore[no-untyped-def]
     bands, _, points = out.shape
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
         first = block * TOGETHER
@@ -62,12 +78,17 @@ def _fold(out, spans, pairs, values, idle, edited, taps):  # type: ignore[no-unt
         rows = np.zeros((TOGETHER, bands, 4), np.float32)
         before = np.empty((bands, 4), np.float32)
         for i in range(count):
-            row = rows[i]
+            row, pair = rows[i], -1
             for n in range(spans[first + i, 0], spans[first + i, 1]):
-                j, k = pairs[n, edited], pairs[n, 1 - edited]
-                row[j, 0] += idle[k, 0] * float_of_half(values[n, 0])  # type: ignore[call-arg]
-                row[j, 1] += idle[k, 1] * float_of_half(values[n, 1])
-                row[j, 2] += idle[k, 2] * float_of_half(values[n, 2])
+                pair += steps[n]
+                j, k = pair // second, pair % second
+                if edited:
+                    j, k = k, j
+                bits = values[n]
+                unit = _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
+                row[j, 0] += idle[k, 0] * unit * np.float32(bits & 511)
+                row[j, 1] += idle[k, 1] * unit * np.float32(bits >> 9 & 511)
+                row[j, 2] += idle[k, 2] * unit * np.float32(bits >> 18 & 511)
             _to_wavelets(row, before, taps)
         for j in range(bands):
             for c in range(3):

@@ -15,6 +15,7 @@ from lambent.bake.view import View
 from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.core.progress import Cancelled
+from lambent.core.shared_exponent import unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
@@ -25,6 +26,7 @@ from lambent.store.contract import baked_views, transport_lights, view_artefact_
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY
 from tests.bake.test_transport import CAMERA, GLOSSY, ball_on_floor, view
+from tests.tools.pair_numbers import pair_numbers
 
 SIZE = (12, 10)
 HOW = Settings(sharp=64, smooth=16, sharp_of_two=64, smooth_of_two=16)
@@ -68,9 +70,11 @@ def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.nda
         if len(means) == 1:
             light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
         else:
-            pairs, values = store.read(f"{start}pairs"), store.read(f"{start}values").astype(float)
-            share = values * means[0][pairs[:, 0]] * means[1][pairs[:, 1]]
-            light = np.array([share[a:b].sum(axis=0) for a, b in store.read(f"{start}spans")]).reshape(-1, 3)
+            spans, steps, values = (store.read(start + part) for part in ("spans", "steps", "values"))
+            light = np.zeros((len(spans), 3))
+            for p, (a, b) in enumerate(spans):
+                j, k = np.divmod(pair_numbers(np.array([b - a]), steps[a:b]), len(means[1]))
+                light[p] = (unpacked_rgb(values[a:b]) * means[0][j] * means[1][k]).sum(axis=0)
         total[worn == term["material"]] += light * of_term.scale * term["scale"]
     return total
 
