@@ -68,7 +68,7 @@ class HostLayer:
         return self.hold(rows.values), rows.unit
 
     def view(self, curve: Curve | None) -> None:
-        self.multiplier = self._texture if curve is None else _viewed(self._texture, self._theta_o, curve)
+        self.multiplier = self._texture if curve is None else viewed(self._texture, self._theta_o, curve)
 
 
 class HostCanvas:
@@ -94,7 +94,7 @@ class HostCanvas:
         return self._image
 
 
-def _viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
+def viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
     """(3, P): a texture (3, P), or (3, 1), times f_o(theta_o)."""
     texture = np.ascontiguousarray(np.broadcast_to(texture, (3, len(theta_o))))
     return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))

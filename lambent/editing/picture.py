@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Image, Indices
 from lambent.core.discovery import known
-from lambent.editing.canvas import Canvas, HostCanvas
+from lambent.editing.canvas import Canvas, HostCanvas, Layer
 from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
 from lambent.editing.products import Products
 from lambent.editing.rows import PairTransport, Rows, coefficients_of
@@ -159,7 +159,12 @@ class EditedPicture:
 
     def compose(self) -> None:
         """Bring the canvas up to date: where it is shown from a GPU's memory, frames end with this."""
-        self.canvas.compose([(t.layer, t.scale) for terms in self._terms.values() for t in terms])
+        self.canvas.compose(self.shown)
+
+    @property
+    def shown(self) -> list[tuple[Layer, NDArray[np.float32]]]:
+        """Layers with their scales, to be composed."""
+        return [(term.layer, term.scale) for terms in self._terms.values() for term in terms]
 
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""

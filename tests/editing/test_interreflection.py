@@ -1,4 +1,4 @@
-"""Freezing: the polynomial in one material is the whole sum; incremental frames reach it; views are refused in words."""
+"""Freezing: the polynomial in one material is the whole sum, and incremental frames reach it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
+from lambent.editing.canvas import HostCanvas
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
@@ -19,6 +20,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 SIZE = (7, 5)
+CANVAS = HostCanvas(np.zeros((*SIZE, 3), np.float32))
 GLOSSY = of_material(Material(kd=(0.4, 0.3, 0.2), lobes=(Lobe(mx=0.3, my=0.3, r0=0.5),)))
 PAPER = of_material(Material(kd=(0.7, 0.6, 0.5), kt_d=0.2))
 KNOWN = of_material(Material(kd=0.3))
@@ -27,7 +29,10 @@ SLOTS = (("glossy", "reflection"), ("paper", "reflection"), ("paper", "transmiss
 DIFFUSE = Tails(SLOTS, 4)
 SLOW = Tails(
     SLOTS, 3,
-    (SecondBands("glossy", 0, (2,)), SecondBands("glossy", 1, (8, 2)), SecondBands("paper", 0, (2,)), SecondBands("paper", 1, (2,)), SecondBands("", 0, ())),
+    (
+        SecondBands("glossy", 0, (2,)), SecondBands("glossy", 1, (8, 2)), SecondBands("paper", 0, (2,)),
+        SecondBands("paper", 1, (2,)), SecondBands("", 0, ()),
+    ),
 )  # fmt: skip
 
 
@@ -72,9 +77,8 @@ def expected(whole: Interreflections, materials: dict[str, Editable], hits: tupl
 
 
 def shown(frozen: FrozenPicture) -> np.ndarray:
-    image = np.zeros((*SIZE, 3), np.float32)
-    frozen.add_to(image)
-    return image
+    CANVAS.compose(frozen.shown)
+    return CANVAS.image()
 
 
 @pytest.mark.parametrize("tails", [DIFFUSE, SLOW], ids=["diffuse", "slow"])
@@ -82,16 +86,16 @@ def shown(frozen: FrozenPicture) -> np.ndarray:
 @pytest.mark.parametrize("hits", [(2, 99), (3, 3)])
 def test_frozen_pictures_are_the_whole_sum(tails: Tails, edited: str, hits: tuple[int, int]) -> None:
     whole = light(tails)
-    frozen = FrozenPicture(whole, START, edited, hits=hits)
+    frozen = FrozenPicture(whole, START, edited, CANVAS, hits=hits)
     reference = expected(whole, START, hits)
     assert np.abs(shown(frozen) - reference).max() < 2e-3 * reference.max()
 
 
 @pytest.mark.parametrize("tails", [DIFFUSE, SLOW], ids=["diffuse", "slow"])
 def test_edits_by_frames(tails: Tails) -> None:
-    """A highlight is moved, the diffuse colour is changed: frames reach the sum of everything, others answer as well."""
+    """A highlight and a colour change: frames reach the sum of everything; other materials answer as well."""
     whole = light(tails)
-    frozen = FrozenPicture(whole, START, "glossy")
+    frozen = FrozenPicture(whole, START, "glossy", CANVAS)
     before = shown(frozen)
     later = of_material(Material(kd=(0.1, 0.8, 0.4), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),)))
     assert frozen.serves(later, None)
@@ -109,13 +113,13 @@ def test_edits_by_frames(tails: Tails) -> None:
 
 
 def test_the_idle_curve_wants_to_be_frozen_anew() -> None:
-    frozen = FrozenPicture(light(DIFFUSE), START, "glossy")
+    frozen = FrozenPicture(light(DIFFUSE), START, "glossy", CANVAS)
     first, second = (factor.curve for factor in GLOSSY.terms[1].factors)
     flat = GLOSSY.with_curve(second, Curve.constant(0.3))
     assert frozen.serves(GLOSSY, first)
     assert not frozen.serves(flat, None)
     assert not frozen.serves(GLOSSY, second)
-    anew = FrozenPicture(light(DIFFUSE), {**START, "glossy": flat}, "glossy", active=second)
+    anew = FrozenPicture(light(DIFFUSE), {**START, "glossy": flat}, "glossy", CANVAS, active=second)
     assert anew.serves(flat, second)
     reference = expected(light(DIFFUSE), {**START, "glossy": flat})
     assert np.abs(shown(anew) - reference).max() < 2e-3 * reference.max()

@@ -1,4 +1,4 @@
-"""The interreflections of an edited view as a picture, to be added to its direct light.
+"""The interreflections of an edited view, as layers of the canvas that its direct light is drawn on.
 
     B = sum over monomials q of  m_q(d_i)  sum over bands of  c_j F_jq        (Ben-Artzi 2007, eq. 6.8)
 
@@ -11,19 +11,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lambent.core.arrays import Image
-from lambent.editing.incremental import TERMS, IncrementalPicture
+from lambent.editing.canvas import Canvas, Layer, viewed
+from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
 from lambent.editing.interreflection.folding import pixels, rows
 from lambent.editing.interreflection.powers import Powers, bands_of, powers
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
-from lambent.editing.picture import _compose, _viewed
 from lambent.editing.products import Pixels
-from lambent.editing.rows import coefficients_of
+from lambent.editing.rows import Rows, coefficients_of
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.terms import Editable, Term
 
 ALL_HITS = (2, 99)
+Shown = list[tuple[Layer, NDArray[np.float32]]]
 
 
 class FrozenPicture:
@@ -35,6 +36,8 @@ class FrozenPicture:
         All materials of the view, as they are now.
     edited : str
         The one that is edited.
+    canvas : Canvas
+        Makes the layers.
     active : str, optional
         Its curve that is edited, in terms that have two.
     hits : (int, int)
@@ -46,33 +49,33 @@ class FrozenPicture:
         light: Interreflections,
         materials: Mapping[str, Editable],
         edited: str,
+        canvas: Canvas,
         active: str | None = None,
         hits: tuple[int, int] = ALL_HITS,
     ) -> None:
-        self.edited, self.active, self._light = edited, active, light
+        self.edited, self.hits = edited, hits
         self._powers = powers(light.tails, materials, edited, hits)
-        self._others = {
-            name: frozen_light(part, materials[name], self._powers)
-            for name, part in light.parts.items()
-            if name != edited
-        }
+        self._others: list[list[_Sum]] = []
         self._terms: list[_TermPicture] = []
-        self._own = light.parts.get(edited)
-        if self._own is not None and self._own.edited:
-            pairs = zip(materials[edited].terms, self._own.terms, strict=True)
-            self._terms = [_TermPicture(*pair, self._own, materials[edited], self._powers, active) for pair in pairs]
-        elif self._own is not None:
-            self._others[edited] = frozen_light(self._own, materials[edited], self._powers)
+        for name, part in light.parts.items():
+            if name == edited and part.edited:
+                pairs = zip(materials[edited].terms, part.terms, strict=True)
+                self._terms = [
+                    _TermPicture(*pair, part, materials[edited], self._powers, active, canvas) for pair in pairs
+                ]
+            else:
+                sums = frozen_light(part, materials[name], self._powers)
+                self._others.append([_Sum(one, part, canvas) for one in sums])
         self.show(materials[edited])
         self.draw()
 
-    def serves(self, material: Editable, active: str | None) -> bool:
+    def serves(self, material: Editable, active: str | None = None) -> bool:
         """Whether the edited material can be shown so: no idle curve of a term with two has changed."""
         return all(term.serves(material, active) for term in self._terms)
 
     def show(self, material: Editable) -> None:
         """Let the picture go to the material as it is edited now."""
-        self._values = self._powers.values(material)
+        self._values = self._powers.values(material).astype(np.float32)
         for term, now in zip(self._terms, material.terms, strict=bool(self._terms)):
             term.show(material, now)
 
@@ -90,27 +93,53 @@ class FrozenPicture:
     def is_exact(self) -> bool:
         return all(term.is_exact for term in self._terms)
 
-    def add_to(self, image: Image) -> None:
-        """Add the interreflections to an image (H, W, 3) of linear radiance, in place."""
-        flat, one = image.reshape(-1, 3), np.ones((3, 1), np.float32)
-        values = self._values.astype(np.float32)
-        for name, sums in self._others.items():
-            for value, picture in zip(values, sums, strict=True):
-                _compose(flat, self._light.parts[name].pixel, picture, value, one)
-        for term in self._terms:
-            assert self._own is not None
-            for value, picture in zip(values, term.pictures, strict=True):
-                _compose(flat, self._own.pixel, picture.picture, value * term.scale, term.multiplier)
+    @property
+    def is_settled(self) -> bool:
+        """Whether another frame would change no bit."""
+        return all(term.is_settled for term in self._terms)
+
+    @property
+    def shown(self) -> Shown:
+        """Layers with their scales, to be composed."""
+        others = [
+            (one.layer, value * one.unit)
+            for sums in self._others
+            for one, value in zip(sums, self._values, strict=True)
+        ]
+        own = [
+            (layer, value * term.scale)
+            for term in self._terms
+            for layer, value in zip(term.layers, self._values, strict=True)
+        ]
+        return others + own
+
+
+class _Sum:
+    """A picture (3, P) that stays as it is, as a layer."""
+
+    def __init__(self, picture: Pixels, part: PartLight, canvas: Canvas) -> None:
+        held = Rows.of_wavelets(picture[None])
+        self.layer, self.unit = canvas.layer(part.pixel, part.theta_o, None), np.float32(held.unit)
+        products = IncrementalPicture(self.layer.hold(held.values))
+        products.want(np.ones((1, 3)))
+        products.draw()
 
 
 class _TermPicture:
     """One term of the edited material: an incremental picture for each monomial, over its active curve."""
 
     def __init__(
-        self, term: Term, light: TermLight, part: PartLight, material: Editable, power: Powers, active: str | None
+        self,
+        term: Term,
+        light: TermLight,
+        part: PartLight,
+        material: Editable,
+        power: Powers,
+        active: str | None,
+        canvas: Canvas,
     ) -> None:
         names = [factor.curve for factor in term.factors]
-        self._factors, self._counts, self._theta_o = term.factors, light.counts, part.theta_o
+        self._factors, self._counts = term.factors, light.counts
         self._at = names.index(active) if active in names else 0
         self._idle = {name: material.curves[name] for k, name in enumerate(names) if k != self._at}
         idle = np.ones((1, 3))
@@ -121,41 +150,54 @@ class _TermPicture:
             row = (row[:, None] + (np.arange(count) if k == self._at else np.zeros(count, np.int64))).reshape(-1)
         count = light.counts[self._at] if light.counts else 1
         found, self._unit = rows(light, idle, power.weight, power.power, len(power.exponents), row, count)
-        self.pictures = [IncrementalPicture(one) for one in found]
+        self.layers = [canvas.layer(part.pixel, part.theta_o, None) for _ in found]
+        self._pictures = [IncrementalPicture(layer.hold(one)) for layer, one in zip(self.layers, found, strict=True)]
         self._viewer: Curve | None = None
-        self.multiplier: Pixels = np.ones((3, 1), np.float32)
+        self._to_renew = 0
 
     def serves(self, material: Editable, active: str | None) -> bool:
         names = [factor.curve for factor in self._factors]
         if active in names and names.index(active) != self._at:
             return False
-        return all(material.curves[name] is curve or np.array_equal(material.curves[name].values, curve.values)
-                   for name, curve in self._idle.items())  # fmt: skip
+        return all(
+            material.curves[name] is curve or np.array_equal(material.curves[name].values, curve.values)
+            for name, curve in self._idle.items()
+        )
 
     def show(self, material: Editable, term: Term) -> None:
         self.scale = np.asarray(np.multiply(term.scale, self._unit), np.float32)
         viewer = material.curves[term.viewer] if term.viewer else None
         if viewer is not self._viewer:
-            self._viewer, one = viewer, np.ones((3, 1), np.float32)
-            self.multiplier = one if viewer is None else _viewed(one, self._theta_o, viewer)
+            self._viewer = viewer
+            for layer in self.layers:
+                layer.view(viewer)
         if self._factors:
             wanted = coefficients_of(material.curves[self._factors[self._at].curve], self._counts[self._at])
         else:
             wanted = np.ones((1, 3))
-        for picture in self.pictures:
+        if not np.array_equal(wanted, self._pictures[0].wanted):
+            self._to_renew = RENEWED_IN
+        for picture in self._pictures:
             picture.want(wanted)
 
     def step(self, terms: int) -> None:
-        for picture in self.pictures:
-            picture.step(terms)
+        if not self.is_settled:
+            for picture in self._pictures:
+                picture.step(terms)
+            self._to_renew -= 1
 
     def draw(self) -> None:
-        for picture in self.pictures:
+        for picture in self._pictures:
             picture.draw()
+        self._to_renew = 0
 
     @property
     def is_exact(self) -> bool:
-        return all(picture.is_exact for picture in self.pictures)
+        return all(picture.is_exact for picture in self._pictures)
+
+    @property
+    def is_settled(self) -> bool:
+        return self.is_exact and self._to_renew <= 0
 
 
 def frozen_light(part: PartLight, material: Editable, power: Powers) -> Pixels:
@@ -167,6 +209,6 @@ def frozen_light(part: PartLight, material: Editable, power: Powers) -> Pixels:
         found = pixels(light, bands_of(term.factors, light.counts, material), power.weight, power.power, len(total))
         scale = np.asarray(term.scale, np.float32)[:, None]
         if term.viewer:
-            scale = scale * _viewed(np.ones((3, 1), np.float32), part.theta_o, material.curves[term.viewer])
+            scale = scale * viewed(np.ones((3, 1), np.float32), part.theta_o, material.curves[term.viewer])
         total += found * scale
     return total
