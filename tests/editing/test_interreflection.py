@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -12,11 +13,14 @@ from lambent.editing.canvas import HostCanvas
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
+from lambent.editing.interreflection.whole import WholePicture
+from lambent.editing.picture import EditedPicture, Part
+from lambent.editing.rows import DensePairs, Rows
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material
-from lambent.materials.factored.terms import Editable
+from lambent.materials.factored.terms import Editable, Term
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 SIZE = (7, 5)
@@ -133,3 +137,71 @@ def test_monomials_are_those_of_the_material_alone() -> None:
     assert found.values(PAPER).max() <= 1
     lengths = sorted(found.exponents.sum(axis=1).tolist())
     assert lengths == sorted(len(order) for order in counts)
+
+
+def whole_picture(light_of: Interreflections) -> WholePicture:
+    """Direct light of nothing, and interreflections."""
+    parts = {}
+    for name, part in light_of.parts.items():
+        transport = tuple(_no_light(term, len(part.pixel)) for term in START[name].terms)
+        parts[name] = Part(START[name], part.pixel, part.theta_o, transport)
+    whole = WholePicture(EditedPicture(np.zeros((*SIZE, 3), np.float32), parts))
+    whole.give(light_of, START)
+    return whole
+
+
+def _no_light(term: Term, points: int) -> Rows | DensePairs:
+    if len(term.factors) < 2:
+        return Rows(np.zeros((4 if term.factors else 1, 3, points), np.float16))
+    return DensePairs(np.zeros((4, 2, 3, points), np.float32))
+
+
+def until_exact(whole: WholePicture) -> None:
+    for _ in range(5000):
+        whole.step()
+        if whole.is_settled:
+            return
+        time.sleep(0.001)
+    raise AssertionError("it never settles")
+
+
+def test_any_material_may_be_next() -> None:
+    """Switching from one to another goes on in the background, whatever changes meanwhile; the end is exact."""
+    source = light(DIFFUSE)
+    whole = whole_picture(source)
+    later = {
+        "glossy": of_material(Material(kd=(0.1, 0.8, 0.4), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),))),
+        "paper": of_material(Material(kd=(0.2, 0.6, 0.9), kt_d=0.4)), "known": KNOWN,
+    }  # fmt: skip
+    whole.step()
+    whole.show("glossy", later["glossy"])
+    whole.step()
+    whole.show("paper", later["paper"])
+    until_exact(whole)
+    for hits in ((1, 99), (1, 1), (2, 2), (3, 99)):
+        whole.see(hits)
+        until_exact(whole)
+        reference = expected(source, later, (max(2, hits[0]), hits[1]))
+        assert np.abs(whole.image() - reference).max() < 2e-3 * max(reference.max(), 1)
+    whole.see((1, 99))
+    whole.show("glossy", START["glossy"])
+    whole.draw()
+    assert whole.is_exact
+    reference = expected(source, {**later, "glossy": GLOSSY})
+    assert np.abs(whole.image() - reference).max() < 2e-3 * reference.max()
+    whole.close()
+
+
+def test_other_terms_show_direct_light_alone() -> None:
+    """Interreflections of a quotient that the material no longer has are taken away, until others are given."""
+    source = light(DIFFUSE)
+    whole = whole_picture(source)
+    whole.draw()
+    assert whole.image().any()
+    other = of_material(Material(kd=0.3, lobes=(Lobe(mx=0.1, my=0.3, r0=0.5),)))
+    transport = tuple(_no_light(term, len(source.parts["glossy"].pixel)) for term in other.terms)
+    whole.direct.put("glossy", Part(other, source.parts["glossy"].pixel, source.parts["glossy"].theta_o, transport))
+    whole.show("glossy", other)
+    until_exact(whole)
+    assert not whole.image().any()
+    whole.close()

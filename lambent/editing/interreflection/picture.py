@@ -21,6 +21,7 @@ from lambent.editing.interreflection.stored import Interreflections, PartLight, 
 from lambent.editing.products import Pixels
 from lambent.editing.rows import Rows, coefficients_of
 from lambent.materials.factored.curve import Curve
+from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
 
 ALL_HITS = (2, 99)
@@ -42,6 +43,11 @@ class FrozenPicture:
         Its curve that is edited, in terms that have two.
     hits : (int, int)
         Least and most surfaces on the paths that are shown.
+
+    Attributes
+    ----------
+    edited, hits, materials
+        As they were given.
     """
 
     def __init__(
@@ -53,7 +59,7 @@ class FrozenPicture:
         active: str | None = None,
         hits: tuple[int, int] = ALL_HITS,
     ) -> None:
-        self.edited, self.hits = edited, hits
+        self.edited, self.hits, self.materials = edited, hits, materials
         self._powers = powers(light.tails, materials, edited, hits)
         self._others: list[list[_Sum]] = []
         self._terms: list[_TermPicture] = []
@@ -70,8 +76,10 @@ class FrozenPicture:
         self.draw()
 
     def serves(self, material: Editable, active: str | None = None) -> bool:
-        """Whether the edited material can be shown so: no idle curve of a term with two has changed."""
-        return all(term.serves(material, active) for term in self._terms)
+        """Whether the edited material can be shown so: it has the same terms, and in those with two curves one as it was."""
+        return same_quotients(self.materials[self.edited], material) and all(
+            term.serves(material, active) for term in self._terms
+        )
 
     def show(self, material: Editable) -> None:
         """Let the picture go to the material as it is edited now."""

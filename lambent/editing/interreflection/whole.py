@@ -1,0 +1,189 @@
+"""The picture of an edited view with its interreflections: direct light, and one material's polynomial on top.
+
+whole = WholePicture(edited_picture(store, session))
+whole.give(interreflections(store, camera, size, materials), materials)
+whole.show("floor", edited); whole.step(); whole.image()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from lambent.core.arrays import Image
+from lambent.editing.incremental import TERMS
+from lambent.editing.interreflection.picture import FrozenPicture, Shown
+from lambent.editing.interreflection.stored import Interreflections
+from lambent.editing.picture import EditedPicture
+from lambent.materials.factored.of_models import same_quotients
+from lambent.materials.factored.terms import Editable
+
+ALL_HITS = (1, 99)
+
+
+class WholePicture:
+    """An `EditedPicture` with interreflections, where there are some.
+
+    Another material is edited as soon as its polynomial is there: it is made in the background, while frames show the
+    one before. `draw` waits for it.
+
+    Parameters
+    ----------
+    direct
+        The direct light; drawn as it was given.
+
+    Attributes
+    ----------
+    hits : (int, int)
+        Least and most surfaces on the paths that are shown: (1, 1) is direct light alone.
+    """
+
+    def __init__(self, direct: EditedPicture) -> None:
+        self.direct = direct
+        self.hits = ALL_HITS
+        self._light: Interreflections | None = None
+        self._now: dict[str, Editable] = {}
+        self._frozen: FrozenPicture | None = None
+        self._wanted: tuple[str, str | None] | None = None  # material and curve to be edited next
+        self._work: Future[FrozenPicture] | None = None
+        self._pool = ThreadPoolExecutor(1)
+
+    @property
+    def samples(self) -> int:
+        """Paths per pixel of the interreflections; 0 without them."""
+        return self._light.samples if self._light is not None else 0
+
+    def give(self, light: Interreflections, materials: Mapping[str, Editable]) -> None:
+        """Add interreflections, or replace them by better ones; `materials` are all of the view as they are shown."""
+        self._light, self._now = light, dict(materials)
+        edited = self._frozen.edited if self._frozen is not None else next(iter(light.parts))
+        self._wanted = self._wanted or (edited, None)
+
+    def see(self, hits: tuple[int, int]) -> None:
+        """Show paths that meet so many surfaces, least and most."""
+        if hits != self.hits:
+            self.hits = hits
+            if self._frozen is not None:
+                self._wanted = self._wanted or (self._frozen.edited, None)
+
+    def show(self, material: str, edited: Editable) -> None:
+        """As `EditedPicture.show`, which may refuse."""
+        self.direct.show(material, edited)
+        self._now[material] = edited
+        frozen = self._frozen
+        if frozen is not None and frozen.edited == material and frozen.serves(edited):
+            frozen.show(edited)
+        elif self._light is not None:
+            self._wanted = material, None
+
+    def activate(self, material: str, curve: str) -> None:
+        """As `EditedPicture.activate`."""
+        self.direct.activate(material, curve)
+        frozen = self._frozen
+        if self._light is None or material not in self._now:
+            return
+        if frozen is None or frozen.edited != material or not frozen.serves(self._now[material], curve):
+            self._wanted = material, curve
+
+    def step(self, terms: int = TERMS) -> None:
+        """One frame."""
+        self.direct.step(terms)
+        if self._work is not None and self._work.done():
+            self._take(self._work.result())
+            self._work = None
+        if self._work is None and self._wanted is not None:
+            work = self._freezing()
+            self._work = self._pool.submit(work) if work is not None else None
+        if self._frozen is not None:
+            self._frozen.step(terms)
+
+    def draw(self) -> None:
+        """The exact picture at once."""
+        self.direct.draw()
+        if self._work is not None:
+            self._take(self._work.result())
+            self._work = None
+        work = self._freezing() if self._wanted is not None else None
+        if work is not None:
+            self._take(work())
+        if self._frozen is not None:
+            self._frozen.draw()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the picture shows all that is wanted."""
+        return self.direct.is_exact and self._is_current and (self._frozen is None or self._frozen.is_exact)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether another frame would change no bit."""
+        return self.direct.is_settled and self._is_current and (self._frozen is None or self._frozen.is_settled)
+
+    @property
+    def shown(self) -> Shown:
+        """Layers with their scales, to be composed."""
+        direct = self.direct.shown if self.hits[0] <= 1 else []
+        return direct + (self._frozen.shown if self._frozen is not None and self.hits[1] > 1 else [])
+
+    def compose(self) -> None:
+        """As `EditedPicture.compose`."""
+        self.direct.canvas.compose(self.shown)
+
+    def image(self) -> Image:
+        """(H, W, 3) float32, linear radiance."""
+        self.compose()
+        return self.direct.canvas.image()
+
+    def close(self) -> None:
+        """End the work in the background."""
+        self._pool.shutdown(cancel_futures=True)
+
+    @property
+    def _is_current(self) -> bool:
+        return self._work is None and self._wanted is None
+
+    def _freezing(self) -> _Freezing | None:
+        """The work that is wanted; None where the interreflections are of other terms than a material has now."""
+        assert self._wanted is not None
+        (material, curve), light = self._wanted, self._light
+        self._wanted = None
+        if light is None or any(not same_quotients(part.start, self._now[name]) for name, part in light.parts.items()):
+            self._frozen = None
+            return None
+        return _Freezing(light, dict(self._now), material, curve, self.hits, self.direct)
+
+    def _take(self, frozen: FrozenPicture) -> None:
+        """Go over to a polynomial; what was edited since is shown, or made anew."""
+        self._frozen = frozen
+        for name, made in frozen.materials.items():
+            now = self._now[name]
+            if now is made:
+                continue
+            if name == frozen.edited and frozen.serves(now):
+                frozen.show(now)
+            else:
+                self._wanted = self._wanted or (name, None)
+        if frozen.hits != _beyond_direct(self.hits):
+            self._wanted = self._wanted or (frozen.edited, None)
+
+
+class _Freezing:
+    """Makes a `FrozenPicture` of what is wanted at this moment."""
+
+    def __init__(
+        self,
+        light: Interreflections,
+        materials: dict[str, Editable],
+        edited: str,
+        active: str | None,
+        hits: tuple[int, int],
+        direct: EditedPicture,
+    ) -> None:
+        self._given = light, materials, edited, direct.canvas, active, _beyond_direct(hits)
+
+    def __call__(self) -> FrozenPicture:
+        return FrozenPicture(*self._given)
+
+
+def _beyond_direct(hits: tuple[int, int]) -> tuple[int, int]:
+    return max(2, hits[0]), hits[1]
