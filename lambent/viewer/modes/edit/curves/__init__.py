@@ -1,0 +1,5 @@
+"""The curves of a material, to be pulled: `editor.CurveEditor` draws them and edits a session.
+
+`axes`, `regions`, `drags`, `lines`, `strokes` and `state` hold the logic, without Dear ImGui. `editor`, `plot`,
+`toolbar`, `layers` and `quantities` draw.
+"""

@@ -1,0 +1,118 @@
+"""The layers of a curve's edit as a list: what each does, taking one out, merging and dropping them; undo and redo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from imgui_bundle import imgui
+
+from lambent.editing.operators import Operator, Region
+from lambent.editing.session import Session
+from lambent.viewer.modes.edit.curves.regions import edges_deg
+from lambent.viewer.modes.edit.curves.state import ALL, CurveState, Shown
+from lambent.viewer.panels.widgets import buttons, explain
+
+MOST_ROWS = 6
+LETTERS = "RGB"
+
+
+def words(layer: Operator) -> str:
+    """What an operator does, without its region."""
+    size, base = layer.size, layer.base
+    if layer.kind == "translate_x":
+        return f"x {np.degrees(size):+.2f}°"
+    if layer.kind == "translate_y":
+        return f"y {size:+.4g}"
+    about = f"{np.degrees(base):.1f}°" if layer.kind == "amplify_x" else f"{base:.4g}"
+    return f"{layer.kind[-1]} × {size:.4g}" + (f" about {about}" if base else "")
+
+
+def where(layer: Operator) -> str:
+    """Its region and channels."""
+    _, b, c, _ = edges_deg(layer.region)
+    channels = "" if layer.channels == ALL else " " + "".join(LETTERS[k] for k in sorted(layer.channels))
+    return f"{b:.1f}..{c:.1f}°{channels}"
+
+
+def draw(state: CurveState, session: Session, material: str, shown: Shown, name: str) -> Region | None:
+    """The list; returns the region of the layer under the mouse."""
+    edit = shown.edit(name)
+    under = _list(state, session, material, name, edit.layers, edit.drawn is not None)
+    edited = edit.drawn is not None or bool(edit.layers)
+    once: Callable[[Callable[[], object]], None] = partial(state.strokes.once, session)
+    history = session.history
+    width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+    any_edit = bool(shown.document.curves or shown.document.tints)
+    rows = (
+        [
+            ("undo", history.can_undo, session.undo, "the last step of the session (Ctrl+Z)"),
+            ("redo", history.can_redo, session.redo, "the step that was undone (Ctrl+Y)"),
+        ],
+        [
+            (
+                "collapse", bool(edit.layers), lambda: once(lambda: session.collapse(material, name)),
+                "all layers become one drawn curve; numbers of the material no longer change it",
+            ),
+            (
+                "reset curve", edited, lambda: once(lambda: session.reset(material, name)),
+                "drop all edits of this curve; can be undone",
+            ),
+        ],
+        [
+            (
+                "reset material", any_edit, lambda: once(lambda: session.reset(material)),
+                "drop the edits of all curves and colours of this material; can be undone",
+            )
+        ],
+    )  # fmt: skip
+    for row in rows:
+        buttons(row, width if len(row) > 1 else -1)
+    return under
+
+
+def _list(
+    state: CurveState, session: Session, material: str, name: str, layers: tuple[Operator, ...], drawn: bool
+) -> Region | None:
+    under: Region | None = None
+    count = len(layers) + drawn
+    if not count:
+        imgui.text_disabled("none: drag the curve in its region")
+        return None
+    line = imgui.get_frame_height_with_spacing()
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_stretch_prop
+    if not imgui.begin_table("layers", 4, flags, (0, line * min(count, MOST_ROWS) + 2)):
+        return None
+    for title, share in (("number", 0.1), ("edit", 0.5), ("where", 0.4)):
+        imgui.table_setup_column(title, imgui.TableColumnFlags_.width_stretch, share)
+    imgui.table_setup_column("out", imgui.TableColumnFlags_.width_fixed, imgui.get_frame_height())
+    for index in reversed(range(len(layers))):  # the last one acts on the others, and stands above them
+        layer = layers[index]
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled(f"{index + 1}")
+        imgui.table_next_column()
+        across = imgui.SelectableFlags_.span_all_columns | imgui.SelectableFlags_.allow_overlap
+        imgui.align_text_to_frame_padding()
+        if imgui.selectable(f"{words(layer)}##layer {index}", False, across)[0]:
+            state.views[material, name].region = layer.region
+        if imgui.is_item_hovered():
+            under = layer.region
+        explain(f"{layer.kind.replace('_', ' in ')}: {words(layer)}, {where(layer)}\na click takes its region")
+        imgui.table_next_column()
+        imgui.text_disabled(where(layer))
+        imgui.table_next_column()
+        if imgui.small_button(f"x##layer {index}"):
+            state.strokes.once(session, partial(session.remove, material, name, index))
+        explain("take this layer out; those above it stay")
+    if drawn:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.table_next_column()
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted("drawn curve")
+        explain("drawn freehand, or collapsed from layers; reset curve drops it")
+    imgui.end_table()
+    return under
