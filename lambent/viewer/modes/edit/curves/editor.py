@@ -21,7 +21,6 @@ HINTS = {
     "amplify": "Drag in the region to scale it about the base. Drag beside it: a new region.",
     "draw": "Draw with the left button. Esc drops the stroke.",
 }
-MOUSE = "Wheel: angles, with Shift values; right drag: shift; double click: all; T A D tools, L log, F fit."
 
 
 class CurveEditor:
@@ -130,7 +129,6 @@ class CurveEditor:
             imgui.text_unformatted(", ".join(layers.words(layer) for layer in hold.layers))
         else:
             imgui.text_disabled(HINTS[state.tool])
-            explain(MOUSE)
         imgui.pop_text_wrap_pos()
         rest = 2 * imgui.get_text_line_height_with_spacing() - (imgui.get_cursor_pos_y() - at)
         if rest > imgui.get_style().item_spacing.y:
@@ -140,7 +138,7 @@ class CurveEditor:
         state = self.state
         curve = shown.editable.curves[name]
         imgui.separator_text("region")
-        toolbar.draw_region(state, state.view(material, name, curve), curve.values)
+        toolbar.draw_region(state, state.view(material, name, curve), curve)
         imgui.separator_text("layers")
         self._outlined = layers.draw(state, session, material, shown, name)
         imgui.separator_text("colours of the terms")

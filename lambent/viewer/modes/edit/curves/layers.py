@@ -42,33 +42,23 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     under = _list(state, session, material, name, edit.layers, edit.drawn is not None)
     edited = edit.drawn is not None or bool(edit.layers)
     once: Callable[[Callable[[], object]], None] = partial(state.strokes.once, session)
+    collapse: Callable[[], None] = partial(once, partial(session.collapse, material, name))
+    reset_curve: Callable[[], None] = partial(once, partial(session.reset, material, name))
+    reset: Callable[[], None] = partial(once, partial(session.reset, material))
     history = session.history
-    width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
     any_edit = bool(shown.document.curves or shown.document.tints)
-    rows = (
-        [
-            ("undo", history.can_undo, session.undo, "the last step of the session (Ctrl+Z)"),
-            ("redo", history.can_redo, session.redo, "the step that was undone (Ctrl+Y)"),
-        ],
-        [
-            (
-                "collapse", bool(edit.layers), lambda: once(lambda: session.collapse(material, name)),
-                "all layers become one drawn curve; numbers of the material no longer change it",
-            ),
-            (
-                "reset curve", edited, lambda: once(lambda: session.reset(material, name)),
-                "drop all edits of this curve; can be undone",
-            ),
-        ],
-        [
-            (
-                "reset material", any_edit, lambda: once(lambda: session.reset(material)),
-                "drop the edits of all curves and colours of this material; can be undone",
-            )
-        ],
-    )  # fmt: skip
-    for row in rows:
-        buttons(row, width if len(row) > 1 else -1)
+    first: list[tuple[str, bool, Callable[[], None], str]] = [
+        ("undo", history.can_undo, session.undo, "the last step of the session (Ctrl+Z)"),
+        ("redo", history.can_redo, session.redo, "the step that was undone (Ctrl+Y)"),
+        ("collapse", bool(edit.layers), collapse, "all layers become one drawn curve; numbers no longer change it"),
+    ]
+    second: list[tuple[str, bool, Callable[[], None], str]] = [
+        ("reset curve", edited, reset_curve, "drop all edits of this curve; can be undone"),
+        ("reset material", any_edit, reset, "drop the edits of all curves and colours of this material; can be undone"),
+    ]
+    room, space = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
+    for row in (first, second):
+        buttons(row, (room - (len(row) - 1) * space) / len(row))
     return under
 
 

@@ -99,7 +99,7 @@ def _axes(view: View, over: str) -> None:
     implot.setup_axis_limits(_X, view.x.low, view.x.high, implot.Cond_.always)
     step = next((s for s in TICKS_DEG if (view.x.high - view.x.low) / s <= 7), TICKS_DEG[-1])
     ticks = np.arange(np.ceil(view.x.low / step - 1e-9), np.floor(view.x.high / step + 1e-9) + 1) * step
-    implot.setup_axis_ticks(_X, ticks.tolist(), [f"{tick:g}°" for tick in ticks.round(6)])
+    implot.setup_axis_ticks(_X, ticks.tolist(), [f"{tick:g}°" for tick in ticks.round(6) + 0.0])
     if view.y.log:
         implot.setup_axis_scale(_Y, implot.Scale_.log10)
     implot.setup_axis_limits(_Y, view.y.low, view.y.high, implot.Cond_.always)

@@ -8,7 +8,6 @@ from typing import Any
 from lambent.core.plain import triple
 from lambent.editing.document import OfDocument, OfModel, OfTable
 from lambent.editing.session import Session
-from lambent.materials.models import model_named
 from lambent.materials.models.model import Parameter
 from lambent.viewer.modes.edit.curves.state import CurveState, Shown
 from lambent.viewer.panels import parameters
@@ -34,7 +33,7 @@ def draw_numbers(state: CurveState, session: Session, material: str, shown: Show
     if not shown.serves:
         wrapped([NO_TRANSPORT])
     if isinstance(source, OfModel):
-        _model(state, session, material, source)
+        _model(state, session, material, shown)
     elif isinstance(source, OfDocument):
         changed, state.linked_roughness = parameters.edited(source.material, state.linked_roughness)
         if changed != source.material:
@@ -49,8 +48,9 @@ def title(shown: Shown) -> str | None:
     return f"model {shown.original.name}" if isinstance(source, OfModel) else "material document"
 
 
-def _model(state: CurveState, session: Session, material: str, source: OfModel) -> None:
-    model = model_named(source.model)(**source.parameters)
+def _model(state: CurveState, session: Session, material: str, shown: Shown) -> None:
+    model = shown.model
+    assert model is not None, "a material that begins as a model has one"
     for parameter in model.parameters:
         value = model.values[parameter.name]
         changed = _parameter(parameter, value)

@@ -12,12 +12,14 @@ from typing import Literal
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.editing.document import CurveEdit, EditedMaterial
+from lambent.editing.document import CurveEdit, EditedMaterial, OfModel
 from lambent.editing.operators import Operator, Region
 from lambent.editing.session import Session
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
+from lambent.materials.models import model_named
+from lambent.materials.models.model import Model
 from lambent.viewer.modes.edit.curves import regions
 from lambent.viewer.modes.edit.curves.axes import END_DEG, Axes, Axis, within_curve
 from lambent.viewer.modes.edit.curves.drags import Channels, Direction, Drag, Point, Tool, locked, painted
@@ -67,12 +69,15 @@ class View:
 
 @dataclass(frozen=True)
 class Shown:
-    """A material as it is and as it was before its edits; `serves`: transport made for it still does."""
+    """A material as it is and as it was before its edits; `serves`: transport made for it still does.
+
+    `model` has the present parameters of a material that began as one."""
 
     document: EditedMaterial
     editable: Editable
     original: Editable
     serves: bool
+    model: Model | None
 
     def edit(self, curve: str) -> CurveEdit:
         return self.document.curves.get(curve, CurveEdit())
@@ -121,7 +126,9 @@ class CurveState:
         if kept is None or kept[0] is not session or kept[1].document is not document:
             original = session.original(material)
             served = self._served.setdefault(material, original)
-            made = Shown(document, session.editable(material), original, same_quotients(served, original))
+            source = document.source
+            model = model_named(source.model)(**source.parameters) if isinstance(source, OfModel) else None
+            made = Shown(document, session.editable(material), original, same_quotients(served, original), model)
             kept = self._shown[material] = session, made
         return kept[1]
 

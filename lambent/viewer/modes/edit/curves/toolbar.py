@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.arrays import Floats
+from lambent.editing.operators import Region
+from lambent.materials.factored.curve import Curve
 from lambent.viewer.modes.edit.curves import regions
 from lambent.viewer.modes.edit.curves.axes import END_DEG
 from lambent.viewer.modes.edit.curves.drags import Direction, Tool
@@ -28,6 +31,14 @@ DIRECTIONS: dict[Direction, str] = {
     "y": "a drag changes values alone (Shift while dragging)",
 }
 CHANNELS: tuple[tuple[Literal[0, 1, 2], str, str], ...] = ((0, "R", "red"), (1, "G", "green"), (2, "B", "blue"))
+KEYS = """Over the plot:
+left drag in the region: pull the curve; Shift keeps angles, Ctrl keeps values
+left drag beside the region: a new region
+handles a b c d, the bar between b and c: the region
+wheel: angles nearer; with Shift or Ctrl: values
+right or middle drag: shift what is shown
+double click: all angles and values
+T A D: translate, amplify, draw;  L: log;  F: fit;  Esc: drop the drag"""
 ON = (0.24, 0.42, 0.66, 1.0)
 GROUP_PX = 14.0  # between groups of buttons
 PRESETS_PER_ROW = 4
@@ -79,9 +90,19 @@ def draw(state: CurveState, view: View, values: Floats, edited: bool) -> None:
     if _toggle("original", state.ghost, "a thin line: the curve as it was before its edits"):
         state.ghost = not state.ghost
     imgui.end_disabled()
+    flow.group(["?"])
+    imgui.align_text_to_frame_padding()
+    imgui.text_disabled("?")
+    explain(KEYS)
 
 
-def draw_region(state: CurveState, view: View, values: Floats) -> None:
+@lru_cache(maxsize=8)
+def presets(curve: Curve) -> tuple[Region | None, Region | None]:
+    """About the peak, and the tail."""
+    return regions.peak(curve.values), regions.tail(curve.values)
+
+
+def draw_region(state: CurveState, view: View, curve: Curve) -> None:
     """The four angles of the region, its presets, and the base of amplification."""
     imgui.begin_disabled(state.tool == "draw")
     space, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
@@ -95,7 +116,7 @@ def draw_region(state: CurveState, view: View, values: Floats) -> None:
         explain(f"{MEANINGS[edge]}; drag, or double click to type")
         if changed:
             view.region = regions.with_edge(view.region, edge, typed)
-    peak, tail = regions.peak(values), regions.tail(values)
+    peak, tail = presets(curve)
     options = (
         ("peak", peak, "about the largest value, down to its half"),
         ("tail", tail, "from where the curve has fallen to a tenth, to 90°"),
