@@ -83,12 +83,13 @@ class CurveEditor:
         """The list of curves, with their angles and the terms that they act in."""
         editable, line = shown.editable, imgui.get_text_line_height_with_spacing()
         rows = min(len(editable.curves), MOST_ROWS) + 1
-        flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_stretch_prop
+        flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_fixed_fit
         if not imgui.begin_table("list", 3, flags, (0, rows * line + 6)):
             return
         imgui.table_setup_scroll_freeze(0, 1)
-        for heading, share in (("curve", 0.38), ("angle", 0.3), ("in the terms", 0.32)):
-            imgui.table_setup_column(heading, imgui.TableColumnFlags_.width_stretch, share)
+        for heading in ("curve", "angle"):
+            imgui.table_setup_column(heading)
+        imgui.table_setup_column("in the terms", imgui.TableColumnFlags_.width_stretch)
         imgui.table_headers_row()
         for name in editable.curves:
             over, terms = _role(editable, name)

@@ -66,4 +66,4 @@ def fitted_y(values: Floats, x: Axis, log: bool) -> Axis:
     if not log:
         return Axis(0.0, 1.25 * top)
     least = float(seen[seen > 0].min())
-    return Axis(min(max(least / 2, top * 10**-DECADES), top / 10), 2 * top, True)
+    return Axis(min(max(least / 2, top * 10**-DECADES), top / 10), 5 * top, True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from imgui_bundle import imgui
+
 from lambent.core.plain import triple
 from lambent.editing.document import OfDocument, OfModel, OfTable
 from lambent.editing.session import Session
@@ -14,17 +16,22 @@ from lambent.viewer.panels import parameters
 from lambent.viewer.panels.widgets import explain, rgb, slider, wrapped
 
 MOST_TINT = 2.0
+LABEL_PX = 88.0
 NO_TRANSPORT = "These numbers need new transport: the picture shows the material as it was."
 
 
 def draw_tints(state: CurveState, session: Session, material: str, shown: Shown) -> None:
     """A colour by which each term is multiplied."""
+    longest = max((imgui.calc_text_size(term.name).x for term in shown.original.terms), default=0.0)
+    labels = min(longest + 2 * imgui.get_style().item_spacing.x, 0.5 * imgui.get_content_region_avail().x)
+    imgui.push_item_width(-max(labels, LABEL_PX))
     for term in shown.original.terms:
         tint = triple(shown.document.tints.get(term.name, (1.0, 1.0, 1.0)))
         meaning = f"linear colour by which the term {term.name} is multiplied; 1, 1, 1 is as it was"
         changed = rgb(term.name, tint, max(MOST_TINT, *tint), meaning)
         if changed != tint:
             state.strokes.replace(session, partial(session.tint, material, term.name, changed))
+    imgui.pop_item_width()
 
 
 def draw_numbers(state: CurveState, session: Session, material: str, shown: Shown) -> None:
