@@ -11,7 +11,7 @@ from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.models import model_named
 from lambent.viewer import layout
-from lambent.viewer.modes.edit.curves.editor import CurveEditor
+from lambent.viewer.modes.edit.curves import CurveEditor
 from tests.viewer import panel_driver
 from tests.viewer.panel_driver import point_of, recording
 
@@ -101,6 +101,14 @@ class Panel:
         self.key(key, True)
         self.key(key, False)
 
+    def undo(self):
+        self.session.undo()
+        self.frame(2)
+
+    def redo(self):
+        self.session.redo()
+        self.frame(2)
+
     @property
     def edit(self):
         return self.session.document.materials[self.material]
@@ -162,9 +170,9 @@ def test_a_drag_pulls_the_curve_and_is_one_step(panel):
     panel.button(False)
     assert panel.editor.active_curve is None
     panel.frame(2)
-    panel.click("undo")
+    panel.undo()
     assert not panel.edit.curves and not panel.session.history.can_undo
-    panel.click("redo")
+    panel.redo()
     assert panel.layers() == (up, across)
 
 
@@ -241,7 +249,7 @@ def test_freehand(panel):
     panel.pull((2.0, 5.0), (4.0, 10.0), (6.0, 5.0))
     assert panel.edit.curves["highlight"].drawn is not None and panel.layers() == ()
     assert panel.session.editable("gold").curves["highlight"].at(np.radians(5.0))[1] == pytest.approx(7.5, abs=0.2)
-    panel.click("undo")
+    panel.undo()
     assert not panel.edit.curves and not panel.session.history.can_undo
 
 
@@ -290,6 +298,16 @@ def test_wheel_shift_and_double_click(panel):
     assert (view.x.low, view.x.high) == (0, 90) and not panel.session.history.can_undo
 
 
+def test_the_wheel_over_the_plot_scrolls_no_panel(open_panel):
+    panel = open_panel({"gold": GOLD}, "gold", (370, 500))
+    x, y = panel.rects["highlight##curve"][:2]
+    top = panel.editor.axes.place.y
+    panel.move(*panel.editor.axes.pixel(5.0, 20.0))
+    panel.io.add_mouse_wheel_event(0, -3)
+    panel.frame(3)
+    assert panel.editor.axes.place.y == top and panel.rects["highlight##curve"][:2] == (x, y)
+
+
 def test_escape_drops_the_drag(panel):
     axes = panel.editor.axes
     panel.move(*axes.pixel(2.0, 20.0))
@@ -301,21 +319,44 @@ def test_escape_drops_the_drag(panel):
     assert not panel.edit.curves and not panel.session.history.can_undo
 
 
+def test_another_material_ends_the_drag(panel):
+    axes = panel.editor.axes
+    panel.move(*axes.pixel(2.0, 20.0))
+    panel.button(True)
+    panel.move(*axes.pixel(3.0, 25.0))
+    pulled = panel.layers()
+    panel.material = "lacquer"
+    panel.frame(2)
+    panel.move(*axes.pixel(4.0, 28.0))
+    panel.button(False)
+    assert panel.editor.active_curve is None and not panel.edit.curves
+    panel.material = "gold"
+    assert panel.layers() == pulled
+    panel.undo()
+    assert not panel.session.history.can_undo
+
+
 def test_layers(panel):
     panel.pull((2.0, 20.0), (3.0, 25.0))
     up, across = panel.layers()
+    panel.click("x##layer 1")
+    assert panel.layers() == (up,)
+    panel.undo()
     panel.click("x##layer 0")
     assert panel.layers() == (across,)
-    panel.click("undo")
+    panel.undo()
     panel.click("collapse")
     assert panel.edit.curves["highlight"].drawn is not None and panel.layers() == ()
     panel.click("reset curve")
     assert not panel.edit.curves
-    panel.click("undo")
-    panel.click("undo")
+    panel.undo()
+    panel.undo()
     assert panel.layers() == (up, across)
-    panel.editor.state.views["gold", "highlight"].region = up.region.model_copy(update={"d": 1.0})
     name = next(label for label in panel.rects if label.endswith("°##layer 1"))
+    panel.move(*point_of(panel.rects[name], 0.1))
+    panel.frame()
+    assert panel.editor._outlined == across.region, "the region of the layer under the mouse is shown"
+    panel.editor.state.views["gold", "highlight"].region = up.region.model_copy(update={"d": 1.0})
     panel.click(name, 0.1)
     assert panel.view.region == across.region, "a click takes the layer's region"
     panel.click("reset material")
@@ -341,7 +382,11 @@ def test_numbers_of_a_document(panel):
     panel.slide("mx", 0.5, 0.7)
     lobe = panel.edit.source.material.lobes[0]
     assert lobe.mx == lobe.my > 0.15 and panel.editor.state.shown(panel.session, "gold").serves
-    panel.click("undo")
+    panel.slide("alpha", 0.1, 0.3)
+    assert panel.edit.source.material.lobes[0].mx == lobe.mx and panel.edit.source.material.lobes[0].alpha > 0
+    panel.undo()
+    assert panel.edit.source.material.lobes[0] == lobe, "each slider is a step"
+    panel.undo()
     assert panel.edit.source.material == GOLD and not panel.session.history.can_undo
     panel.click("keep the ratio of mx and my", 0.1)
     panel.slide("mx", 0.5, 0.7)
@@ -356,7 +401,7 @@ def test_parameters_of_a_model(open_panel):
     layers = panel.layers(name)
     panel.slide("ex", 0.4, 0.6)
     assert panel.edit.source.parameters["ex"] > 100 and panel.layers(name) == layers, "layers stay"
-    panel.click("undo")
+    panel.undo()
     assert panel.edit.source.parameters["ex"] == 100 and panel.layers(name) == layers
 
 
@@ -375,7 +420,7 @@ def test_factors_of_a_table(open_panel, tmp_path, monkeypatch):
     panel.slide("##values", 0.15, 0.05)
     red, green, blue = panel.edit.tints["specular"]
     assert red < 0.5 and green == blue == 1, "the first of the last term's three sliders"
-    panel.click("undo")
+    panel.undo()
     assert not panel.edit.tints and len(panel.layers()) == 2, "one step"
 
 

@@ -1,4 +1,4 @@
-"""The layers of a curve's edit as a list: what each does, taking one out, merging and dropping them; undo and redo."""
+"""The layers of a curve's edit as a list: what each does, taking one out, merging and dropping them."""
 
 from __future__ import annotations
 
@@ -45,20 +45,14 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     collapse: Callable[[], None] = partial(once, partial(session.collapse, material, name))
     reset_curve: Callable[[], None] = partial(once, partial(session.reset, material, name))
     reset: Callable[[], None] = partial(once, partial(session.reset, material))
-    history = session.history
     any_edit = bool(shown.document.curves or shown.document.tints)
-    first: list[tuple[str, bool, Callable[[], None], str]] = [
-        ("undo", history.can_undo, session.undo, "the last step of the session (Ctrl+Z)"),
-        ("redo", history.can_redo, session.redo, "the step that was undone (Ctrl+Y)"),
+    actions: list[tuple[str, bool, Callable[[], None], str]] = [
         ("collapse", bool(edit.layers), collapse, "all layers become one drawn curve; numbers no longer change it"),
-    ]
-    second: list[tuple[str, bool, Callable[[], None], str]] = [
         ("reset curve", edited, reset_curve, "drop all edits of this curve; can be undone"),
         ("reset material", any_edit, reset, "drop the edits of all curves and colours of this material; can be undone"),
     ]
     room, space = imgui.get_content_region_avail().x, imgui.get_style().item_spacing.x
-    for row in (first, second):
-        buttons(row, (room - (len(row) - 1) * space) / len(row))
+    buttons(actions, (room - (len(actions) - 1) * space) / len(actions))
     return under
 
 

@@ -126,7 +126,6 @@ def _mouse(state: CurveState, session: Session, material: str, shown: Shown, nam
     imgui.set_cursor_screen_pos(before)
     values = shown.editable.curves[name].values
     if hovered and imgui.is_mouse_double_clicked(0):
-        state.cancel(session)
         view.fit(values, whole_x())
     elif hovered and imgui.is_mouse_clicked(0):
         state.press(session, material, axes, mouse.x, mouse.y)
