@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lambent.core.camera import Camera
+from lambent.core.errors import UserError
 from lambent.editing.operators import Region
 from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
@@ -11,7 +12,7 @@ from lambent.materials.factored.curve import KNOTS, Curve, angles_rad
 from lambent.materials.models import model_named
 from lambent.viewer.modes.edit.curves import regions
 from lambent.viewer.modes.edit.curves.axes import Axes, Axis, Place, within_curve
-from lambent.viewer.modes.edit.curves.drags import Drag, locked, painted
+from lambent.viewer.modes.edit.curves.drags import Drag, locked, painted, resized
 from lambent.viewer.modes.edit.curves.lines import ANGLES_DEG, decimated, feature_deg, fitted_x, fitted_y, is_grey
 from lambent.viewer.modes.edit.curves.regions import edges_deg, grip_at, region_of, with_edge
 from lambent.viewer.modes.edit.curves.state import CurveState, View
@@ -170,6 +171,16 @@ def test_stretching_stops_before_the_curve_folds():
     assert 2 / 30 < squeezed.size < 1
     with pytest.raises(ValueError, match="folds"):
         type(squeezed)(**{**squeezed.model_dump(), "size": 0.99 * squeezed.size})
+
+
+def test_a_layer_of_another_size():
+    (across,) = drag().operators((28.0, 2.0), "x")
+    wider = resized(across, float(np.radians(30)))
+    assert np.degrees(wider.size) == pytest.approx(30) and wider.region.a < REGION.a and wider.region.d == REGION.d
+    (stretched,) = drag("amplify", region=region_of(-10, 0, 40, 60), begin=(20.0, 2.0)).operators((30.0, 2.0), "x")
+    assert resized(stretched, 2.0).size == 2.0 and resized(stretched, 2.0).base == stretched.base
+    with pytest.raises(UserError, match="folds"):
+        resized(stretched, 0.01)
 
 
 def test_modifier_keys_lock_an_axis():

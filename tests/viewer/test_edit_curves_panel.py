@@ -352,15 +352,29 @@ def test_layers(panel):
     panel.undo()
     panel.undo()
     assert panel.layers() == (up, across)
-    name = next(label for label in panel.rects if label.endswith("°##layer 1"))
-    panel.move(*point_of(panel.rects[name], 0.1))
+    name = "2##layer 1"
+    panel.move(*point_of(panel.rects[name], 0.0))
     panel.frame()
     assert panel.editor._outlined == across.region, "the region of the layer under the mouse is shown"
     panel.editor.state.views["gold", "highlight"].region = up.region.model_copy(update={"d": 1.0})
-    panel.click(name, 0.1)
+    panel.click(name, 0.0)
     assert panel.view.region == across.region, "a click takes the layer's region"
     panel.click("reset material")
     assert not panel.edit.curves
+
+
+def test_the_size_of_a_layer(panel):
+    panel.pull((2.0, 20.0), (3.0, 25.0))
+    up, across = panel.layers()
+    panel.slide("##size 0", 0.2, 0.6)
+    bigger, same = panel.layers()
+    assert bigger.size > up.size and bigger.region == up.region and same == across
+    panel.slide("##size 1", 0.2, 0.6)
+    assert panel.layers()[0] == bigger and panel.layers()[1].size > across.size
+    panel.undo()
+    assert panel.layers() == (bigger, across)
+    panel.undo()
+    assert panel.layers() == (up, across)
 
 
 def test_curves_are_chosen_in_the_list(panel):

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.editing.operators import Kind, Operator, Region, room_for, translation
 from lambent.viewer.modes.edit.curves.axes import Axis
 from lambent.viewer.modes.edit.curves.lines import ANGLES_DEG
@@ -82,6 +83,21 @@ class Drag:
 def locked(direction: Direction, *, shift: bool, ctrl: bool) -> Direction:
     """The direction while modifier keys are held: Shift keeps angles, Ctrl keeps values."""
     return "y" if shift else "x" if ctrl else direction
+
+
+def resized(layer: Operator, size: float) -> Operator:
+    """A layer with another size, and with ramps as wide as it needs.
+
+    Raises
+    ------
+    UserError
+        The curve would fold.
+    """
+    region = room_for(layer.region, size) if layer.kind == "translate_x" else layer.region
+    try:
+        return Operator(kind=layer.kind, region=region, size=size, base=layer.base, channels=layer.channels)
+    except ValidationError as error:
+        raise UserError(str(error.errors()[0]["msg"]), field=layer.kind) from error
 
 
 def painted(values: Floats, begin: Point, end: Point, channels: Channels, log: bool) -> Floats:
