@@ -389,8 +389,10 @@ def test_a_material_is_made_anew_only_when_it_changes(session):
     assert state.shown(session, "brass") is first
     session.tint("brass", "specular", 0.5)
     assert state.shown(session, "brass") is not first
-    copy = Session(session.document)
-    assert state.shown(copy, "brass").document is session.document.materials["brass"]
+    session.become("brass", PHONG)
+    assert not state.shown(session, "brass").serves
+    other = Session(session.document)
+    assert state.shown(other, "brass").serves, "another session begins anew"
 
 
 def test_views():

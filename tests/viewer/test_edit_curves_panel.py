@@ -9,9 +9,12 @@ from imgui_bundle import imgui, implot
 from lambent.core.camera import Camera
 from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.models import model_named
 from lambent.viewer import layout
 from lambent.viewer.modes.edit.curves import CurveEditor
+from lambent.viewer.modes.edit.curves.axes import Axis
+from lambent.viewer.modes.edit.curves.regions import region_of
 from tests.viewer import panel_driver
 from tests.viewer.panel_driver import point_of, recording
 
@@ -194,6 +197,21 @@ def test_modifier_keys(panel):
     panel.pull((2.0, 20.0), (4.0, 25.0))
     panel.key(imgui.Key.mod_ctrl, False)
     assert [layer.kind for layer in panel.layers()] == ["translate_y", "translate_x"]
+
+
+def test_a_modifier_key_answers_while_the_mouse_rests(panel):
+    axes = panel.editor.axes
+    panel.move(*axes.pixel(2.0, 20.0))
+    panel.button(True)
+    panel.move(*axes.pixel(3.0, 25.0))
+    document = panel.session.document
+    panel.frame(3)
+    assert panel.session.document is document, "nothing is done anew while nothing moves"
+    panel.key(imgui.Key.mod_shift, True)
+    assert [layer.kind for layer in panel.layers()] == ["translate_y"]
+    panel.key(imgui.Key.mod_shift, False)
+    assert [layer.kind for layer in panel.layers()] == ["translate_y", "translate_x"]
+    panel.button(False)
 
 
 def test_channels_and_direction(panel):
@@ -453,6 +471,28 @@ def test_errors_are_shown(panel):
 def test_every_size_is_drawn(open_panel, size):
     panel = open_panel({"gold": GOLD}, "gold", size)
     panel.pull((2.0, 20.0), (3.0, 25.0)) if panel.editor.axes else None
+    panel.frame(3)
+
+
+@pytest.mark.parametrize("top", [0.0, 1e-25, 1e-9, 5e8])
+@pytest.mark.parametrize("log", [False, True])
+def test_values_of_every_size(panel, top, log):
+    values = np.zeros((KNOTS + 1, 3))
+    values[2000:] = top  # a step
+    panel.session.draw("gold", "highlight", Curve(values))
+    panel.view.fit(values, Axis(0.0, 90.0))
+    panel.view.set_log(values, log)
+    panel.frame(2)
+    axes = panel.editor.axes
+    panel.view.region = region_of(20, 30, 60, 70)
+    panel.frame()
+    middle = axes.y.value(0.5)
+    panel.pull((45.0, middle), (45.0, axes.y.value(0.6)))
+    expected = [axes.y.value(0.6) - middle]
+    assert [layer.size for layer in panel.layers()] == pytest.approx(expected, rel=0.05)
+    panel.io.add_mouse_wheel_event(0, 100)
+    panel.frame(3)
+    panel.io.add_mouse_wheel_event(0, -100)
     panel.frame(3)
 
 

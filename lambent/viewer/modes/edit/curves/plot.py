@@ -130,8 +130,7 @@ def _mouse(state: CurveState, session: Session, material: str, shown: Shown, nam
     elif hovered and imgui.is_mouse_clicked(0):
         state.press(session, material, axes, mouse.x, mouse.y)
     elif state.hold is not None and held and imgui.is_mouse_down(0):
-        if io.mouse_delta.x or io.mouse_delta.y or io.key_shift or io.key_ctrl:
-            state.move(session, mouse.x, mouse.y, shift=io.key_shift, ctrl=io.key_ctrl)
+        state.move(session, mouse.x, mouse.y, shift=io.key_shift, ctrl=io.key_ctrl)
     elif state.hold is not None:
         state.release(session)
     if held and (imgui.is_mouse_dragging(1, 0) or imgui.is_mouse_dragging(2, 0)):

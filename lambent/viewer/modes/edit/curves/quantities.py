@@ -17,7 +17,7 @@ from lambent.viewer.panels.widgets import explain, rgb, slider, wrapped
 
 MOST_TINT = 2.0
 LABEL_PX = 88.0
-NO_TRANSPORT = "These numbers need new transport: the picture shows the material as it was."
+NO_TRANSPORT = "More than curves and colours has changed: this material needs transport of its own."
 
 
 def draw_tints(state: CurveState, session: Session, material: str, shown: Shown) -> None:

@@ -96,6 +96,7 @@ class Hold:
     painted: Floats
     last: Point
     layers: tuple[Operator, ...] = ()
+    seen: tuple[float, float, bool, bool] | None = None  # mouse and keys of the last move
 
 
 @dataclass
@@ -123,6 +124,8 @@ class CurveState:
         """The material of the session as it is now; made anew only when it has changed."""
         document = session.document.materials[material]
         kept = self._shown.get(material)
+        if kept is not None and kept[0] is not session:
+            del self._served[material]
         if kept is None or kept[0] is not session or kept[1].document is not document:
             original = session.original(material)
             served = self._served.setdefault(material, original)
@@ -134,8 +137,8 @@ class CurveState:
 
     def transported(self, session: Session, material: str) -> None:
         """Transport was made for the material as it is now."""
-        self._served[material] = session.original(material)
         self._shown.pop(material, None)
+        self._served[material] = session.original(material)
 
     def curve(self, material: str, shown: Shown) -> str:
         """The chosen curve of a material; at first the one that changes most, its highlight."""
@@ -174,8 +177,9 @@ class CurveState:
     def move(self, session: Session, x: float, y: float, *, shift: bool = False, ctrl: bool = False) -> None:
         """The mouse is here with what it holds."""
         hold = self.hold
-        if hold is None:
+        if hold is None or hold.seen == (x, y, shift, ctrl):
             return
+        hold.seen = x, y, shift, ctrl
         end, view = hold.axes.at(x, y), self.views[hold.material, hold.curve]
         if hold.grip == "paint":
             self._paint(session, hold, end)
