@@ -1,7 +1,5 @@
 """The curve editor drawn without a window: real Dear ImGui and ImPlot frames, a mouse that presses and moves."""
 
-import time
-
 import numpy as np
 import pytest
 from imgui_bundle import imgui, implot
@@ -11,117 +9,13 @@ from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.models import model_named
-from lambent.viewer import layout
-from lambent.viewer.modes.edit.curves import CurveEditor
 from lambent.viewer.modes.edit.curves.axes import Axis
 from lambent.viewer.modes.edit.curves.regions import region_of
-from tests.viewer import panel_driver
-from tests.viewer.panel_driver import point_of, recording
+from tests.viewer.curve_panel import NARROW, WIDE, Panel
+from tests.viewer.panel_driver import point_of
 
 GOLD = Material(name="gold", kd=0.05, lobes=(Lobe(k=(0.9, 0.7, 0.3), mx=0.1, my=0.1, r0=(0.9, 0.7, 0.4)),))
 ASHIKHMIN = model_named("ashikhmin-shirley")(ex=100.0, ey=1000.0)
-NARROW, WIDE = (370, 1100), (1100, 700)
-
-
-class Panel:
-    """The editor in a window of its own; `rects` are the controls by label."""
-
-    def __init__(self, monkeypatch, starts, material, size=NARROW):
-        camera = Camera(name="front", position=(0, 1, 3), target=(0, 1, 0))
-        self.session, self.material, self.size = Session.new("room", camera, starts), material, size
-        self.editor, self.rects, self.seconds = CurveEditor(), {}, []
-        self._context = imgui.create_context()
-        imgui.set_current_context(self._context)
-        self.io = imgui.get_io()
-        self.io.set_ini_filename("")
-        self.io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
-        self.io.display_size = size
-        self.io.config_input_trickle_event_queue = False
-        layout.set_style()
-        monkeypatch.setattr(panel_driver, "RECORDED", (*panel_driver.RECORDED, "drag_float"))
-        recording(monkeypatch.setattr, self.rects)
-        self.frame(2)
-
-    def close(self):
-        implot.destroy_context()
-        imgui.destroy_context(self._context)
-
-    def frame(self, count=1):
-        for _ in range(count):
-            self.rects.clear()
-            self.io.delta_time = 1 / 30
-            imgui.new_frame()
-            imgui.set_next_window_pos((0, 0))
-            imgui.set_next_window_size(self.size)
-            imgui.begin("window", None, layout.FIXED)
-            imgui.push_item_width(-layout.LABEL_PX)
-            begin = time.perf_counter()
-            self.editor.draw(self.session, self.material)
-            self.seconds.append(time.perf_counter() - begin)
-            imgui.pop_item_width()
-            imgui.end()
-            imgui.render()
-
-    def move(self, x, y):
-        self.io.add_mouse_pos_event(x, y)
-        self.frame()
-
-    def button(self, down, which=0):
-        self.io.add_mouse_button_event(which, down)
-        self.frame()
-
-    def click(self, label, along=0.5):
-        self.move(*point_of(self.rects[label], along))
-        self.button(True)
-        self.button(False)
-        self.io.add_mouse_pos_event(-1, -1)
-        self.frame(20)  # the next press is no double click
-
-    def pull(self, begin, *ends, which=0):
-        """Drag over the plot, in degrees and values of the axes as they are at first."""
-        axes = self.editor.axes
-        self.move(*axes.pixel(*begin))
-        self.button(True, which)
-        for end in ends:
-            self.move(*axes.pixel(*end))
-        self.button(False, which)
-        self.frame(20)
-
-    def slide(self, label, begin, end):
-        rect = self.rects[label]
-        self.move(*point_of(rect, begin))
-        self.button(True)
-        for share in (0.5, 1.0):
-            self.move(*point_of(rect, begin + share * (end - begin)))
-        self.button(False)
-        self.frame(20)
-
-    def key(self, key, down):
-        self.io.add_key_event(key, down)
-        self.frame()
-
-    def tap(self, key):
-        self.key(key, True)
-        self.key(key, False)
-
-    def undo(self):
-        self.session.undo()
-        self.frame(2)
-
-    def redo(self):
-        self.session.redo()
-        self.frame(2)
-
-    @property
-    def edit(self):
-        return self.session.document.materials[self.material]
-
-    def layers(self, curve="highlight"):
-        return self.edit.curves[curve].layers
-
-    @property
-    def view(self):
-        return self.editor.state.views[self.material, self.editor.curve(self.session, self.material)]
 
 
 @pytest.fixture
@@ -306,6 +200,12 @@ def test_wheel_shift_and_double_click(panel):
     assert view.x.high - view.x.low == pytest.approx((axes.x.high - axes.x.low) * 0.85**2)
     assert panel.editor.axes.at(*axes.pixel(5.0, 20.0))[0] == pytest.approx(5.0, abs=0.05)
     assert view.y == axes.y
+    x = view.x
+    panel.key(imgui.Key.mod_shift, True)
+    panel.io.add_mouse_wheel_event(0, -1)
+    panel.frame(2)
+    panel.key(imgui.Key.mod_shift, False)
+    assert view.x == x and view.y.low == 0 and view.y.high == pytest.approx(axes.y.high / 0.85)
     before = view.x.low
     panel.pull((5.0, 20.0), (4.0, 20.0), which=1)
     assert view.x.low == pytest.approx(before + 1.0, abs=0.05) and not panel.edit.curves

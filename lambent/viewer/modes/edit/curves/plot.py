@@ -121,8 +121,9 @@ def _mouse(state: CurveState, session: Session, material: str, shown: Shown, nam
     mouse = io.mouse_pos
     if hovered:
         imgui.set_item_key_owner(imgui.Key.mouse_wheel_y)
-        if io.mouse_wheel:
-            view.zoom(axes, (mouse.x, mouse.y), io.mouse_wheel, values=io.key_shift or io.key_ctrl)
+        steps = io.mouse_wheel or io.mouse_wheel_h  # macOS turns the wheel aside with Shift
+        if steps:
+            view.zoom(axes, (mouse.x, mouse.y), steps, values=io.key_shift or io.key_ctrl)
     imgui.set_cursor_screen_pos(before)
     values = shown.editable.curves[name].values
     if hovered and imgui.is_mouse_double_clicked(0):
