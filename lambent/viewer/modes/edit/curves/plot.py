@@ -26,6 +26,7 @@ _PLOT = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_
 _X, _Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 _BUTTONS = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
 _BUTTONS |= imgui.ButtonFlags_.mouse_button_middle
+PADDING_PX = 14.0  # half of the last angle's label
 TICKS_DEG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30)  # steps of the axis of angles
 Line = tuple[int | None, Floats, Floats]  # channel, or None for all; degrees; values
 
@@ -40,8 +41,10 @@ def draw(state: CurveState, session: Session, material: str, shown: Shown, name:
     view = state.view(material, name, curve)
     if size[0] < 80 or size[1] < 60 or not implot.begin_plot("##curve", size, _PLOT | implot.Flags_.no_inputs):
         return None
+    implot.push_style_var(implot.StyleVar_.plot_padding, imgui.ImVec2(PADDING_PX, 6))
     _axes(view, over)
     implot.setup_finish()
+    implot.pop_style_var()
     place, extent = implot.get_plot_pos(), implot.get_plot_size()
     axes = Axes(view.x, view.y, Place(place.x, place.y, extent.x, extent.y))
     hovered = _mouse(state, session, material, shown, name, axes)
