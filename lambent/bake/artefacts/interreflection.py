@@ -160,6 +160,7 @@ class _Pass:
 
     def _tile(self, part: Part, tile: int, place: slice) -> None:
         from lambent.bake.interreflection.binning import Sorting
+        from lambent.bake.interreflection.directions import shares_of
         from lambent.bake.interreflection.paths import trace
         from lambent.bake.interreflection.sums import Sums
 
@@ -227,14 +228,6 @@ def said(part: Part, term: int) -> dict[str, Any]:
     one, factors = part.terms[term]
     curves = [[factor.curve, n] for factor, n in factors]
     return {"material": part.material, "term": term, "fixed": one.fixed, "curves": curves}
-
-
-def shares_of(editable: Editable) -> np.ndarray:
-    """(2,) shares of first directions that go through a surface, and back to the viewer."""
-    sides = {term.side for term in editable.terms}
-    if sides == {"transmission"}:
-        return np.array([1.0, 0.0])
-    return np.array([0.5 * ("transmission" in sides), 0.25 * ("retro" in sides)])
 
 
 def _tile_count(context: BakeContext, part: Part) -> int:

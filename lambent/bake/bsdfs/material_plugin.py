@@ -53,8 +53,8 @@ def material_dict(
 
 
 @once_per_variant
-def register_material_plugin() -> None:
-    """Choose the engine and make `lambent_material` known to it; further calls cost nothing."""
+def register_material_plugin() -> type:
+    """Choose the engine and make `lambent_material` known to it: its class. Further calls cost nothing."""
 
     class MaterialBSDF(mi.BSDF):  # type: ignore[misc]
         """Diffuse terms and lobes; component i of Mitsuba is component i of `bsdf.selection`."""
@@ -157,6 +157,7 @@ def register_material_plugin() -> None:
             return index, flags
 
     mi.register_bsdf(PLUGIN, MaterialBSDF)
+    return MaterialBSDF
 
 
 def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:

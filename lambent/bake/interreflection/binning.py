@@ -10,14 +10,14 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.interreflection.evaluation import Curves, quotient_of
 from lambent.bake.interreflection.paths import WAYS, Paths
 from lambent.bake.interreflection.sums import Sorted
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.bands import Bands
 from lambent.bake.transport.view_points import ViewPoints
-from lambent.materials.factored.albedo import is_flat
-from lambent.materials.factored.curve import END_RAD, KNOTS
+from lambent.materials.factored.curve import END_RAD
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Editable, Term, upper_pair
 from lambent.store.tails import Tails
@@ -53,25 +53,18 @@ class Sorting:
 
     def by_term(self, term: Term, bands: Sequence[Bands]) -> Sorted:
         """By the bands of a term's curves, numbered first curve first."""
+        texture = self._gathered(self._points.diffuse if term.is_diffuse else self._points.specular)
         value, band = by_bands(term, bands, self._paths.wi, self._wo, self._ops)
-        return self._sorted(value * self._texture(term), band)
+        return self._sorted(value * texture, band)
 
     def whole(self, material: Editable) -> Sorted:
         """Into the one band of a material whose curves stay as they are."""
-        ops, total = self._ops, mi.Vector3f(0.0)
-        tables = {name: [mi.Float(column) for column in curve.values.T] for name, curve in material.curves.items()}
-        for term in material.terms:
-            (light, viewer), seen = upper_pair(tuple(self._paths.wi), tuple(self._wo), term.side, ops)
-            value = _quotient(term, light, viewer, ops) * mi.Vector3f(*term.scale) * self._texture(term)
-            for factor in term.factors:
-                value *= _looked_up(tables[factor.curve], angle_of(factor.over, light, viewer, factor.stretch, ops))
-            if term.viewer:
-                value *= _looked_up(tables[term.viewer], angle_of("theta_o", light, viewer, 1.0, ops))
-            total += dr.select(seen, value * light[2], 0.0)
-        return self._sorted(total, dr.zeros(mi.UInt32, dr.width(self._paths.wi)))
+        width = dr.width(self._paths.wi)
+        textures = (self._gathered(texture) for texture in (self._points.diffuse, self._points.specular))
+        value = Curves(material, self._ops).evaluate(self._paths.wi, self._wo, *textures)
+        return self._sorted(value * dr.abs(self._paths.wi.z), dr.zeros(mi.UInt32, width))
 
-    def _texture(self, term: Term) -> Any:
-        texture = self._points.diffuse if is_flat(term) else self._points.specular
+    def _gathered(self, texture: np.ndarray) -> Any:
         return dr.gather(mi.Vector3f, vectors(mi.Vector3f, texture), self._paths.at)
 
     def _sorted(self, value: Any, band: Any) -> Sorted:
@@ -91,7 +84,7 @@ def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any) -> 
     for one in bands:
         angle = angle_of(one.factor.over, light, viewer, one.factor.stretch, ops)
         band = band * one.count + dr.minimum(mi.UInt32(angle * (one.count / END_RAD)), one.count - 1)
-    return dr.select(seen, _quotient(term, light, viewer, ops) * light[2], 0.0), band
+    return dr.select(seen, quotient_of(term, light, viewer, ops) * light[2], 0.0), band
 
 
 def _second_surfaces(
@@ -116,17 +109,3 @@ def _second_surfaces(
     dr.eval(found)
     factors = [[np.stack([np.array(value[c]) for c in range(3)]) for value, _ in term] for term in found]
     return np.array(factors, np.float32), np.array([[np.array(band) for _, band in term] for term in found], np.uint32)
-
-
-def _quotient(term: Term, light: Any, viewer: Any, ops: Any) -> Any:
-    value = term.quotient.evaluate(light, viewer, ops)
-    return mi.Vector3f(*value) if isinstance(value, tuple) else mi.Vector3f(value)
-
-
-def _looked_up(table: Any, angle: Any) -> Any:
-    at = dr.clip(angle * (KNOTS / END_RAD), 0, KNOTS)
-    k = dr.minimum(mi.UInt32(at), KNOTS - 1)
-    share = at - mi.Float(k)
-    return mi.Vector3f(
-        *(dr.gather(mi.Float, c, k) * (1 - share) + dr.gather(mi.Float, c, k + 1) * share for c in table)
-    )

@@ -11,6 +11,9 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+
+from lambent.materials.factored.terms import Editable
 
 NARROW, EXPONENT = 0.3, 200.0  # share and exponent of the Blinn lobe
 
@@ -21,6 +24,14 @@ class Sides:
 
     through: Any
     back: Any
+
+
+def shares_of(editable: Editable) -> np.ndarray:
+    """(2,) shares of first directions that go through a surface, and back to the viewer."""
+    sides = {term.side for term in editable.terms}
+    if sides == {"transmission"}:
+        return np.array([1.0, 0.0])
+    return np.array([0.5 * ("transmission" in sides), 0.25 * ("retro" in sides)])
 
 
 def sampled(wo: Any, sides: Sides, u_side: Any, u_lobe: Any, u: Any) -> tuple[Any, Any]:

@@ -13,11 +13,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.bsdfs.edited_plugin import edited_dict
 from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
 from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.sky.daylight import sky_image
 from lambent.core.arrays import Floats
 from lambent.core.images import read_image
+from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
 from lambent.scenes.interiors import lat_long_image
 from lambent.scenes.scene import (
@@ -58,6 +60,8 @@ class SceneBuilder:
         False takes the diffuse terms out of all materials (for tracing with a light map).
     measured : mapping, optional
         Tables by material name, by which surfaces scatter instead of their material, whole even without `diffuse`.
+    edited : mapping, optional
+        Terms and curves by material name, by which surfaces scatter instead of by their documents.
     sampling : EmitterSampling, optional
         Of another builder of the same scene, whose emitters are sampled alike.
     """
@@ -70,10 +74,13 @@ class SceneBuilder:
         diffuse: bool = True,
         measured: Mapping[str, Lookup] | None = None,
         sampling: EmitterSampling | None = None,
+        edited: Mapping[str, Editable] | None = None,
     ) -> None:
         register_material_plugin()
         self.scene, self.measured = scene, measured or {}
         tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
+        for name, made in (edited or {}).items():
+            tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
         # Equal materials share a BSDF: each one costs every kernel a function of its own.
         bsdfs: dict[object, Any] = {}
         self.meshes = {}

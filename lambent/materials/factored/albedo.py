@@ -51,8 +51,8 @@ def albedo(material: Editable, side: str) -> Floats:
     return np.asarray(sum((term_albedo(term, material.curves) for term in mine), np.zeros(3)))
 
 
-def is_flat(term: Term) -> bool:
-    """Whether a term's curves are over angles of directions alone, so that it takes the texture of diffuse light."""
+def _is_flat(term: Term) -> bool:
+    """Whether a term's curves are over angles of directions alone."""
     return all(factor.over in FLAT for factor in term.factors)
 
 
@@ -76,7 +76,7 @@ def _axes(term: Term) -> list[_Axis]:
 
 def _shares(term: Term, axes: list[_Axis]) -> Floats:
     """e (bands of each axis, 3)."""
-    wi, wo, weight = _nodes(not is_flat(term), 1 if _is_isotropic(term, axes) else TURNS)
+    wi, wo, weight = _nodes(not _is_flat(term), 1 if _is_isotropic(term, axes) else TURNS)
     quotient = term.quotient.evaluate(wi, wo, NUMPY)
     value = (
         np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]
