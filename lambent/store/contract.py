@@ -52,18 +52,18 @@ there; `transport_lights` lists those that are complete, the last being the best
 
 Light that met other surfaces first, of the same points:
 
-    view/KEY/interreflection/tails         (Z,) uint32, surfaces on the path of each tail; meta["tails"] is the document of
-                                           `store.tails`, which numbers them, meta["series"] that of the bands
-    view/KEY/interreflection/MATERIAL/TERM/TILE    uint32, the TILE-th 4096 points of a material, P: number of entries of
-                                           each point (P,), then of all entries tail * bands + band (N,), rising, and
-                                           their light as RGB9E5 (N,), times meta["unit"] W/(sr m^2). meta["points"] is P,
+    view/KEY/interreflection/tails         (Z,) uint32, surfaces on the path of each tail; meta["tails"] is the document
+                                           of `store.tails`, which numbers them, meta["series"] that of the bands
+    view/KEY/interreflection/MATERIAL/TERM/TILE    uint32, the TILE-th 4096 points of a material, P: number of entries
+                                           of each point (P,), then of all entries tail * bands + band (N,), rising, and
+                                           their light (N,), RGB9E5 times meta["unit"] W/(sr m^2). meta["points"] is P,
                                            meta["samples"] the paths that were traced; "fixed" and "curves" as above. Of
                                            two curves, bands are numbered first curve first. A material that is not
                                            edited has one band, TERM 0, with all its light
     view/KEY/interreflection/samples       (1,) uint32, paths that every tile has; written last
 
-Radiance of a term by interreflections: scale f_q f_o(theta_o) times the sum over entries of light, the band's coefficient,
-and the tail's factor.
+Radiance of a term by interreflections: scale f_q f_o(theta_o) times the sum over entries of light, the coefficient of
+the band, and the factor of the tail.
 
 The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings". Every array
 is absent, partial or complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
