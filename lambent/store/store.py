@@ -278,7 +278,12 @@ class Store:
 
     def _save(self) -> None:
         rewritten = any(version.generation for a in self.artefacts() for version in a.done.values())
-        manifest = {"format": FORMAT, "version": VERSIONS[rewritten], "inputs": self.inputs, "documents": self.documents}
+        manifest = {
+            "format": FORMAT,
+            "version": VERSIONS[rewritten],
+            "inputs": self.inputs,
+            "documents": self.documents,
+        }
         parts = {key: json.dumps(value) for key, value in manifest.items()}
         parts["artefacts"] = _object({name: json.dumps(a.entry()) for name, a in self._artefacts.items()})
         write_text(self.folder / MANIFEST, _object(parts))
