@@ -2,7 +2,7 @@
 
     value = mantissa 2^(e - 24);   r | g << 9 | b << 18 | e << 27        (OpenGL's EXT_texture_shared_exponent)
 
-Colours reach from 0 to `LARGEST`; of the largest channel, rounding changes at most 1/512.
+Colours reach from 0 to `LARGEST`. Rounding changes each channel by 1/511 of the largest at most, or by 2^-25.
 """
 
 from __future__ import annotations

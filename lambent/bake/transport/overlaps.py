@@ -14,7 +14,7 @@ Spread = tuple[Any, Any, Any, Any, Any]
 
 
 def spread(a: Any, b: Any, c: Any, ops: Any) -> Spread:
-    """The values at the corners in order, and what the square of a distance from the first and the last is an area by."""
+    """The values at the corners in order, and shares of the area by square of the distance from first and last."""
     low, high = ops.minimum(ops.minimum(a, b), c), ops.maximum(ops.maximum(a, b), c)
     middle = ops.maximum(ops.minimum(a, b), ops.minimum(ops.maximum(a, b), c))
     width = ops.maximum(high - low, LEAST)
