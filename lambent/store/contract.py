@@ -41,8 +41,8 @@ To edit the materials of a view, with the image's size in its key:
     .../steps, values, spans               of a term with two curves instead: (Q, 2) uint32 spans, first entry of each
                                            point and the one past its last; (N,) uint32 light by pairs of bands j, k,
                                            RGB9E5 (core.shared_exponent); (N,) uint8 steps from one entry's pair to the
-                                           next. Pairs are numbered j K + k, and each point begins at -1. Black pairs are
-                                           left out, but where a step would be longer than 255
+                                           next. Pairs are numbered j K + k; each point begins at -1. Black pairs are
+                                           absent, except where a step would be longer than 255
     view/KEY/transport/LIGHTS/terms        (T,) uint32, Q of each term; written last. meta["terms"] has for each
                                            "material", "term", "fixed": its quotient and angles (Term.fixed), "curves":
                                            names and numbers of bands, and "scale"

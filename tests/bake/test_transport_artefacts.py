@@ -191,7 +191,7 @@ def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, t
 
 
 def test_light_from_behind_shows_where_a_material_transmits(tmp_path: Path) -> None:
-    """Under even light a sheet of kd = .3 and kt_d = .5 shows .8 of it; visibility has both sides there, and there alone."""
+    """Under even light a sheet of kd = .3 and kt_d = .5 shows .8 of it; only its visibility has both sides."""
     sheet = SceneObject("sheet", patch((-9, 0, 9), (18, 0, 0), (0, 0, -18)), "sheet")
     wall = SceneObject("wall", patch((-9, 0.2, -9), (18, 0, 0), (0, 9, 0)), "grey")
     materials = {"sheet": Material(kd=0.3, kt_d=0.5), "grey": GREY}
