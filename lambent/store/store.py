@@ -123,6 +123,14 @@ class Store:
         self._artefacts.clear()
         self._save()
 
+    def forget(self, names: Iterable[str]) -> None:
+        """Drop arrays, those of these names that are there, and their files."""
+        self._own()
+        dropped = [self._artefacts.pop(name) for name in list(names) if name in self._artefacts]
+        self._save()
+        for artefact in dropped:
+            ChunkFiles(self.folder, artefact).remove()
+
     def begin(
         self,
         name: str,
@@ -278,7 +286,12 @@ class Store:
 
     def _save(self) -> None:
         rewritten = any(version.generation for a in self.artefacts() for version in a.done.values())
-        manifest = {"format": FORMAT, "version": VERSIONS[rewritten], "inputs": self.inputs, "documents": self.documents}
+        manifest = {
+            "format": FORMAT,
+            "version": VERSIONS[rewritten],
+            "inputs": self.inputs,
+            "documents": self.documents,
+        }
         parts = {key: json.dumps(value) for key, value in manifest.items()}
         parts["artefacts"] = _object({name: json.dumps(a.entry()) for name, a in self._artefacts.items()})
         write_text(self.folder / MANIFEST, _object(parts))

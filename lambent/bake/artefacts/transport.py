@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,13 +104,15 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
     seen = context.store.read(view.name("visibility", str(count)))
     worn = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))
-    for part in parts:
-        mine = worn == part.material
-        sizes.append(np.count_nonzero(mine))
-        if context.stale(KIND) & {part.name(array) for array in part.arrays}:
-            what = f"{part.material}: {part.term.name}, {len(lights)} lights"
-            baking = _Baking(part, points.where(mine), lights, seen[:, mine], scale, what, context.progress)
-            (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
+    for material, terms in groupby(parts, lambda part: part.material):
+        mine = worn == material
+        own = points.where(mine), lights, seen[:, mine], scale
+        for part in terms:
+            sizes.append(np.count_nonzero(mine))
+            if context.stale(KIND) & {part.name(array) for array in part.arrays}:
+                what = f"{part.material}: {part.term.name}, {len(lights)} lights"
+                baking = _Baking(part, *own, what, context.progress)
+                (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
     said = {**view.meta, "terms": [part.said(scale) for part in parts]}
     context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
 

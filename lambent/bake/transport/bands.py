@@ -3,8 +3,8 @@
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
 Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights,
-touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, it has pairs
-of bands (4.15).
+touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, bands are
+pairs of bands (4.15).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ OWN_PAIRS = 1 << 11  # of bands that threads hold at a time: 400 kB for 16 threa
 class Pairs(NamedTuple):
     """Transport by pairs of bands: of each point the number of its entries, and all entries, point after point.
 
-    counts (P,). steps (N,) uint8 from one entry's pair to the next; pairs are numbered j K + k, each point's from -1 on.
-    light (N,) RGB9E5 (`core.shared_exponent`); black entries stand where a step would be too long.
+    counts (P,); steps (N,) uint8 from one entry's pair to the next: pairs are numbered j K + k, and each point begins
+    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries stand where a step would be too long.
     """
 
     counts: NDArray[np.int64]
@@ -292,9 +292,9 @@ def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def
     begin, end = part
     low, high = orders[0][0], orders[0][2]
     j = dr.maximum(dr.minimum(mi.UInt32(low), counts[0] - 1), begin)
-    below = share_below(mi.Float(j), *orders[0], dr)
+    below = share_below(mi.Float(j), orders[0], dr)
     while (mi.Float(j) <= high) & (j < end):
-        up_to = share_below(mi.Float(j + 1), *orders[0], dr)
+        up_to = share_below(mi.Float(j + 1), orders[0], dr)
         share = power * (up_to - below)
         below = up_to
         if dr.hint(len(counts) == 1, mode="scalar"):
@@ -304,7 +304,7 @@ def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def
             k = dr.minimum(mi.UInt32(low_2), counts[1] - 1)
             under = mi.Float(0)
             while (mi.Float(k) <= high_2) & (k < counts[1]):
-                over = share_below(mi.Float(k + 1), *orders[1], dr)
+                over = share_below(mi.Float(k + 1), orders[1], dr)
                 _add(row, 3 * ((j - begin) * counts[1] + k), share * (over - under))
                 under = over
                 k += 1
@@ -364,9 +364,7 @@ def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type
     before = dr.gather(mi.UInt32, last, pixel, active)
     while active & (code < size):
         rgb = [dr.clip(row[3 * code + c] * scale[c], 0, LARGEST) for c in range(3)]
-        bits = packed(
-            *rgb, lambda x: dr.reinterpret_array(mi.UInt32, x), lambda x: dr.reinterpret_array(mi.Float, x), dr
-        )
+        bits = packed(tuple(rgb), _bits, _floats, mi.UInt32, dr)
         step = first + code - before
         kept = ((bits & ONES) > 0) | (step == LONGEST)
         at = pixel * size + found
@@ -377,6 +375,14 @@ def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type
         code += 1
     dr.scatter(counts, found, pixel, active)
     dr.scatter(last, before, pixel, active)
+
+
+def _bits(value: Any) -> Any:
+    return dr.reinterpret_array(mi.UInt32, value)
+
+
+def _floats(bits: Any) -> Any:
+    return dr.reinterpret_array(mi.Float, bits)
 
 
 @dr.syntax

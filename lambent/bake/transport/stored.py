@@ -20,4 +20,4 @@ def scale_of(lights: TriangleLights) -> float:
 
 def wavelet_rows(bands: NDArray[np.float32], scale: float) -> NDArray[np.float16]:
     """(J, 3, P) half floats, wavelets, of transport (J, 3, P) by bands."""
-    return np.clip(transformed(bands) / np.float32(scale), -HALF_MAX, HALF_MAX).astype(np.float16)
+    return np.asarray(np.clip(transformed(bands) / np.float32(scale), -HALF_MAX, HALF_MAX), np.float16)
