@@ -13,11 +13,13 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from lambent.core.camera import Camera
+from lambent.core.environment_layouts import Layout
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import read_bytes
 from lambent.editing.operators import Operator, Region
 from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
+from lambent.scenes.scene import Axis
 from lambent.scenes.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
 
@@ -116,6 +118,8 @@ class Surroundings(_Strict):
     file: Place
     scale: Annotated[float, Field(gt=0, le=LARGEST)] = 1.0
     rotation_deg: Number = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 class SessionDocument(_Strict):

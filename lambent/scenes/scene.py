@@ -10,15 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.environment_layouts import Layout
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
@@ -107,11 +110,16 @@ class SunSky:
 
 @dataclass(frozen=True)
 class ImageEnvironment:
-    """A lat-long HDR image, oriented as `core.latlong`."""
+    """A picture of everything around, in one of the layouts of `core.environment_layouts`; None lets it be recognised.
+
+    It is turned by `rotation_deg` about its own up, from -z towards -x, and its up is then put along the axis `up`.
+    """
 
     file: Path
     scale: float = 1.0
-    rotation_deg: float = 0.0  # about +y
+    rotation_deg: float = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 @dataclass(frozen=True)

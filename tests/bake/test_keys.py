@@ -118,6 +118,8 @@ IMAGE: Answers = {
     "file": (lambda file: file.with_name("dusk.exr"), SKY),
     "scale": (2.0, SKY),
     "rotation_deg": (90.0, SKY),
+    "layout": ("cross", SKY),
+    "up": ("+z", SKY),
 }
 CONSTANT: Answers = {"radiance": ((1.0, 1.0, 1.1), SKY)}
 POINT: Answers = {

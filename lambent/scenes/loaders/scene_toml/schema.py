@@ -8,9 +8,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.environment_layouts import Layout
 from lambent.core.plain import Triple, triple
 from lambent.scenes.interiors import INTERIORS
-from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
+from lambent.scenes.scene import Axis, ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
 
 FORMAT = "lambent-scene"
 
@@ -65,12 +66,14 @@ class SunSkySection(Section):
 
 
 class ImageSection(Section):
-    """A lat-long HDR picture."""
+    """An HDR picture of everything around; its layout is recognised where it is not said."""
 
     kind: Literal["image"]
     file: str
     scale: NotNegative = 1.0
     rotation_deg: Finite = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 class ConstantSection(Section):
