@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.editing.products import Halves, Pixels, add_rows
+from lambent.editing.sparse_rows import SparseRows
 
 TERMS = 30  # a frame
 RENEWED_IN = 64  # frames until every pixel was computed anew
@@ -23,7 +24,7 @@ class IncrementalPicture:
     Parameters
     ----------
     transport
-        (J, C, P) float16, of bands or, better, of wavelets (`core.wavelets`).
+        (J, C, P) float16, of bands or, better, of wavelets (`core.wavelets`); or rows that are sparse.
 
     Attributes
     ----------
@@ -33,7 +34,7 @@ class IncrementalPicture:
         Coefficients of the curve, and those that `picture` shows.
     """
 
-    def __init__(self, transport: Halves) -> None:
+    def __init__(self, transport: Halves | SparseRows) -> None:
         self.transport = transport
         bands, channels, pixels = transport.shape
         self.wanted: Floats = np.zeros((bands, channels))
@@ -57,7 +58,7 @@ class IncrementalPicture:
         rows = np.flatnonzero(size)
         if len(rows) > terms:
             rows = np.sort(np.argpartition(-size, terms - 1)[:terms])
-        add_rows(self.picture, self.transport, rows, change[rows])
+        self._add(rows, change[rows])
         self.effective[rows] = self.wanted[rows]  # effective + change, without its rounding
         self._renew(self._next_block, RENEWED_IN)
         self._next_block = (self._next_block + 1) % RENEWED_IN
@@ -78,4 +79,10 @@ class IncrementalPicture:
         part = slice(pixels * block // blocks, pixels * (block + 1) // blocks)
         self.picture[:, part] = 0
         rows = np.flatnonzero(self.effective.any(axis=1))
-        add_rows(self.picture, self.transport, rows, self.effective[rows], part)
+        self._add(rows, self.effective[rows], part)
+
+    def _add(self, rows: Indices, weights: Floats, part: slice = slice(None)) -> None:
+        if isinstance(self.transport, SparseRows):
+            self.transport.add_to(self.picture, rows, weights, part)
+        else:
+            add_rows(self.picture, self.transport, rows, weights, part)

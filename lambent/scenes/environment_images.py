@@ -8,8 +8,11 @@ import numpy as np
 
 from lambent.core.arrays import Floats, Image
 from lambent.core.environment_layouts import Layout, as_lat_long, layout_of
+from lambent.core.errors import UserError
 from lambent.core.images import read_image
-from lambent.scenes.scene import Axis, ImageEnvironment
+from lambent.core.latlong import lat_long_uv
+from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.scene import Axis, ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 
 _UPRIGHT = np.eye(3)
 # The least turns that take +y to an axis: columns are where +x, +y, +z go. Upside down, front stays front.
@@ -45,3 +48,29 @@ def orientation(environment: ImageEnvironment) -> Floats:
     angle = np.radians(environment.rotation_deg)
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(up_turn(environment.up) @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+
+
+def environment_picture(environment: Environment) -> Image:
+    """(H, W, 3) lat-long picture of an environment, unturned, scaled to its radiance.
+
+    Raises
+    ------
+    UserError
+        It is daylight, which a bake alone computes, or its file cannot be read.
+    """
+    if isinstance(environment, ImageEnvironment):
+        return read_lat_long(environment.file, environment.layout) * np.float32(environment.scale)
+    if isinstance(environment, ComputedEnvironment):
+        return lat_long_image(environment.name)
+    if isinstance(environment, ConstantEnvironment):
+        return np.full((2, 4, 3), environment.radiance, np.float32)
+    hint = "bake the scene under it, or give a picture of it"
+    raise UserError("daylight is computed by bakes alone", field="environment", got="sunsky", hint=hint)
+
+
+def seen_at(picture: Image, w: Floats) -> Image:
+    """(..., 3) radiance of the texels of a lat-long picture (H, W, 3) in unit directions (..., 3)."""
+    height, width = picture.shape[:2]
+    column, row = lat_long_uv(w)
+    at = np.minimum((row * height).astype(int), height - 1), (column * width).astype(int) % width
+    return np.asarray(picture[at])

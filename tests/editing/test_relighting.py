@@ -7,8 +7,8 @@ import pytest
 
 from lambent.core.directions import normalize
 from lambent.editing.relighting import RelitPicture
-from lambent.editing.triangle_wavelets import FACES, TriangleTree, TurningLight
 from lambent.scenes.triangle_lights import icosahedron
+from lambent.scenes.triangle_wavelets import FACES, TriangleTree, TurningLight
 
 
 def directions(count: int, seed: int = 1) -> np.ndarray:

@@ -155,7 +155,7 @@ class _Baking:
             texture = np.repeat(self._texture(some), found.counts, axis=0)
             light = halves(found.values * texture / np.float32(self.scale))
             for writer, array in ((pairs, found.bands), (values, light)):
-                _append(writer, begin, array)
+                append(writer, begin, array)
             ends = begin + np.cumsum(found.counts)
             spans.write(chunk, np.stack([ends - found.counts, ends], axis=1).astype(np.uint32))
         for writer in (pairs, values, spans):
@@ -197,7 +197,7 @@ def _points_at_once(bands: list[Any]) -> int:
     return max(1, min(POINTS, BYTES // (12 * int(bands[0].count) * int(bands[1].count))))
 
 
-def _append(writer: Writer, begin: int, entries: np.ndarray) -> None:
+def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
     """Write entries into whole chunks from `begin`, the last one filled with zeros."""
     size = -(-len(entries) // ENTRIES) * ENTRIES
     padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
