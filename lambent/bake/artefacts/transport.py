@@ -15,6 +15,7 @@ from lambent.bake.keys import key_of, texture_inputs
 from lambent.bake.quality import QualityName
 from lambent.bake.view import View
 from lambent.core.progress import Progress
+from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.store.store import Store, Writer
 
@@ -212,11 +213,13 @@ def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
     scene = context.in_views
     light = lights_key(context, view, count)
     textures: Any = texture_inputs(scene, "diffuse", "specular")
+    rough: Any = texture_inputs(scene, "roughness")
     for material in dict.fromkeys(o.material for o in scene.objects):
         for number, term in enumerate(context.editable(material).terms):
             bands = tuple((factor, _count(context, factor, len(term.factors))) for factor in term.factors)
             angles = [(factor.over, factor.stretch, count) for factor, count in bands]
-            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material))
+            said = [rough[material]] if material in rough and varies(term) else []
+            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material), *said)
             yield _Part(view, count, material, number, term, bands, key)
 
 

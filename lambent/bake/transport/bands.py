@@ -23,6 +23,7 @@ from lambent.bake.transport.overlaps import in_order, share_below
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.materials.factored.curve import END_RAD
 from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
@@ -133,6 +134,9 @@ def _traced(
     wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
     mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
 
+    rough = mi.Float(points.roughness) if varies(term) and (points.roughness != 1).any() else None
+    sheet = vectors(mi.Vector3f, points.sheet) if points.sheet.any() else None
+
     # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
     def local(w: Any) -> Any:
         return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
@@ -141,16 +145,23 @@ def _traced(
         """The angles of a direction, in bands."""
         wi = local(w)
         angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
+        if rough is not None:
+            angles = [narrowed(b.factor.over, angle, rough, dr) for angle, b in zip(angles, bands, strict=True)]
         return [_in_bands(angle, b.count) for angle, b in zip(angles, bands, strict=True)]
 
     def height(w: Any) -> Any:
-        return dr.dot(w, axes[2]) * mirrored
+        above = dr.dot(w, axes[2]) * mirrored
+        if sheet is None:
+            return above
+        return dr.select(dr.squared_norm(sheet) > 0, dr.minimum(above, dr.dot(w, sheet) * mirrored), above)
 
     def weight(w: Any) -> Any:
         """rho_q cos of a direction on the side that the term scatters from."""
         wi = local(w)
         quotient = term.quotient.evaluate(wi, wo, ops)
         value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+        if rough is not None:
+            value *= thinned(term, wi, wo, rough, ops)
         return value * wi[2]
 
     pixel, width = dr.arange(mi.UInt32, pixels), dr.opaque(mi.UInt32, pixels)
