@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -23,8 +22,8 @@ from lambent.core import cubemap
 from lambent.core.arrays import Flags, Floats, Image
 from lambent.core.errors import UserError
 from lambent.core.latlong import lat_long_directions
+from lambent.core.surroundings import Layout
 
-Layout = Literal["lat-long", "angular", "cross", "strip"]
 DARK, MOSTLY = 1e-3, 0.75  # of the picture's mean is black; share of unused pixels that are (captions are not)
 MOST_ROWS, SAMPLES = 4096, 3  # of a resampled picture; samples per pixel and axis
 ROWS_AT_ONCE = 64

@@ -13,13 +13,12 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from lambent.core.camera import Camera
-from lambent.core.environment_layouts import Layout
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import read_bytes
+from lambent.core.surroundings import Axis, Layout
 from lambent.editing.operators import Operator, Region
 from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
-from lambent.scenes.scene import Axis
 from lambent.scenes.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
 

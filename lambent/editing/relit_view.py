@@ -13,7 +13,7 @@ from lambent.editing.sparse_rows import SparseRows
 from lambent.scenes.environment_images import environment_picture, orientation, seen_at
 from lambent.scenes.scene import Environment, ImageEnvironment
 from lambent.scenes.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
-from lambent.store.contract import view_artefact_name
+from lambent.store.contract import ViewRecord, baked_views, view_artefact_name
 from lambent.store.store import Store
 
 TERMS_OF_LIGHT = 10 * TERMS  # a frame: rows are short, and a turn changes most of them
@@ -117,3 +117,12 @@ def _depth(triangles: int) -> int:
     depth = round(float(np.log(triangles / FACES) / np.log(CHILDREN)))
     assert FACES * CHILDREN**depth == triangles, f"not a tree of triangles: {triangles}"
     return depth
+
+
+def views_for_relighting(store: Store) -> dict[str, ViewRecord]:
+    """The views that a store can relight, by the camera's name; of several sizes the one with the most pixels."""
+    found = [
+        view for view in baked_views(store).values()
+        if view_artefact_name(view.camera, view.width, view.height, "relighting", "spans") in store
+    ]  # fmt: skip
+    return {view.camera.name: view for view in sorted(found, key=lambda view: view.width * view.height)}

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.arrays import Floats, Image
-from lambent.core.environment_layouts import Layout, as_lat_long, layout_of
+from lambent.core.environment_layouts import as_lat_long, layout_of
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
 from lambent.core.latlong import lat_long_uv
+from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import lat_long_image
-from lambent.scenes.scene import Axis, ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
+from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 
 _UPRIGHT = np.eye(3)
 # The least turns that take +y to an axis: columns are where +x, +y, +z go. Upside down, front stays front.

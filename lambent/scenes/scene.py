@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, CameraPath
-from lambent.core.environment_layouts import Layout
 from lambent.core.plain import Triple
+from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
-Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person

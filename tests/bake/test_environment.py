@@ -12,10 +12,10 @@ from lambent.bake.bake import bake
 from lambent.bake.sky.cube import environment_cube
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
 from lambent.core.directions import normalize
-from lambent.core.environment_layouts import Layout
 from lambent.core.images import write_image
+from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.environment_images import orientation
-from lambent.scenes.scene import Axis, ImageEnvironment, SunSky
+from lambent.scenes.scene import ImageEnvironment, SunSky
 from tests.bake.small_scenes import TINY, plane
 
 SUN = normalize(np.array([0.5, 0.6, 0.3]))

@@ -203,3 +203,45 @@ def test_what_cannot_be_is_said(store: Store, view: RelitView) -> None:
         view.light(SunSky((0.0, 1.0, 0.0)))
     assert np.array_equal(view.image(), shown)
     assert view_artefact_name(CAMERA, *SIZE, "relighting", "spans") in store
+
+
+def test_the_command_draws_what_python_draws(store: Store, view: RelitView, folder: Path) -> None:
+    from lambent.cli.main import run
+    from lambent.core.images import read_image
+
+    picture, out = sky(folder, "b.exr", 2), folder / "out.exr"
+    assert run(["relight", str(store.folder), "-o", str(out), "--environment", str(picture), "--up", "+x",
+                "--turn", "30", "--camera", "above"]) == 0  # fmt: skip
+    view.light(ImageEnvironment(picture, up="+x"))
+    view.turn(30.0)
+    assert np.allclose(read_image(out), drawn(view), rtol=1e-3, atol=1e-6)
+    assert run(["relight", str(store.folder), "-o", str(folder / "out.png")]) == 0
+    for wrong in (["--camera", "none"], ["--environment", str(folder / "no.hdr")]):
+        assert run(["relight", str(store.folder), "-o", str(folder / "x.exr"), *wrong]) == 2
+
+
+def test_an_interrupted_bake_ends_with_the_same_arrays(
+    store: Store, scene: Scene, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from lambent.bake.artefacts import relighting
+    from lambent.core.progress import Cancelled
+
+    for constant, value in (("POINTS", 50), ("ENTRIES", 4096)):
+        monkeypatch.setattr(relighting, constant, value)
+    monkeypatch.setattr("lambent.bake.artefacts.transport.ENTRIES", 4096)
+    views, found, starts = [View(CAMERA, *SIZE)], None, 0
+    while found is None:
+        starts += 1
+        blocks = iter((True, True, False))
+
+        def stop(done: float, total: float, what: str, blocks: object = blocks) -> None:
+            if "triangles" in what and not next(blocks, True):  # type: ignore[call-overload]
+                raise Cancelled
+
+        try:
+            found = bake(scene, folder / "i", quality=HOW, only={"relighting"}, views=views, progress=stop)
+        except Cancelled:
+            assert starts < 5
+    assert starts > 1
+    whole = RelitView(store, CAMERA, *SIZE)
+    assert np.allclose(RelitView(found, CAMERA, *SIZE).image(), whole.image(), rtol=0.02)

@@ -9,9 +9,10 @@ import pytest
 
 from lambent.core.cubemap import texel_solid_angles
 from lambent.core.directions import normalize
-from lambent.core.environment_layouts import Layout, as_lat_long, layout_of
+from lambent.core.environment_layouts import as_lat_long, layout_of
 from lambent.core.errors import UserError
 from lambent.core.latlong import lat_long_direction, lat_long_directions
+from lambent.core.surroundings import Layout
 
 N = 16  # texels of a face
 FRONT, BACK, RIGHT, LEFT, TOP, BOTTOM = (0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)

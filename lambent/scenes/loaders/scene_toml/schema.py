@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
-from lambent.core.environment_layouts import Layout
 from lambent.core.plain import Triple, triple
+from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
-from lambent.scenes.scene import Axis, ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
+from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
 
 FORMAT = "lambent-scene"
 
