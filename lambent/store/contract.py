@@ -52,6 +52,18 @@ times the curves' coefficients. Coefficients of pairs are means over equal bands
 wavelets of such means; f_q and f_o are the term's. Textures are in the array. The first set of LIGHTS is small and soon
 there; `transport_lights` lists those that are complete, the last being the best, and `forget_lights` drops one.
 
+To relight a view with its materials as they are, with the image's size in its key; N triangles of the icosahedron cut
+into four again and again, in the order of scenes.triangle_wavelets:
+
+    view/KEY/relighting/spans              (B, N + 1) uint32, first entry of each wavelet in each block of meta["block"]
+                                           points, and the one past the last; B blocks of the points of view_points
+    view/KEY/relighting/points, values     (E, 1) uint16, each entry's point within its block, and (E, 3) float16, light
+                                           by a wavelet of radiance: sum to W/(sr m^2) with TriangleTree.of_radiance
+    view/KEY/relighting/errors             (B, 2) float32: squared sums of what was left out or rounded, and of all
+    view/KEY/relighting/lamps              (P, 3) float32, W/(sr m^2), direct light of all but the environment
+    view/KEY/relighting/light              (16 N, 3) float32, W/(sr m^2), the scene's environment in the N triangles cut
+                                           twice more
+
 The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings". Every array
 is absent, partial or complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """

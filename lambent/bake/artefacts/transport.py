@@ -17,6 +17,7 @@ from lambent.bake.keys import key_of, texture_inputs
 from lambent.bake.quality import QualityName
 from lambent.bake.view import View
 from lambent.core.progress import Progress
+from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.store.store import Store, Writer
 
@@ -235,16 +236,28 @@ class _Stream:
         self._writer.write((number,), chunk)
 
 
+def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
+    """Write entries into whole chunks from `begin`, the last one filled with zeros."""
+    size = -(-len(entries) // ENTRIES) * ENTRIES
+    padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
+    if begin + size > writer.artefact.shape[0]:
+        writer.extend(begin + size - writer.artefact.shape[0])
+    for first in range(0, size, ENTRIES):
+        writer.write(((begin + first) // ENTRIES, 0), padded[first : first + ENTRIES])
+
+
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
     """The terms of every material that an object of the scene has."""
     scene = context.in_views
     light = lights_key(context, view, count)
     textures: Any = texture_inputs(scene, "diffuse", "specular")
+    rough: Any = texture_inputs(scene, "roughness")
     for material in dict.fromkeys(o.material for o in scene.objects):
         for number, term in enumerate(context.editable(material).terms):
             bands = tuple((factor, _count(context, factor, len(term.factors))) for factor in term.factors)
             angles = [(factor.over, factor.stretch, count) for factor, count in bands]
-            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material))
+            said = [rough[material]] if material in rough and varies(term) else []
+            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material), *said)
             yield _Part(view, count, material, number, term, bands, key)
 
 

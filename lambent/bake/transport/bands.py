@@ -34,6 +34,7 @@ from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.visibility import BITS
 from lambent.core.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
@@ -177,6 +178,9 @@ class _Lit:
         self._arrays = [vectors(mi.Vector3f, of) for of in (points.p, points.t, points.b, points.n, points.wo)]
         self._lights, self._number = lights_on_device(lights), dr.opaque(mi.UInt32, len(lights))
         self._seen = mi.UInt32(seen.ravel())
+        rough = varies(term) and (points.roughness != 1).any()
+        self._roughness = mi.Float(points.roughness) if rough else None
+        self._sheet = vectors(mi.Vector3f, points.sheet) if points.sheet.any() else None
 
     def __len__(self) -> int:
         return self._many
@@ -191,6 +195,9 @@ class _Lit:
         wo, ops, term, bands = tuple(seen_from), array_ops(), self._term, self._bands
         mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
 
+        rough = None if self._roughness is None else dr.gather(mi.Float, self._roughness, pixel, active)
+        sheet = None if self._sheet is None else dr.gather(mi.Vector3f, self._sheet, pixel, active)
+
         # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
         def local(w: Any) -> Any:
             return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
@@ -199,16 +206,23 @@ class _Lit:
             """The angles of a direction, in bands."""
             wi = local(w)
             angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
+            if rough is not None:
+                angles = [narrowed(b.factor.over, angle, rough, dr) for angle, b in zip(angles, bands, strict=True)]
             return [in_bands(angle, b.count) for angle, b in zip(angles, bands, strict=True)]
 
         def height(w: Any) -> Any:
-            return dr.dot(w, axes[2]) * mirrored
+            above = dr.dot(w, axes[2]) * mirrored
+            if sheet is None:
+                return above
+            return dr.select(dr.squared_norm(sheet) > 0, dr.minimum(above, dr.dot(w, sheet) * mirrored), above)
 
         def weight(w: Any) -> Any:
             """rho_q cos of a direction on the side that the term scatters from."""
             wi = local(w)
             quotient = term.quotient.evaluate(wi, wo, ops)
             value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+            if rough is not None:
+                value *= thinned(term, wi, wo, rough, ops)
             return value * wi[2]
 
         row = dr.alloc_local(mi.Float, 3 * count * int(np.prod(self.counts[1:])), value=mi.Float(0))
