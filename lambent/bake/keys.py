@@ -6,9 +6,13 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
+from lambent.core.environment_layouts import layout_of
+from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.interiors import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene
@@ -61,13 +65,22 @@ def light_inputs(scene: Scene) -> object:
     return [emissions, [(type(x).__name__, asdict(x)) for x in scene.lights], environment_inputs(scene.environment)]
 
 
+@lru_cache(maxsize=16)
+def _layout(file: Path, content: str) -> str:
+    """The layout that a picture is recognised by; `content` is its hash, for the cache."""
+    return layout_of(read_image(file), file)
+
+
 def environment_inputs(environment: Environment | None) -> object:
     """The environment; an image counts by its content, wherever it comes from."""
     if environment is None:
         return None
     values: Mapping[str, object] = asdict(environment)
     if isinstance(environment, ImageEnvironment):
-        values = {**values, "file": sha256_of(environment.file)}
+        content = sha256_of(environment.file)
+        values = {**values, "file": content, "layout": environment.layout or _layout(environment.file, content)}
+        plain = {"layout": "lat-long", "up": "+y"}  # all there was once: the keys of its stores stay
+        values = {name: value for name, value in values.items() if plain.get(name) != value}
     elif isinstance(environment, ComputedEnvironment):
         values = {**values, "image": key_of("computed", 1, lat_long_image(environment.name))}
     return [type(environment).__name__, values]

@@ -11,12 +11,12 @@ from pathlib import Path
 
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material, load_material
 from lambent.materials.fitting.fit import fit
 from lambent.materials.measured import registry
+from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.environments import dusk, from_lat_long, night, studio
 
 OWN_ENVIRONMENTS = {"studio": studio, "night": night, "dusk": dusk}
@@ -57,7 +57,7 @@ def read_inputs(paths: Iterable[Path], progress: Progress = silent) -> tuple[dic
         elif registry.is_known(path):
             materials.append(specular_part(fit(registry.load(path), progress=progress).material, path))
         else:
-            environments[path.stem] = from_lat_long(read_image(path))
+            environments[path.stem] = from_lat_long(read_lat_long(path))
     return environments, tuple(materials)
 
 

@@ -14,9 +14,9 @@ def lat_long_direction(theta_rad: ArrayLike, phi_rad: ArrayLike) -> Floats:
     return np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], axis=-1)
 
 
-def lat_long_directions(height: int, width: int) -> Floats:
-    """Unit vectors (height, width, 3) of the pixel centres."""
-    theta = (np.arange(height) + 0.5) / height * np.pi
+def lat_long_directions(height: int, width: int, rows: slice = slice(None)) -> Floats:
+    """Unit vectors (height, width, 3) of the pixel centres, or of some rows of them."""
+    theta = (np.arange(height)[rows] + 0.5) / height * np.pi
     phi = (np.arange(width) + 0.5) / width * (2 * np.pi) - np.pi
     return lat_long_direction(theta[:, None], phi)
 

@@ -2,7 +2,7 @@
 
     value = mantissa 2^(e - 24);   r | g << 9 | b << 18 | e << 27        (OpenGL's EXT_texture_shared_exponent)
 
-Colours reach from 0 to `LARGEST`; of the largest channel, rounding changes at most 1/512.
+Colours reach from 0 to `LARGEST`. Rounding changes each channel by 1/511 of the largest at most, or by 2^-25.
 """
 
 from __future__ import annotations
@@ -20,21 +20,18 @@ _OFFSET = 127 - 16  # of exponents of float32
 
 def packed_rgb(rgb: NDArray[np.float32]) -> NDArray[np.uint32]:
     """Colours (..., 3), not negative, in 32 bits each."""
-    clipped = np.clip(rgb, 0, LARGEST).astype(np.float32)
-    return packed(*np.moveaxis(clipped, -1, 0), lambda x: x.view(np.uint32), lambda x: x.view(np.float32), np)
+    r, g, b = np.moveaxis(np.clip(rgb, 0, LARGEST).astype(np.float32), -1, 0)
+    bits = packed((r, g, b), lambda x: x.view(np.uint32), lambda x: x.view(np.float32), np.uint32, np)
+    return np.asarray(bits, np.uint32)
 
 
-def packed(r: Any, g: Any, b: Any, bits: Any, floats: Any, ops: Any) -> Any:
-    """Bits of colours from 0 to `LARGEST`; `bits` and `floats` look at float32 as uint32 and back."""
-    largest = ops.maximum(ops.maximum(r, g), b)
+def packed(rgb: tuple[Any, Any, Any], bits: Any, floats: Any, whole: Any, ops: Any) -> Any:
+    """Bits of colours from 0 to `LARGEST`; `bits` and `floats` see float32 as uint32 and back, `whole` rounds down."""
+    largest = ops.maximum(ops.maximum(rgb[0], rgb[1]), rgb[2])
     exponent = ops.maximum((bits(largest) + _ROUNDED) >> 23, _OFFSET) - _OFFSET
     scale = floats((127 + 24 - exponent) << 23)
-    red, green, blue = (_whole(channel * scale + np.float32(0.5), exponent) for channel in (r, g, b))
+    red, green, blue = (whole(channel * scale + np.float32(0.5)) for channel in rgb)
     return red | (green << 9) | (blue << 18) | (exponent << 27)
-
-
-def _whole(value: Any, kind: Any) -> Any:
-    return value.astype(np.uint32) if isinstance(value, np.ndarray) else type(kind)(value)
 
 
 def unpacked_rgb(packed: NDArray[np.uint32]) -> NDArray[np.float32]:

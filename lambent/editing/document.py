@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import read_bytes
+from lambent.core.surroundings import Axis, Layout
 from lambent.editing.operators import Operator, Region
 from lambent.materials.document import Material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
@@ -116,6 +117,8 @@ class Surroundings(_Strict):
     file: Place
     scale: Annotated[float, Field(gt=0, le=LARGEST)] = 1.0
     rotation_deg: Number = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 class SessionDocument(_Strict):

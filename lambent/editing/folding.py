@@ -57,7 +57,9 @@ def folded(
     scale = float(np.abs(idle).max()) or 1.0
     out = np.empty((bands, 3, len(spans)), np.uint16)
     second = bands if edited else len(idle)
-    _fold(out, spans, steps, values, (idle / scale).astype(np.float32), edited, second, TAPS.astype(np.float32))
+    shift, mask = second.bit_length() - 1, second - 1
+    places = (0, mask, shift, -1) if edited else (shift, -1, 0, mask)
+    _fold(out, spans, steps, values, (idle / scale).astype(np.float32), places, TAPS.astype(np.float32))
     return out.view(np.float16), scale
 
 
@@ -70,25 +72,35 @@ def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(parallel=True, fastmath=True, cache=True)
-def _fold(out, spans, steps, values, idle, edited, second, taps):  # type: ignore[no-untyped-def]
+def _fold(out, spans, steps, values, idle, places, taps):  # type: ignore[no-untyped-def]
+    """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
     bands, _, points = out.shape
+    shift, mask, idle_shift, idle_mask = places
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
         first = block * TOGETHER
         count = min(TOGETHER, points - first)
         rows = np.zeros((TOGETHER, bands, 4), np.float32)
         before = np.empty((bands, 4), np.float32)
         for i in range(count):
-            row, pair = rows[i], -1
+            row, pair, last = rows[i], -1, 0
+            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
             for n in range(spans[first + i, 0], spans[first + i, 1]):
                 pair += steps[n]
-                j, k = pair // second, pair % second
-                if edited:
-                    j, k = k, j
+                j, k = pair >> shift & mask, pair >> idle_shift & idle_mask
+                if j != last:  # sums stay in registers: most entries have the band of the one before
+                    row[last, 0] += red
+                    row[last, 1] += green
+                    row[last, 2] += blue
+                    red, green, blue = np.float32(0), np.float32(0), np.float32(0)
+                    last = j
                 bits = values[n]
-                unit = _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
-                row[j, 0] += idle[k, 0] * unit * np.float32(bits & 511)
-                row[j, 1] += idle[k, 1] * unit * np.float32(bits >> 9 & 511)
-                row[j, 2] += idle[k, 2] * unit * np.float32(bits >> 18 & 511)
+                unit = _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg,var-annotated]
+                red += idle[k, 0] * unit * np.float32(bits & 511)
+                green += idle[k, 1] * unit * np.float32(bits >> 9 & 511)
+                blue += idle[k, 2] * unit * np.float32(bits >> 18 & 511)
+            row[last, 0] += red
+            row[last, 1] += green
+            row[last, 2] += blue
             _to_wavelets(row, before, taps)
         for j in range(bands):
             for c in range(3):

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.editing.incremental import TERMS, IncrementalPicture
-from lambent.editing.products import Halves, Pixels
+from lambent.editing.products import Halves, HostProducts, Pixels
+from lambent.editing.sparse_rows import SparseRows
 
 
 class PerBandPicture:
@@ -23,15 +24,15 @@ class PerBandPicture:
     Parameters
     ----------
     transport
-        (J, C, P) float16 of wavelets, coarse to fine.
+        (J, C, P) float16 of wavelets, coarse to fine; or rows that are sparse.
     levels
         (J,) level of each, not decreasing (`core.wavelets.levels`).
     """
 
-    def __init__(self, transport: Halves, levels: NDArray[np.integer]) -> None:
+    def __init__(self, transport: Halves | SparseRows, levels: NDArray[np.integer]) -> None:
         starts = np.flatnonzero(np.diff(levels, prepend=-1))
         self._ranges = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(levels)], strict=True)]
-        self._levels = [IncrementalPicture(transport[part]) for part in self._ranges]
+        self._levels = [IncrementalPicture(HostProducts(transport[part])) for part in self._ranges]
 
     @property
     def is_exact(self) -> bool:

@@ -99,10 +99,21 @@ class Products(Protocol):
         """
 
 
-class HostProducts:
-    """`Products` of transport (J, C, P) float16 in memory, summed by all cores."""
+class Summable(Protocol):
+    """Rows that are kept in another way."""
 
-    def __init__(self, transport: Halves) -> None:
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(J, C, P) of the transport."""
+
+    def add_to(self, picture: Pixels, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None)) -> None:
+        """As the function `add_rows`."""
+
+
+class HostProducts:
+    """`Products` of transport (J, C, P) float16 in memory, or of other rows, summed by all cores."""
+
+    def __init__(self, transport: Halves | Summable) -> None:
         self._transport = transport
         self.shape = transport.shape
         self.picture: Pixels = np.zeros(transport.shape[1:], np.float32)
@@ -112,4 +123,7 @@ class HostProducts:
     ) -> None:
         if anew:
             self.picture[:, part] = 0
-        add_rows(self.picture, self._transport, rows, weights, part)
+        if isinstance(self._transport, np.ndarray):
+            add_rows(self.picture, self._transport, rows, weights, part)
+        else:
+            self._transport.add_to(self.picture, rows, weights, part)

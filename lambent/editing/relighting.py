@@ -12,7 +12,8 @@ from lambent.editing.incremental import TERMS
 from lambent.editing.per_band import PerBandPicture
 from lambent.editing.products import Pixels
 from lambent.editing.rows import Rows
-from lambent.editing.triangle_wavelets import TriangleTree
+from lambent.editing.sparse_rows import SparseRows
+from lambent.scenes.triangle_wavelets import TriangleTree
 
 
 class RelitPicture:
@@ -22,14 +23,17 @@ class RelitPicture:
     ----------
     tree
         The N triangles that light the scene.
-    transport : (N, 3, P) float32
-        Radiance of the P pixels that each triangle makes with a radiance of 1.
+    transport : (N, 3, P) float32, or SparseRows
+        Radiance of the P pixels that each triangle makes with a radiance of 1; or the wavelets of that.
     """
 
-    def __init__(self, tree: TriangleTree, transport: Pixels) -> None:
-        rows = Rows.of_wavelets(np.asarray(tree.of_transport(transport), np.float32))
-        self._tree, self._unit = tree, rows.unit
-        self._picture = PerBandPicture(rows.values, tree.levels)
+    def __init__(self, tree: TriangleTree, transport: Pixels | SparseRows) -> None:
+        self._tree, self._unit = tree, 1.0
+        if isinstance(transport, SparseRows):
+            self._picture = PerBandPicture(transport, tree.levels)
+        else:
+            rows = Rows.of_wavelets(np.asarray(tree.of_transport(transport), np.float32))
+            self._unit, self._picture = rows.unit, PerBandPicture(rows.values, tree.levels)
 
     @property
     def is_exact(self) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple
+from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
 
 Array = NDArray[np.floating]
@@ -107,11 +108,16 @@ class SunSky:
 
 @dataclass(frozen=True)
 class ImageEnvironment:
-    """A lat-long HDR image, oriented as `core.latlong`."""
+    """A picture of everything around, in one of the layouts of `core.environment_layouts`; None lets it be recognised.
+
+    It is turned by `rotation_deg` about its own up, from -z towards -x, and its up is then put along the axis `up`.
+    """
 
     file: Path
     scale: float = 1.0
-    rotation_deg: float = 0.0  # about +y
+    rotation_deg: float = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 @dataclass(frozen=True)

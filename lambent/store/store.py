@@ -123,6 +123,14 @@ class Store:
         self._artefacts.clear()
         self._save()
 
+    def forget(self, names: Iterable[str]) -> None:
+        """Drop arrays, those of these names that are there, and their files."""
+        self._own()
+        dropped = [self._artefacts.pop(name) for name in list(names) if name in self._artefacts]
+        self._save()
+        for artefact in dropped:
+            ChunkFiles(self.folder, artefact).remove()
+
     def begin(
         self,
         name: str,

@@ -13,6 +13,8 @@ from lambent.bake.sky.cube import environment_cube
 from lambent.core.cubemap import face_directions, sample, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.images import write_image
+from lambent.core.surroundings import Axis, Layout
+from lambent.scenes.environment_images import orientation
 from lambent.scenes.scene import ImageEnvironment, SunSky
 from tests.bake.small_scenes import TINY, plane
 
@@ -62,6 +64,38 @@ def test_picture_looks_along_minus_z_in_its_middle_with_plus_x_to_the_right(
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     for direction, colour in (((0, 0, -1), (2, 0, 0)), ((1, 0, 0), (0, 2, 0)), ((0, 1, 0), (0, 0, 2))):
         assert sample(cube, turn @ np.array(direction, float)) == pytest.approx(colour, abs=0.05)
+
+
+@pytest.mark.parametrize("layout", [None, "cross"])
+@pytest.mark.parametrize(
+    ("up", "front", "right"),
+    [
+        ("+y", (0, 0, -1), (1, 0, 0)),
+        ("-y", (0, 0, -1), (-1, 0, 0)),
+        ("+z", (0, 1, 0), (1, 0, 0)),
+        ("-z", (0, -1, 0), (1, 0, 0)),
+        ("+x", (0, 0, -1), (0, -1, 0)),
+        ("-x", (0, 0, -1), (0, 1, 0)),
+    ],
+)
+def test_a_cross_lies_as_its_up_axis_says(
+    tmp_path: Path, up: Axis, front: tuple[int, ...], right: tuple[int, ...], layout: Layout | None
+) -> None:
+    """Top blue, front red, right green; turned by 90 degrees about its own up, its front is where its left was."""
+    n = 16
+    picture = np.zeros((3 * n, 4 * n, 3), np.float32)
+    picture[:n, n : 2 * n, 2] = 1
+    picture[n : 2 * n, n : 2 * n, 0] = 1
+    picture[n : 2 * n, 2 * n : 3 * n, 1] = 1
+    write_image(tmp_path / "p.exr", picture)
+    axis = np.array([(up[1] == a) * (1.0 if up[0] == "+" else -1.0) for a in "xyz"])
+    for turned, at in ((0.0, (front, right)), (90.0, (tuple(-np.array(right)), front))):
+        environment = ImageEnvironment(tmp_path / "p.exr", 1.0, turned, layout, up)
+        cube = environment_cube(environment, 32).astype(float)
+        for direction, colour in ((at[0], (1, 0, 0)), (at[1], (0, 1, 0)), (axis, (0, 0, 1))):
+            assert sample(cube, np.array(direction, float)) == pytest.approx(colour, abs=0.05)
+            of_picture = np.array(direction, float) @ orientation(environment)
+            assert of_picture[np.argmax([colour[1], colour[2], colour[0]])] * (-1 if colour[0] else 1) > 0.99
 
 
 def test_no_environment_is_black() -> None:

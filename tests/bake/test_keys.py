@@ -44,16 +44,18 @@ from tests.bake.small_scenes import GREY, MIRROR, TINY
 
 NOTHING: tuple[str, ...] = ()
 PROBES = ("probe/",)
-LIT = ("light_map/", *PROBES)  # whatever light falls on
+BAKED = ("light_map/", *PROBES)
 OF_BALL = ("probe/ball/",)
 CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
+REFLECTED = tuple(SEEN.name("relighting", part) for part in ("spans", "points", "values", "errors", "lamps"))
+LIT = (*BAKED, *REFLECTED)  # whatever light falls on
 VISIBLE = (SEEN.name("visibility", ""), SEEN.name("transport", ""))
 POINTS = (SEEN.name("view_points", ""), *VISIBLE)
 SHINING = (SEEN.name("view_points", "backdrop"), *VISIBLE)
-LIGHTS = (*LIT, *SHINING)
+LIGHTS = (*BAKED, *SHINING, SEEN.name("relighting", "lamps"))
 LOOK = (*LIT, *POINTS)  # where light falls, and where on it the viewer looks
-SKY = ("environment/", *LIGHTS)
+SKY = ("environment/", *BAKED, *SHINING, SEEN.name("relighting", "light"))
 SURFACES = ("geometry/", *LOOK)
 
 
@@ -118,6 +120,8 @@ IMAGE: Answers = {
     "file": (lambda file: file.with_name("dusk.exr"), SKY),
     "scale": (2.0, SKY),
     "rotation_deg": (90.0, SKY),
+    "layout": ("cross", SKY),
+    "up": ("+z", SKY),
 }
 CONSTANT: Answers = {"radiance": ((1.0, 1.0, 1.1), SKY)}
 POINT: Answers = {
@@ -181,16 +185,16 @@ CASES: list[tuple[type, Answers, Callable[[Scene], Any], Callable[[Scene, Any], 
     ),
 ]  # fmt: skip
 SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
-    "geometry": {"texels": (64, ("geometry/", *LIT))},
+    "geometry": {"texels": (64, ("geometry/", *BAKED))},
     "environment": {"texels": (32, ("environment/",))},
     "light_map": {
-        "samples": ((64, 128), LIT),
-        "noise": (0.1, LIT),
-        "max_depth": (33, LIT),
-        "gather_samples": (16, LIT),
+        "samples": ((64, 128), BAKED),
+        "noise": (0.1, BAKED),
+        "max_depth": (33, BAKED),
+        "gather_samples": (16, BAKED),
         "photons_per_texel": (65, NOTHING),  # of the other method
-        "gather_noise": (0.1, LIT),
-        "tile_texels": (128, LIT),
+        "gather_noise": (0.1, BAKED),
+        "tile_texels": (128, BAKED),
     },
     "view_points": {},
     "visibility": {"lights": ((400, 500), (SEEN.name("visibility", "500"), SEEN.name("transport", "500/")))},
@@ -199,6 +203,13 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "sharp_of_two": (64, of_terms("mirror/0/", "sheet/2/")),
         "smooth": (32, of_terms("grey/0/", "sheet/0/", "sheet/1/", "worn/0/")),
         "smooth_of_two": (8, of_terms("mirror/0/", "sheet/2/")),
+    },
+    "relighting": {
+        "depth": (2, (*REFLECTED[:4], SEEN.name("relighting", "light"))),
+        "levels": (2, REFLECTED[:4]),
+        "samples": (8, REFLECTED[:4]),
+        "tolerance": (0.5, REFLECTED[:4]),
+        "paths": (3, REFLECTED[4:]),
     },
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
 }
@@ -338,9 +349,9 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
     assert stale(before, keys(scene, seed=1)) == starting(before, LIT)
     assert stale(before, keys(scene, probes="traced")) == starting(before, PROBES)
     photons = keys(scene, light_map="photons")
-    assert stale(before, photons) == starting(before | photons, LIT)
+    assert stale(before, photons) == starting(before | photons, BAKED)
     more = keys(scene, TINY.changed(light_map={"photons_per_texel": 65}), light_map="photons")
-    assert stale(photons, more) == starting(photons, LIT)
+    assert stale(photons, more) == starting(photons, BAKED)
 
 
 def test_what_a_material_is_edited_as(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:

@@ -117,7 +117,7 @@ def _small(corners: np.ndarray, cuts: int) -> np.ndarray:
     return surface_triangles(corners[None], np.ones((1, 3)), longest / cuts * 1.0001).centres
 
 
-def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SIZE)) -> View:
+def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SIZE), camera: Camera = CAMERA) -> View:
     from lambent.bake.engine import engine
 
     engine()
@@ -127,7 +127,7 @@ def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SI
 
     builder = SceneBuilder(scene)
     traced = builder.build()
-    points = view_points(builder, traced, CAMERA, *size)
+    points = view_points(builder, traced, camera, *size)
     return View(scene, lights, points, visibility(traced, points, lights))
 
 

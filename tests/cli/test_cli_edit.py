@@ -72,7 +72,7 @@ def test_environments_are_named_and_found(tmp_path):
     write_image(other, dusk(4)[0])
     preview = opened(tmp_path, tmp_path / "a.json", None, [other]).preview
     assert preview.environments[-2:] == ("beside", "beside'") and preview.environment == "beside'"
-    with pytest.raises(UserError, match="not a lat-long"):
+    with pytest.raises(UserError, match="the picture is square"):
         preview.light("beside")
     with pytest.raises(UserError, match="no such file"):
         opened(tmp_path, tmp_path / "a.json", None, [tmp_path / "none.hdr"])

@@ -7,8 +7,9 @@ import pytest
 
 from lambent.core.directions import normalize
 from lambent.editing.relighting import RelitPicture
-from lambent.editing.triangle_wavelets import FACES, TriangleTree, TurningLight
+from lambent.editing.sparse_rows import SparseRows
 from lambent.scenes.triangle_lights import icosahedron
+from lambent.scenes.triangle_wavelets import FACES, TriangleTree, TurningLight
 
 
 def directions(count: int, seed: int = 1) -> np.ndarray:
@@ -153,3 +154,43 @@ def test_swapped_and_bright_environments() -> None:
         picture.light(radiance)
         picture.draw()
         assert np.allclose(picture.picture, np.einsum("nc,ncp->cp", radiance, transport), rtol=1e-3)
+
+
+def sparse(rows: np.ndarray, block: int) -> SparseRows:
+    """Rows (J, 3, P) without their zeros, written one by one."""
+    spans, points, values = [], [], []
+    for first in range(0, rows.shape[2], block):
+        spans.append([])
+        for row in rows[:, :, first : first + block]:
+            spans[-1].append(len(points))
+            for p in np.flatnonzero(row.any(axis=0)):
+                points.append(p)
+                values.append(row[:, p])
+        spans[-1].append(len(points))
+    arrays = np.array(spans), np.array(points, np.uint16), np.array(values, np.float16)
+    return SparseRows(*arrays, block, rows.shape[2])
+
+
+@pytest.mark.parametrize("part", [slice(None), slice(3, 5), slice(7, 23), slice(9, 9)])
+def test_sparse_rows_are_the_dense_ones(part: slice) -> None:
+    """Whole or in part, across blocks of which the last is short."""
+    rng = np.random.default_rng(6)
+    rows = ((rng.random((20, 1, 23)) < 0.3) * rng.random((20, 3, 23))).astype(np.float16)
+    chosen, weights = np.array([1, 4, 19]), rng.normal(size=(3, 3))
+    found = np.zeros((3, 23), np.float32)
+    sparse(rows, 9).add_to(found, chosen, weights, part)
+    expected = np.zeros((3, 23))
+    expected[:, part] = np.einsum("kc,kcp->cp", weights, rows[chosen].astype(float))[:, part]
+    assert np.allclose(found, expected, atol=1e-6)
+    some = np.zeros((3, 23), np.float32)
+    sparse(rows, 9)[3:20].add_to(some, chosen[1:] - 3, weights[1:])
+    assert np.allclose(some, np.einsum("kc,kcp->cp", weights[1:], rows[chosen[1:]].astype(float)), atol=1e-6)
+
+
+def test_a_turned_lamp_keeps_its_light() -> None:
+    """A lamp as small as a part of a triangle is never missed, and never counts twice."""
+    tree, picture = TriangleTree(2), np.full((64, 128, 3), 0.1, np.float32)
+    picture[20, 40] = 5000.0
+    light = TurningLight.of_picture(tree, picture)
+    total = [(light.radiance(turned_about_y(a)) * tree.areas_sr[:, None]).sum(axis=0) for a in np.arange(20) * 0.3]
+    assert np.allclose(total, (light.radiance() * tree.areas_sr[:, None]).sum(axis=0), rtol=0.01)

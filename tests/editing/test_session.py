@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import Curve, angles_rad
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models import model_named
+from lambent.scenes.scene import ImageEnvironment
 
 CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 TRAY = Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.1, my=0.1),))
@@ -332,3 +334,11 @@ def test_damaged_documents_are_read_or_refused(tmp_path: Path) -> None:
                 continue
             again.save(file)
             assert Session.open(file).document.materials == again.document.materials
+
+
+def test_surroundings_say_what_an_environment_says() -> None:
+    values = {"file": "sky.hdr", "scale": 2.0, "rotation_deg": 30.0, "layout": "cross", "up": "-z"}
+    assert set(values) == {field.name for field in fields(ImageEnvironment)} == set(Surroundings.model_fields)
+    assert ImageEnvironment(**Surroundings(**values).model_dump()) == ImageEnvironment(**values)
+    with pytest.raises(ValueError, match="layout"):
+        Surroundings(file="sky.hdr", layout="round")

@@ -41,6 +41,8 @@ def test_everything_a_scene_may_say(tmp_path: Path) -> None:
 kind = "image"
 file = "sky.hdr"
 rotation_deg = 30.0
+layout = "angular"
+up = "+z"
 """
         + MATERIALS
         + """
@@ -77,7 +79,9 @@ keys = [
 """,
     )
     scene = load_scene(path)
-    assert scene.exposure_ev == 1.5 and scene.environment == ImageEnvironment(tmp_path / "sky.hdr", 1.0, 30.0)
+    assert scene.exposure_ev == 1.5 and scene.environment == ImageEnvironment(
+        tmp_path / "sky.hdr", 1.0, 30.0, "angular", "+z"
+    )
     assert scene.object("sphere").material == "gold" and scene.materials["gold"].lobes[0].my == 0.2
     assert {o.light_map_scale for o in scene.objects} == {2.0}
     assert scene.object("lamp").emission == (1.0, 2.0, 3.0)

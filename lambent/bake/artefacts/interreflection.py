@@ -212,7 +212,7 @@ def unpacked(array: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray, np
 def parts(context: BakeContext, view: View) -> Iterator[Part]:
     """The materials of a scene's objects."""
     bounces, key = context.bounces, _series_key(context, view)
-    textures: Any = texture_inputs(context.in_views, "diffuse", "specular")
+    textures: Any = texture_inputs(context.in_views, "diffuse", "specular", "roughness")
     for material in _worn(context):
         editable, terms = context.editable(material), []
         if material not in bounces.fixed:

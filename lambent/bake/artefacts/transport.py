@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from lambent.bake.keys import key_of, texture_inputs
 from lambent.bake.quality import QualityName
 from lambent.bake.view import View
 from lambent.core.progress import Progress
+from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.store.store import Store, Writer
 
@@ -103,13 +105,15 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
     seen = context.store.read(view.name("visibility", str(count)))
     worn = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))
-    for part in parts:
-        mine = worn == part.material
-        sizes.append(np.count_nonzero(mine))
-        if context.stale(KIND) & {part.name(array) for array in part.arrays}:
-            what = f"{part.material}: {part.term.name}, {len(lights)} lights"
-            baking = _Baking(part, points.where(mine), lights, seen[:, mine], scale, what, context.progress)
-            (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
+    for material, terms in groupby(parts, lambda part: part.material):
+        mine = worn == material
+        own = points.where(mine), lights, seen[:, mine], scale
+        for part in terms:
+            sizes.append(np.count_nonzero(mine))
+            if context.stale(KIND) & {part.name(array) for array in part.arrays}:
+                what = f"{part.material}: {part.term.name}, {len(lights)} lights"
+                baking = _Baking(part, *own, what, context.progress)
+                (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
     said = {**view.meta, "terms": [part.said(scale) for part in parts]}
     context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
 
@@ -232,16 +236,28 @@ class _Stream:
         self._writer.write((number,), chunk)
 
 
+def append(writer: Writer, begin: int, entries: np.ndarray) -> None:
+    """Write entries into whole chunks from `begin`, the last one filled with zeros."""
+    size = -(-len(entries) // ENTRIES) * ENTRIES
+    padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
+    if begin + size > writer.artefact.shape[0]:
+        writer.extend(begin + size - writer.artefact.shape[0])
+    for first in range(0, size, ENTRIES):
+        writer.write(((begin + first) // ENTRIES, 0), padded[first : first + ENTRIES])
+
+
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:
     """The terms of every material that an object of the scene has."""
     scene = context.in_views
     light = lights_key(context, view, count)
     textures: Any = texture_inputs(scene, "diffuse", "specular")
+    rough: Any = texture_inputs(scene, "roughness")
     for material in dict.fromkeys(o.material for o in scene.objects):
         for number, term in enumerate(context.editable(material).terms):
             bands = tuple((factor, _count(context, factor, len(term.factors))) for factor in term.factors)
             angles = [(factor.over, factor.stretch, count) for factor, count in bands]
-            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material))
+            said = [rough[material]] if material in rough and varies(term) else []
+            key = key_of(KIND, REVISION, light, repr(term.quotient), term.side, angles, textures.get(material), *said)
             yield _Part(view, count, material, number, term, bands, key)
 
 

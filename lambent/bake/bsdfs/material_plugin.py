@@ -35,7 +35,11 @@ PLUGIN = "lambent_material"
 TANGENT_ATTRIBUTE = "vertex_tangent"
 # Attributes of the BSDF: the textures that multiply kd and kt_d, and k of every lobe; the shading frame in world space.
 DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE = "diffuse", "specular", "normal"
-ATTRIBUTES = (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE, TANGENT_ATTRIBUTE)
+# The factor of roughness; the normal of the mesh where a normal map bends it, else 0.
+ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE = "roughness", "sheet"
+ATTRIBUTES = (
+    DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, NORMAL_ATTRIBUTE, TANGENT_ATTRIBUTE, ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE,
+)  # fmt: skip
 
 
 def material_dict(
@@ -124,6 +128,10 @@ def register_material_plugin() -> type:
                 return self.textures.diffuse(si, active)
             if name == SPECULAR_ATTRIBUTE:
                 return self.textures.specular(si, active)
+            if name == ROUGHNESS_ATTRIBUTE:
+                return mi.Color3f(self.textures.roughness(self.material, si, active))
+            if name == SHEET_ATTRIBUTE:
+                return mi.Color3f(si.sh_frame.n) * float("normal" in self.textures)
             turned = brushing_angle(si, active, anisotropic=True)
             frame = self.textures.frame(turned, si, active) if self.framed else Turned(*turned)
             axis = (0.0, 0.0, 1.0) if name == NORMAL_ATTRIBUTE else (1.0, 0.0, 0.0)

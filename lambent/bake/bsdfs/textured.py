@@ -66,6 +66,13 @@ class SurfaceTextures:
         """Factor (mi.Color3f) of k of every lobe."""
         return self._colour("specular", si, active)
 
+    def roughness(self, material: Material, si: Any, active: Any) -> Any:
+        """Factor (mi.Float) of mx and my of every lobe, within what materials may have."""
+        if "roughness" not in self or not material.lobes:
+            return mi.Float(1.0)
+        widths = [m for lobe in material.lobes for m in (lobe.mx, lobe.my)]
+        return dr.clip(self.at("roughness", si, active)[0], SMALLEST_M / min(widths), LARGEST_M / max(widths))
+
     def _colour(self, part: str, si: Any, active: Any) -> Any:
         return mi.Color3f(*self.at(part, si, active)) if part in self else mi.Color3f(1.0)
 

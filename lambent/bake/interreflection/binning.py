@@ -19,6 +19,7 @@ from lambent.bake.transport.bands import Bands
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.materials.factored.curve import END_RAD
 from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Editable, Term, upper_pair
 from lambent.store.tails import Tails
 
@@ -54,7 +55,10 @@ class Sorting:
     def by_term(self, term: Term, bands: Sequence[Bands]) -> Sorted:
         """By the bands of a term's curves, numbered first curve first."""
         texture = self._gathered(self._points.diffuse if term.is_diffuse else self._points.specular)
-        value, band = by_bands(term, bands, self._paths.wi, self._wo, self._ops)
+        rough = None
+        if varies(term) and (self._points.roughness != 1).any():
+            rough = dr.gather(mi.Float, mi.Float(self._points.roughness), self._paths.at)
+        value, band = by_bands(term, bands, self._paths.wi, self._wo, self._ops, rough)
         return self._sorted(value * texture, band)
 
     def whole(self, material: Editable) -> Sorted:
@@ -77,14 +81,20 @@ class Sorting:
         )  # fmt: skip
 
 
-def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any) -> tuple[Any, Any]:
-    """rho_q |cos| of directions in the local frame, and the band, of all curves together, that they are in."""
+def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rough: Any = None) -> tuple[Any, Any]:
+    """rho_q |cos| of directions in the local frame, and the band, of all curves together, that they are in.
+
+    `rough` is what a texture multiplies slopes by.
+    """
     (light, viewer), seen = upper_pair(tuple(wi), tuple(wo), term.side, ops)
     band = mi.UInt32(0)
     for one in bands:
         angle = angle_of(one.factor.over, light, viewer, one.factor.stretch, ops)
+        angle = angle if rough is None else narrowed(one.factor.over, angle, rough, ops)
         band = band * one.count + dr.minimum(mi.UInt32(angle * (one.count / END_RAD)), one.count - 1)
-    return dr.select(seen, quotient_of(term, light, viewer, ops) * light[2], 0.0), band
+    value = quotient_of(term, light, viewer, ops)
+    value = value if rough is None else value * thinned(term, light, viewer, rough, ops)
+    return dr.select(seen, value * light[2], 0.0), band
 
 
 def _second_surfaces(

@@ -18,9 +18,9 @@ from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE, material_dict,
 from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.sky.daylight import sky_image
 from lambent.core.arrays import Floats
-from lambent.core.images import read_image
 from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
+from lambent.scenes.environment_images import read_lat_long, up_turn
 from lambent.scenes.interiors import lat_long_image
 from lambent.scenes.scene import (
     ComputedEnvironment,
@@ -194,15 +194,17 @@ def environment_dict(environment: Environment) -> dict[str, Any]:
 
     Mitsuba's lat-long image looks along -z at its left edge, ours in the middle: it is turned by 180 degrees about y.
     """
+    scale, rotation_deg, tilt = 1.0, 0.0, np.eye(4)
     if isinstance(environment, ConstantEnvironment):
         # an image, since Mitsuba's own constant evaluates to one value for any number of directions
-        image, scale, rotation_deg = np.full((8, 16, 3), environment.radiance, np.float32), 1.0, 0.0
+        image = np.full((8, 16, 3), environment.radiance, np.float32)
     elif isinstance(environment, SunSky):
-        image, scale, rotation_deg = sky_image(environment), 1.0, 0.0
+        image = sky_image(environment)
     elif isinstance(environment, ComputedEnvironment):
-        image, scale, rotation_deg = lat_long_image(environment.name), 1.0, 0.0
+        image = lat_long_image(environment.name)
     else:
-        image = read_image(environment.file)[..., :3].astype(np.float32)
+        image = read_lat_long(environment.file, environment.layout)
         scale, rotation_deg = environment.scale, environment.rotation_deg
-    turned = mi.ScalarTransform4f().rotate([0, 1, 0], 180 + rotation_deg)
+        tilt[:3, :3] = up_turn(environment.up)
+    turned = mi.ScalarTransform4f(tilt) @ mi.ScalarTransform4f().rotate([0, 1, 0], 180 + rotation_deg)
     return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(image)), "scale": scale, "to_world": turned}

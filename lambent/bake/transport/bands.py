@@ -3,8 +3,8 @@
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
 Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights,
-touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, it has pairs
-of bands (4.15).
+touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, bands are
+pairs of bands (4.15).
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.visibility import BITS
 from lambent.core.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
@@ -46,8 +47,8 @@ OWN_PAIRS = 1 << 11  # of bands that threads hold at a time: 400 kB for 16 threa
 class Pairs(NamedTuple):
     """Transport by pairs of bands: of each point the number of its entries, and all entries, point after point.
 
-    counts (P,). steps (N,) uint8 from one entry's pair to the next; pairs are numbered j K + k, each point's from -1 on.
-    light (N,) RGB9E5 (`core.shared_exponent`); black entries stand where a step would be too long.
+    counts (P,); steps (N,) uint8 from one entry's pair to the next: pairs are numbered j K + k, and each point begins
+    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries stand where a step would be too long.
     """
 
     counts: NDArray[np.int64]
@@ -177,6 +178,9 @@ class _Lit:
         self._arrays = [vectors(mi.Vector3f, of) for of in (points.p, points.t, points.b, points.n, points.wo)]
         self._lights, self._number = lights_on_device(lights), dr.opaque(mi.UInt32, len(lights))
         self._seen = mi.UInt32(seen.ravel())
+        rough = varies(term) and (points.roughness != 1).any()
+        self._roughness = mi.Float(points.roughness) if rough else None
+        self._sheet = vectors(mi.Vector3f, points.sheet) if points.sheet.any() else None
 
     def __len__(self) -> int:
         return self._many
@@ -191,6 +195,9 @@ class _Lit:
         wo, ops, term, bands = tuple(seen_from), array_ops(), self._term, self._bands
         mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
 
+        rough = None if self._roughness is None else dr.gather(mi.Float, self._roughness, pixel, active)
+        sheet = None if self._sheet is None else dr.gather(mi.Vector3f, self._sheet, pixel, active)
+
         # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
         def local(w: Any) -> Any:
             return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
@@ -199,16 +206,23 @@ class _Lit:
             """The angles of a direction, in bands."""
             wi = local(w)
             angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
+            if rough is not None:
+                angles = [narrowed(b.factor.over, angle, rough, dr) for angle, b in zip(angles, bands, strict=True)]
             return [in_bands(angle, b.count) for angle, b in zip(angles, bands, strict=True)]
 
         def height(w: Any) -> Any:
-            return dr.dot(w, axes[2]) * mirrored
+            above = dr.dot(w, axes[2]) * mirrored
+            if sheet is None:
+                return above
+            return dr.select(dr.squared_norm(sheet) > 0, dr.minimum(above, dr.dot(w, sheet) * mirrored), above)
 
         def weight(w: Any) -> Any:
             """rho_q cos of a direction on the side that the term scatters from."""
             wi = local(w)
             quotient = term.quotient.evaluate(wi, wo, ops)
             value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+            if rough is not None:
+                value *= thinned(term, wi, wo, rough, ops)
             return value * wi[2]
 
         row = dr.alloc_local(mi.Float, 3 * count * int(np.prod(self.counts[1:])), value=mi.Float(0))
@@ -292,9 +306,9 @@ def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def
     begin, end = part
     low, high = orders[0][0], orders[0][2]
     j = dr.maximum(dr.minimum(mi.UInt32(low), counts[0] - 1), begin)
-    below = share_below(mi.Float(j), *orders[0], dr)
+    below = share_below(mi.Float(j), orders[0], dr)
     while (mi.Float(j) <= high) & (j < end):
-        up_to = share_below(mi.Float(j + 1), *orders[0], dr)
+        up_to = share_below(mi.Float(j + 1), orders[0], dr)
         share = power * (up_to - below)
         below = up_to
         if dr.hint(len(counts) == 1, mode="scalar"):
@@ -304,7 +318,7 @@ def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def
             k = dr.minimum(mi.UInt32(low_2), counts[1] - 1)
             under = mi.Float(0)
             while (mi.Float(k) <= high_2) & (k < counts[1]):
-                over = share_below(mi.Float(k + 1), *orders[1], dr)
+                over = share_below(mi.Float(k + 1), orders[1], dr)
                 _add(row, 3 * ((j - begin) * counts[1] + k), share * (over - under))
                 under = over
                 k += 1
@@ -364,9 +378,7 @@ def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type
     before = dr.gather(mi.UInt32, last, pixel, active)
     while active & (code < size):
         rgb = [dr.clip(row[3 * code + c] * scale[c], 0, LARGEST) for c in range(3)]
-        bits = packed(
-            *rgb, lambda x: dr.reinterpret_array(mi.UInt32, x), lambda x: dr.reinterpret_array(mi.Float, x), dr
-        )
+        bits = packed(tuple(rgb), _bits, _floats, mi.UInt32, dr)
         step = first + code - before
         kept = ((bits & ONES) > 0) | (step == LONGEST)
         at = pixel * size + found
@@ -377,6 +389,14 @@ def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type
         code += 1
     dr.scatter(counts, found, pixel, active)
     dr.scatter(last, before, pixel, active)
+
+
+def _bits(value: Any) -> Any:
+    return dr.reinterpret_array(mi.UInt32, value)
+
+
+def _floats(bits: Any) -> Any:
+    return dr.reinterpret_array(mi.Float, bits)
 
 
 @dr.syntax

@@ -6,6 +6,7 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats
@@ -68,6 +69,18 @@ def environment_samples(environment: Any) -> Samples:
     many = int(np.count_nonzero(~bright))
     fine_radiance = radiance_from(environment, w[many:]) if len(w) > many else np.zeros((0, 3))
     return w, weights, np.concatenate([light[~bright] / weights[:many, None], fine_radiance])
+
+
+def environment_rows(environment: Any, rows: int) -> NDArray[np.float32]:
+    """(rows, 2 rows, 3) lat-long picture of an environment (mi.Emitter): means over the pixels, in radiance."""
+    n = int(np.clip(np.ceil(_rows_of(environment) / rows), 2, MOST_FINE))
+    weight = -np.diff(np.cos(np.linspace(0, np.pi, rows * n + 1))).reshape(rows, n)
+    picture = np.empty((rows, 2 * rows, 3), np.float32)
+    for row in range(rows):
+        w = _directions(rows * n, 2 * rows * n, slice(row * n, (row + 1) * n)).reshape(-1, 3)
+        found = radiance_from(environment, w).reshape(n, 2 * rows, n, 3).mean(axis=2)
+        picture[row] = np.einsum("ncx,n->cx", found, weight[row] / weight[row].sum())
+    return picture
 
 
 def _rows_of(environment: Any) -> int:

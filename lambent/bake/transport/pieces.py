@@ -1,4 +1,4 @@
-"""Pieces of triangles, small enough that angles are nearly linear in each, and the order of the angles at its corners."""
+"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners in order."""
 
 from __future__ import annotations
 

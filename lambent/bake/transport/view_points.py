@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from lambent.bake.bsdfs.material_plugin import (
     DIFFUSE_ATTRIBUTE,
     NORMAL_ATTRIBUTE,
+    ROUGHNESS_ATTRIBUTE,
+    SHEET_ATTRIBUTE,
     SPECULAR_ATTRIBUTE,
     TANGENT_ATTRIBUTE,
 )  # fmt: skip
@@ -39,6 +41,11 @@ class ViewPoints:
         Direction to the viewer in that frame.
     diffuse, specular : (P, 3)
         What textures multiply diffuse and specular terms by.
+    roughness : (P,)
+        What they multiply the slopes of highlights by.
+    sheet : (P, 3)
+        Normal of the mesh, world space, on the viewer's side, where a normal map bends the frame: light is on one side
+        of both. Elsewhere 0.
     """
 
     pixel: NDArray[np.int64]
@@ -51,6 +58,8 @@ class ViewPoints:
     wo: Floats32
     diffuse: Floats32
     specular: Floats32
+    roughness: Floats32
+    sheet: Floats32
 
     def __len__(self) -> int:
         return len(self.pixel)
@@ -77,8 +86,11 @@ def view_points(builder: SceneBuilder, scene: Any, camera: Camera, width: int, h
     b = dr.cross(n, t)
     wo = mi.Vector3f(dr.dot(to_viewer, t), dr.dot(to_viewer, b), dr.dot(to_viewer, n))
     number = dr.gather(mi.UInt32, builder.object_numbers(), dr.reinterpret_array(mi.UInt32, si.shape), hit)
-    textures = (bsdf.eval_attribute_3(name, si, hit) for name in (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE))
-    arrays = [array_of(v) for v in (si.p, si.n, t, b, n, wo, *textures)]
+    names = (DIFFUSE_ATTRIBUTE, SPECULAR_ATTRIBUTE, ROUGHNESS_ATTRIBUTE, SHEET_ATTRIBUTE)
+    *textures, rough, sheet = (bsdf.eval_attribute_3(name, si, hit) for name in names)
+    sheet = dr.select(below, -sheet, sheet)
+    arrays = [array_of(v) for v in (si.p, si.n, t, b, n, wo, *textures, rough, sheet)]
+    arrays[-2] = arrays[-2][:, 0]
     shown = np.flatnonzero(np.array(hit))
     objects = np.array(number)[shown].astype(np.int64)
     return ViewPoints(shown, objects, *(a[shown] for a in arrays))

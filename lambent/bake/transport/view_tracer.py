@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.bake.transport.lights import Samples, environment_samples, scene_lights
+from lambent.bake.transport.lights import Samples, environment_rows, environment_samples, scene_lights
 from lambent.bake.transport.view_points import ViewPoints, view_points
 from lambent.bake.view import View
 from lambent.core.camera import pixel_rays
@@ -40,6 +40,31 @@ class ViewTracer:
         """What the pixels of a view show."""
         return view_points(self._builder, self.scene, view.camera, view.width, view.height)
 
+    def surfaces(self, view: View) -> tuple[Any, Any]:
+        """Interactions (mi.SurfaceInteraction3f) at the points, in their order, and the rays (mi.Ray3f) to them."""
+        ray = self._rays(view)
+        si = intersect(self.scene, ray, mi.Bool(True), has_holes(self.scene))
+        shown = dr.compress(si.is_valid())
+        return dr.gather(mi.SurfaceInteraction3f, si, shown), dr.gather(mi.Ray3f, ray, shown)
+
+    def _rays(self, view: View) -> Any:
+        directions = pixel_rays(view.camera, view.width, view.height).reshape(-1, 3)
+        return rays_from(np.asarray(view.camera.position, float), directions)
+
+    @cached_property
+    def lamps(self) -> Any:
+        """The scene (mi.Scene) without its environment; None where nothing else shines."""
+        scene = self._builder.scene
+        if not scene.lights and not any(any(o.emission) for o in scene.objects):
+            return None
+        return SceneBuilder(replace(scene, environment=None)).build()
+
+    def environment_rows(self, rows: int) -> NDArray[np.float32]:
+        """(rows, 2 rows, 3) lat-long picture of the environment, black where there is none."""
+        environment = self._builder.environment
+        black = np.zeros((rows, 2 * rows, 3), np.float32)
+        return black if environment is None else environment_rows(environment, rows)
+
     def _lights(self, count: int) -> TriangleLights:
         """About `count` lights."""
         return scene_lights(self._builder.scene, self._samples, count)
@@ -52,8 +77,7 @@ class ViewTracer:
 
     def backdrop(self, view: View) -> NDArray[np.float32]:
         """(height, width, 3) radiance that the pixels show without reflection."""
-        directions = pixel_rays(view.camera, view.width, view.height).reshape(-1, 3)
-        ray = rays_from(np.asarray(view.camera.position, float), directions)
+        ray = self._rays(view)
         si = intersect(self.scene, ray, mi.Bool(True), has_holes(self.scene))
         si.wi = dr.select(si.is_valid(), si.wi, -ray.d)
         seen = array_of(si.emitter(self.scene).eval(si))

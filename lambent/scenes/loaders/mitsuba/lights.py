@@ -58,7 +58,7 @@ def _picture(plugin: Plugin, matrix: Floats) -> Environment | None:
         plugin.note("its gamma is not read")
     turned_deg = math.degrees(math.atan2(axes[0, 2], axes[2, 2]))
     rotation_deg = turned_deg % 360 - 180
-    return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4))
+    return ImageEnvironment(path, plugin.number("scale", 1.0), round(rotation_deg, 4), "lat-long")
 
 
 def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:

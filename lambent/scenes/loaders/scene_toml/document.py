@@ -194,7 +194,7 @@ def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Envi
     file = files.path(section.file, path, "environment.file")
     if not file.is_file():
         raise UserError("file not found", file=path, field="environment.file", got=section.file)
-    return ImageEnvironment(file, section.scale, section.rotation_deg)
+    return ImageEnvironment(file, section.scale, section.rotation_deg, section.layout, section.up)
 
 
 def _check_names(names: list[str], path: Path, field: str) -> None:

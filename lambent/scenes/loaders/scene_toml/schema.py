@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple, triple
+from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
 
@@ -65,12 +66,14 @@ class SunSkySection(Section):
 
 
 class ImageSection(Section):
-    """A lat-long HDR picture."""
+    """An HDR picture of everything around; its layout is recognised where it is not said."""
 
     kind: Literal["image"]
     file: str
     scale: NotNegative = 1.0
     rotation_deg: Finite = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
 
 
 class ConstantSection(Section):

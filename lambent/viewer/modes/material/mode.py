@@ -160,7 +160,7 @@ def draw_preview(preview: Preview, editor: Editor, look: Look) -> None:
     preview.shape = choice("shape", preview.shape, tuple(SHAPES))
     preview.environment = choice("light", preview.environment, preview.environments)
     explain("every environment is scaled to the same mean radiance")
-    text = typed_field("environment", editor.files.typed, "add", "another .hdr or .exr, lat-long...")
+    text = typed_field("environment", editor.files.typed, "add", "another .hdr or .exr, lat-long, angular or cube...")
     if text is not None:
         editor.files.open(text)
     looks.draw_exposure(look, "##preview")

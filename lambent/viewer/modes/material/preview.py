@@ -14,7 +14,7 @@ from lambent.core.colour import luminance
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
+from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.environments import daylight, dusk, from_lat_long, night, studio
 from lambent.scenes.geometry import patch, placed, sphere, teapot, turn
 from lambent.scenes.scene import Mesh
@@ -73,12 +73,13 @@ class Preview:
         if name in BUILT_IN:
             cube = BUILT_IN[name]()
         else:
-            picture = read_image(self.files[name])
+            picture = read_lat_long(self.files[name])
             height, width = picture.shape[:2]
             if width != 2 * height:
                 got = f"{width}x{height}"
-                raise UserError("not a lat-long picture", file=self.files[name], got=got, expected="2:1")
-            cube = from_lat_long(picture[..., :3])
+                what = "not a lat-long picture, an angular map, a cross or a strip"
+                raise UserError(what, file=self.files[name], got=got, expected="2:1")
+            cube = from_lat_long(picture)
         cube = np.maximum(np.nan_to_num(cube, posinf=0.0, neginf=0.0), 0)
         mean = _mean_radiance(cube)
         if mean <= 0:

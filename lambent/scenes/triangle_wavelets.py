@@ -12,16 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numba
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Image, Indices
 from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_directions
 from lambent.scenes.triangle_lights import icosahedron, solid_angles
 
 FACES, CHILDREN = 20, 4
 DEEPEST = 6  # 81,920 triangles of 1.5 degrees
+LAMP = 8.0  # times the mean radiance: brighter parts of an environment are lamps
 PARTS = 2  # levels below the triangles at which a turned environment is looked up: 16 points each
+ROWS_OF_PARTS = 8  # of a picture, times 2^depth: a part is then two to three texels high
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,13 @@ class TriangleTree:
 
     def containing(self, w: Floats) -> Indices:
         """(...) number of the finest triangle that has each unit direction (..., 3)."""
-        flat = np.ascontiguousarray(w, float).reshape(-1, 3)
-        return np.asarray(_find(flat, icosahedron(), self.depth)).reshape(w.shape[:-1])
+        flat = np.asarray(w, float).reshape(-1, 3)
+        number = np.argmax(flat @ icosahedron().sum(axis=1).T, axis=1)  # the nearest middle: faces are congruent
+        for planes in self._cuts:
+            beyond = np.matmul(planes[number], flat[:, :, None])[..., 0] > 0
+            child = np.select([beyond[:, 0], beyond[:, 1], beyond[:, 2]], [0, 1, 2], 3)
+            number = CHILDREN * number + child
+        return np.asarray(number.reshape(w.shape[:-1]))
 
     def means(self, w: Floats, weight_sr: Floats, radiance: Floats) -> Floats:
         """Mean radiance (N, 3) in each triangle of samples: directions (S, 3), solid angles (S,), radiance (S, 3).
@@ -106,6 +113,17 @@ class TriangleTree:
             details.append(both[:, 1:].reshape(-1, *values.shape[1:]))
             values = both[:, 0]
         return np.concatenate([values, *details[::-1]])
+
+    @cached_property
+    def _cuts(self) -> list[Floats]:
+        """By level, normals (n, 3, 3) of the planes through the middles of two edges: corners a, b, c lie beyond."""
+        cuts, triangles = [], icosahedron()
+        for _ in range(self.depth):
+            a, b, c = np.moveaxis(triangles, 1, 0)
+            ab, bc, ca = normalize(a + b), normalize(b + c), normalize(c + a)
+            cuts.append(np.stack([np.cross(ab, ca), np.cross(bc, ab), np.cross(ca, bc)], axis=1))
+            triangles = children_of(triangles)
+        return cuts
 
     @cached_property
     def _steps(self) -> list[Floats]:
@@ -138,15 +156,42 @@ class TurningLight:
         """Of samples as in `TriangleTree.means`."""
         return cls(tree, TriangleTree(tree.depth + PARTS).means(w, weight_sr, radiance))
 
+    @classmethod
+    def of_picture(cls, tree: TriangleTree, picture: Image) -> TurningLight:
+        """Of a lat-long picture (H, W, 3), texels repeated until every part has some."""
+        finer = -(-ROWS_OF_PARTS * 2 ** (tree.depth + PARTS) // len(picture))
+        picture = picture.repeat(finer, axis=0).repeat(finer, axis=1)
+        height, width = picture.shape[:2]
+        weight = np.repeat(-np.diff(np.cos(np.linspace(0, np.pi, height + 1))) * (2 * np.pi / width), width)
+        return cls.of_samples(tree, lat_long_directions(height, width).reshape(-1, 3), weight, picture.reshape(-1, 3))
+
+    def seen(self, w: Floats) -> Floats:
+        """(n, 3) radiance of the unturned environment in unit directions (n, 3), as fine as its parts."""
+        return np.asarray(self.fine[self._parts.containing(w)])
+
     def radiance(self, rotation: Floats | None = None) -> Floats:
         """(N, 3) mean radiance by triangle once the environment is turned by `rotation` (3, 3)."""
-        parts = self._parts
-        values = self.fine
+        parts, each = self._parts, CHILDREN**PARTS
+        light = self.fine * parts.areas_sr[:, None]
         if rotation is not None:
-            values = values[parts.containing(self._centres @ np.asarray(rotation, float))]
-        each = CHILDREN**PARTS
-        light = (values * parts.areas_sr[:, None]).reshape(-1, each, 3).sum(axis=1)
-        return np.asarray(light / parts.areas_sr.reshape(-1, each).sum(axis=1, keepdims=True))
+            turn, lamps = np.asarray(rotation, float), self._lamps
+            light = np.minimum(self.fine, self._even)[parts.containing(self._centres @ turn)] * parts.areas_sr[:, None]
+            gone = (self.fine[lamps] - np.minimum(self.fine[lamps], self._even)) * parts.areas_sr[lamps, None]
+            np.add.at(light, parts.containing(self._centres[lamps] @ turn.T), gone)
+        whole = light.reshape(-1, each, 3).sum(axis=1)
+        return np.asarray(whole / parts.areas_sr.reshape(-1, each).sum(axis=1, keepdims=True))
+
+    @cached_property
+    def _even(self) -> Floats:
+        """(3,) radiance up to which light is looked up where it comes from; what lamps have above is carried there.
+
+        A look-up may miss a lamp as small as a part, or find it twice.
+        """
+        return np.asarray(LAMP * (self.fine * self._parts.areas_sr[:, None]).sum(axis=0) / (4 * np.pi))
+
+    @cached_property
+    def _lamps(self) -> Indices:
+        return np.flatnonzero((self.fine > self._even).any(axis=1))
 
     @cached_property
     def _parts(self) -> TriangleTree:
@@ -179,50 +224,3 @@ def _reflections(constant: Floats) -> Floats:
 
 def _scaled(values: Floats, factors: Floats) -> Floats:
     return np.asarray(values * factors.astype(values.dtype).reshape(-1, *[1] * (values.ndim - 1)))
-
-
-@numba.njit(parallel=True, cache=True)
-def _find(w, faces, depth):  # type: ignore[no-untyped-def]
-    """Number of the finest triangle by descent; cuts are the planes through the middles of two edges."""
-    found = np.empty(len(w), np.int64)
-    for s in numba.prange(len(w)):
-        x = (w[s, 0], w[s, 1], w[s, 2])
-        best, number = -np.inf, 0
-        for f in range(len(faces)):
-            near = 0.0
-            for k in range(3):
-                near += (faces[f, 0, k] + faces[f, 1, k] + faces[f, 2, k]) * x[k]
-            if near > best:
-                best, number = near, f
-        face = faces[number]
-        a, b, c = (
-            (face[0, 0], face[0, 1], face[0, 2]),
-            (face[1, 0], face[1, 1], face[1, 2]),
-            (face[2, 0], face[2, 1], face[2, 2]),
-        )
-        for _ in range(depth):
-            ab, bc, ca = _middle(a, b), _middle(b, c), _middle(c, a)
-            if _side(ab, ca, x) > 0:
-                child, b, c = 0, ab, ca
-            elif _side(bc, ab, x) > 0:
-                child, a, c = 1, ab, bc
-            elif _side(ca, bc, x) > 0:
-                child, a, b = 2, ca, bc
-            else:
-                child, a, b, c = 3, ab, bc, ca
-            number = 4 * number + child
-        found[s] = number
-    return found
-
-
-@numba.njit(cache=True)
-def _middle(a, b):  # type: ignore[no-untyped-def]
-    x, y, z = a[0] + b[0], a[1] + b[1], a[2] + b[2]
-    scale = 1 / np.sqrt(x * x + y * y + z * z)
-    return x * scale, y * scale, z * scale
-
-
-@numba.njit(cache=True)
-def _side(p, q, x):  # type: ignore[no-untyped-def]
-    """Positive on the side of (p x q)."""
-    return (p[1] * q[2] - p[2] * q[1]) * x[0] + (p[2] * q[0] - p[0] * q[2]) * x[1] + (p[0] * q[1] - p[1] * q[0]) * x[2]

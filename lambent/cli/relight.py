@@ -1,0 +1,70 @@
+"""`lambent relight`: a still of a view that was baked for relighting, under a turned or another environment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lambent.cli.console import Force, Json, show
+from lambent.core.errors import UserError
+from lambent.core.surroundings import Axis, Layout
+
+if TYPE_CHECKING:
+    from lambent.store.contract import ViewRecord
+    from lambent.store.store import Store
+
+
+def command(
+    store: Annotated[Path, typer.Argument(help="Folder of a store with relighting of a view.")],
+    output: Annotated[Path, typer.Option("-o", help="Image: .exr, .hdr or .png.")],
+    camera: Annotated[str | None, typer.Option(help="Camera by name. [default: the first]")] = None,
+    environment: Annotated[
+        Path | None, typer.Option(help="Picture that lights the scene. [default: the scene's own environment]")
+    ] = None,
+    layout: Annotated[Layout | None, typer.Option(help="Of the picture. [default: recognised]")] = None,
+    up: Annotated[Axis, typer.Option(help="Axis of the world that the picture's up points along.")] = "+y",
+    scale: Annotated[float, typer.Option(min=0.0, help="Times the picture's radiance.")] = 1.0,
+    turn: Annotated[float, typer.Option(help="Degrees about +y that the environment is turned by.")] = 0.0,
+    exposure: Annotated[float, typer.Option(help="In EV, of PNG.")] = 0.0,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Draw a view under a turned or another environment, materials as they are: direct light, with shadows.
+
+    Example: lambent relight room.store --environment grace.hdr --turn 90 -o grace.png
+    """
+    from lambent.core.colour import shown
+    from lambent.core.images import WRITABLE, to_bytes, write_image, write_shown
+    from lambent.core.outputs import check_output
+    from lambent.editing.relit_view import RelitView
+    from lambent.scenes.scene import ImageEnvironment
+    from lambent.store.store import Store
+
+    check_output(output, WRITABLE, force=force)
+    opened = Store.open(store)
+    record = _chosen(opened, camera)
+    view = RelitView(opened, record.camera, record.width, record.height)
+    if environment is not None:
+        view.light(ImageEnvironment(environment, scale, 0.0, layout, up))
+    view.turn(turn)
+    view.draw()
+    image = view.image()
+    if output.suffix.lower() == ".png":
+        write_shown(output, to_bytes(shown(image, "filmic", exposure)))
+    else:
+        write_image(output, image)
+    facts = {"written": output, "camera": record.camera.name, "size": [record.width, record.height]}
+    text = f"{output}: {record.width}x{record.height}, camera {record.camera.name}, left out {100 * view.error:.2g} %"
+    show({**facts, "left_out": view.error}, text, json)
+
+
+def _chosen(store: Store, camera: str | None) -> ViewRecord:
+    from lambent.core.discovery import known
+    from lambent.editing.relit_view import views_for_relighting
+
+    views = views_for_relighting(store)
+    if not views:
+        raise UserError("no view was baked for relighting", file=store.folder, hint="see docs/editing.md, Relighting")
+    return views[known("camera", camera, views, field="--camera") if camera is not None else next(iter(views))]

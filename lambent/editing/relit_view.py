@@ -1,0 +1,128 @@
+"""A baked view under an environment that turns or is replaced, materials as they are (store.contract, relighting)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.arrays import Image
+from lambent.core.camera import Camera, pixel_rays
+from lambent.core.errors import UserError
+from lambent.editing.incremental import TERMS
+from lambent.editing.relighting import RelitPicture
+from lambent.editing.sparse_rows import SparseRows
+from lambent.scenes.environment_images import environment_picture, orientation, seen_at
+from lambent.scenes.scene import Environment, ImageEnvironment
+from lambent.scenes.triangle_wavelets import CHILDREN, FACES, TriangleTree, TurningLight
+from lambent.store.contract import ViewRecord, baked_views, view_artefact_name
+from lambent.store.store import Store
+
+TERMS_OF_LIGHT = 10 * TERMS  # a frame: rows are short, and a turn changes most of them
+
+
+class RelitView:
+    """The picture of a view of a store under a changing environment; it begins with that of the bake.
+
+    Parameters
+    ----------
+    camera, width, height
+        Of a view that `bake(..., only={"relighting"}, views=[...])` was called for.
+
+    Attributes
+    ----------
+    error : float
+        What the store has left out and rounded, as a share of the transport's norm (root mean square).
+
+    Raises
+    ------
+    UserError
+        The store has no relighting of the view.
+    """
+
+    def __init__(self, store: Store, camera: Camera, width: int, height: int) -> None:
+        def name(part: str, kind: str = "relighting") -> str:
+            return view_artefact_name(camera, width, height, kind, part)
+
+        if not all(name(part) in store for part in ("spans", "points", "values", "errors", "lamps", "light")):
+            what = f"no relighting of camera {camera.name}, {width} x {height}"
+            raise UserError(what, file=store.folder, field="view", hint="bake the view for relighting first")
+        self._pixel = store.read(name("pixel", "view_points")).astype(np.int64)
+        self._backdrop = store.read(name("backdrop", "view_points")).astype(np.float32).reshape(-1, 3)
+        self._lamps, fine = store.read(name("lamps")), store.read(name("light")).astype(float)
+        spans = store.read(name("spans")).astype(np.int64)
+        left_out, whole = store.read(name("errors")).astype(float).sum(axis=0)
+        self.error = float(np.sqrt(left_out / max(whole, 1e-300)))
+        self._tree = TriangleTree(_depth(spans.shape[1] - 1))
+        rows = SparseRows(
+            spans, store.read(name("points"))[:, 0], store.read(name("values")),
+            int(store.artefact(name("spans")).meta["block"]), len(self._pixel),
+        )  # fmt: skip
+        self._rays, self._shape = pixel_rays(camera, width, height).reshape(-1, 3), (height, width, 3)
+        self._picture = RelitPicture(self._tree, rows)
+        self._baked = TurningLight(self._tree, fine)
+        self.light(None)
+        self.draw()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the picture shows all of the light."""
+        return self._picture.is_exact
+
+    def turn(self, rotation_deg: float) -> None:
+        """Let the picture go to the environment turned about +y, from where it was baked or given."""
+        angle = np.radians(rotation_deg % 360)
+        c, s = np.cos(angle), np.sin(angle)
+        self._turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ self._laid
+        self._picture.light(self._light.radiance(None if self._is_upright else self._turn))
+
+    def light(self, environment: Environment | None) -> None:
+        """Let the picture go to another environment, or back to that of the bake (None).
+
+        Raises
+        ------
+        UserError
+            It is daylight, which a bake alone computes, or its file cannot be read.
+        """
+        self._around = None if environment is None else environment_picture(environment)
+        self._light = self._baked if self._around is None else TurningLight.of_picture(self._tree, self._around)
+        self._laid = orientation(environment) if isinstance(environment, ImageEnvironment) else np.eye(3)
+        self.turn(0.0)
+
+    def step(self, terms: int = TERMS_OF_LIGHT) -> None:
+        """One frame: of each level of wavelets the largest changes, or the level anew, whichever errs less."""
+        self._picture.step(terms)
+
+    def draw(self) -> None:
+        """The exact picture at once."""
+        self._picture.draw()
+
+    def image(self) -> Image:
+        """(H, W, 3) float32, linear radiance."""
+        image = self._backdrop.copy()
+        around = np.ones(len(image), bool)
+        around[self._pixel] = False
+        w = self._rays[around] @ self._turn
+        if self._around is not None:
+            image[around] = seen_at(self._around, w)
+        elif not self._is_upright:
+            image[around] = self._light.seen(w)
+        image[self._pixel] += self._picture.picture.T + self._lamps
+        return image.reshape(self._shape)
+
+    @property
+    def _is_upright(self) -> bool:
+        return np.array_equal(self._turn, np.eye(3))
+
+
+def _depth(triangles: int) -> int:
+    depth = round(float(np.log(triangles / FACES) / np.log(CHILDREN)))
+    assert FACES * CHILDREN**depth == triangles, f"not a tree of triangles: {triangles}"
+    return depth
+
+
+def views_for_relighting(store: Store) -> dict[str, ViewRecord]:
+    """The views that a store can relight, by the camera's name; of several sizes the one with the most pixels."""
+    found = [
+        view for view in baked_views(store).values()
+        if view_artefact_name(view.camera, view.width, view.height, "relighting", "spans") in store
+    ]  # fmt: skip
+    return {view.camera.name: view for view in sorted(found, key=lambda view: view.width * view.height)}

@@ -1,0 +1,77 @@
+"""Pictures that light scenes: read in any layout, and the way they lie in the world."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lambent.core.arrays import Floats, Image
+from lambent.core.environment_layouts import as_lat_long, layout_of
+from lambent.core.errors import UserError
+from lambent.core.images import read_image
+from lambent.core.latlong import lat_long_uv
+from lambent.core.surroundings import Axis, Layout
+from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
+
+_UPRIGHT = np.eye(3)
+# The least turns that take +y to an axis: columns are where +x, +y, +z go. Upside down, front stays front.
+_TURNS: dict[Axis, Floats] = {
+    "+y": _UPRIGHT,
+    "-y": np.diag([-1.0, -1.0, 1.0]),
+    "+z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "-z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "+x": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    "-x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+
+
+def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
+    """(H, W, 3) float32 lat-long picture of a file in any layout; it is recognised where `layout` is None.
+
+    Raises
+    ------
+    UserError
+        The file is no picture, or not of that layout, or its layout is not clear.
+    """
+    picture = np.asarray(read_image(file)[..., :3], np.float32)
+    return as_lat_long(picture, layout or layout_of(picture, file), file)
+
+
+def up_turn(up: Axis) -> Floats:
+    """(3, 3) rotation that takes +y, the up of a picture, to an axis of the world."""
+    return _TURNS[up]
+
+
+def orientation(environment: ImageEnvironment) -> Floats:
+    """(3, 3) rotation from directions in an environment's picture to those in the world."""
+    angle = np.radians(environment.rotation_deg)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(up_turn(environment.up) @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+
+
+def environment_picture(environment: Environment) -> Image:
+    """(H, W, 3) lat-long picture of an environment, unturned, scaled to its radiance.
+
+    Raises
+    ------
+    UserError
+        It is daylight, which a bake alone computes, or its file cannot be read.
+    """
+    if isinstance(environment, ImageEnvironment):
+        return read_lat_long(environment.file, environment.layout) * np.float32(environment.scale)
+    if isinstance(environment, ComputedEnvironment):
+        return lat_long_image(environment.name)
+    if isinstance(environment, ConstantEnvironment):
+        return np.full((2, 4, 3), environment.radiance, np.float32)
+    hint = "bake the scene under it, or give a picture of it"
+    raise UserError("daylight is computed by bakes alone", field="environment", got="sunsky", hint=hint)
+
+
+def seen_at(picture: Image, w: Floats) -> Image:
+    """(..., 3) radiance of the texels of a lat-long picture (H, W, 3) in unit directions (..., 3)."""
+    height, width = picture.shape[:2]
+    column, row = lat_long_uv(w)
+    at = np.minimum((row * height).astype(int), height - 1), (column * width).astype(int) % width
+    return np.asarray(picture[at])
