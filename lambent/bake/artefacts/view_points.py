@@ -14,7 +14,7 @@ from lambent.store.contract import SceneRecord, write_scene_record
 KIND = "view_points"
 NEEDS = ()
 OF_VIEWS = True
-REVISION = 1
+REVISION = 2
 PARTS = ("pixel", "object", "theta_o")
 BACKDROP = "backdrop"
 
