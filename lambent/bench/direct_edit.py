@@ -74,7 +74,7 @@ class Effort:
     lights: tuple[int, ...] = (400, 4000)
     frames: int = 40
     edits: int = 2000
-    reference_spp: int = 2048
+    reference_spp: int = 4096
     rival_s: float = 120.0
     checked: int = 16
 

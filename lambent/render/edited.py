@@ -7,6 +7,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lambent.bake.artefacts.visibility import SETTINGS
 from lambent.core.arrays import Image
 from lambent.core.camera import Camera
@@ -33,7 +35,7 @@ class Edited(Images):
         self._picture = picture
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Image:
-        return self._picture.image()
+        return np.maximum(self._picture.image(), 0)  # in the dark, half floats of wavelets leave a little less
 
 
 def edited_still(store: Store | Path | str, session: Path, file: Path | str, settings: Settings = DEFAULT) -> Rendered:
