@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,9 @@ from lambent.editing.document import Surroundings
 from lambent.editing.session import Session
 from lambent.materials.models import model_named
 from lambent.scenes import load_scene
+from lambent.store.contract import baked_views
+from lambent.store.store import Store
+from lambent.store.views import change_views
 
 SIZE = (24, 16)
 SCENE = """
@@ -131,6 +135,19 @@ def test_views_that_cannot_be_baked(refused, scene, tmp_path):
     stranger.save(tmp_path / "wool.json")
     assert "unknown material" in error("--only", "transport", "--edit", tmp_path / "wool.json")
     assert not (tmp_path / "s").exists()
+
+
+def test_saved_views_can_be_baked(lambent, refused, scene, tmp_path):
+    store = tmp_path / "s"
+    above = load_scene(str(scene)).cameras[0]
+    bake = ("bake", scene, "-o", store, "--only", "transport", "--view")
+    assert lambent(*bake, "above:4x4").code == 0
+    saved_view = replace(above, name="from:9x9", position=(0.0, 3.0, 1.0))
+    change_views(store, lambda views: views.model_copy(update={"cameras": (saved_view,)}))
+    assert lambent(*bake, "from:9x9:6x4").code == 0
+    assert "expected from:9x9, above" in refused(*bake, "from")
+    baked = {(view.camera.name, view.width, view.height) for view in baked_views(Store.open(store)).values()}
+    assert baked == {("above", 4, 4), ("from:9x9", 6, 4)}
 
 
 def test_a_store_of_views_alone_is_no_walkthrough(lambent, refused, scene, tmp_path):
