@@ -15,6 +15,8 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,7 @@ from lambent.store.store import Store
 NAME = "direct-edit"
 MIB = 2**20
 BANDS = 256  # of the full frame
+SWITCHES = 3  # forth and back
 DRAG = Region(a=-0.1, b=0.0, c=0.1, d=0.4)
 
 
@@ -168,17 +171,17 @@ def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort)
     states, rng = _drag(session, case), np.random.default_rng(0)
     picture.show(case.material, next(states))
     picture.draw()
-    dense = [_ms(lambda: _drawn(picture, case, next(states))) for _ in range(effort.frames // 4 + 1)]
-    frames, late = [], []
-    for _ in range(effort.frames):
-        state = next(states)
-        frames.append(_ms(lambda state=state: _frame(picture, case, state)))  # type: ignore[misc]
-        late.append(0 if picture.is_exact else 1)
+    dense, frames, inexact = [], [], 0
+    for state in islice(states, effort.frames // 4 + 1):
+        dense.append(_ms(partial(_drawn, picture, case, state)))
+    for state in islice(states, effort.frames):
+        frames.append(_ms(partial(_frame, picture, case, state)))
+        inexact += not picture.is_exact
     more = 1
     while not picture.is_exact:
         picture.step()
         more += 1
-    switches = [_ms(lambda c=curve: picture.activate(case.material, c)) for curve in (*case.curves[::-1],) * 3]  # type: ignore[misc]
+    switches = [_ms(partial(picture.activate, case.material, curve)) for curve in case.curves[::-1] * SWITCHES]
     for _ in range(effort.edits):
         session.pull(case.material, case.curves[0], DRAG, y=float(rng.uniform(-0.3, 2.0)))
         picture.show(case.material, session.editable(case.material))
@@ -191,7 +194,7 @@ def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort)
     exact = picture.image()
     return {
         "dense_ms": _median(dense), "frame_ms": _median(frames), "frame_worst_ms": round(max(frames), 2),
-        "frames_to_exact": more, "inexact_share": round(float(np.mean(late)), 3), "switch_ms": _median(switches),
+        "frames_to_exact": more, "inexact_share": round(inexact / effort.frames, 3), "switch_ms": _median(switches),
         "switch_worst_ms": round(max(switches), 2),
         "drift": float(f"{np.abs(walked - exact).max() / exact.max():.2g}"),
     }  # fmt: skip
@@ -234,8 +237,8 @@ def _full_frame(effort: Effort) -> dict[str, Any]:
     for state in states[:2]:
         _drawn(picture, case, state)
         _frame(picture, case, state)
-    dense = [_ms(lambda s=s: _drawn(picture, case, s)) for s in states[:9]]  # type: ignore[misc]
-    frames = [_ms(lambda s=s: _frame(picture, case, s)) for s in states]  # type: ignore[misc]
+    dense = [_ms(partial(_drawn, picture, case, state)) for state in states[:9]]
+    frames = [_ms(partial(_frame, picture, case, state)) for state in states]
     return {
         "points": pixels, "terms": 1, "memory_mib": round(held_bytes(picture) / MIB, 1), "dense_ms": _median(dense),
         "frame_ms": _median(frames), "frame_worst_ms": round(max(frames), 2),
