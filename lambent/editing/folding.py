@@ -9,17 +9,25 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.wavelets import TAPS
-from lambent.editing.products import Halves, float_of_half, half_of_float
+from lambent.editing.products import Halves, half_of_float
 
 TOGETHER = 32  # points whose rows stay in the second-level cache
 
 
 def folded(
-    spans: NDArray[np.uint32], pairs: NDArray[np.uint8], values: Halves, idle: Floats, edited: int, bands: int
+    spans: NDArray[np.uint32],
+    steps: NDArray[np.uint8],
+    values: NDArray[np.uint32],
+    idle: Floats,
+    edited: int,
+    bands: int,
 ) -> tuple[Halves, float]:
     """Transport of the edited one of two curves, with the other's coefficients folded in.
 
@@ -27,10 +35,11 @@ def folded(
     ----------
     spans : (P, 2)
         First entry of each point, and the one past its last.
-    pairs : (N, 2)
-        Bands of the two curves.
-    values : (N, 3)
-        Transport by these.
+    steps : (N,)
+        From each entry's pair of bands to the next entry's. With K bands of the second curve, bands j and k are pair
+        j K + k; each point begins at -1.
+    values : (N,)
+        Transport by these, RGB9E5 (`core.shared_exponent`).
     idle : (K, 3)
         Means of the curve that stays over its bands.
     edited : {0, 1}
@@ -47,27 +56,51 @@ def folded(
     """
     scale = float(np.abs(idle).max()) or 1.0
     out = np.empty((bands, 3, len(spans)), np.uint16)
-    _fold(
-        out, spans, pairs, values.view(np.uint16), (idle / scale).astype(np.float32), edited, TAPS.astype(np.float32)
-    )  # fmt: skip
+    second = bands if edited else len(idle)
+    shift, mask = second.bit_length() - 1, second - 1
+    places = (0, mask, shift, -1) if edited else (shift, -1, 0, mask)
+    _fold(out, spans, steps, values, (idle / scale).astype(np.float32), places, TAPS.astype(np.float32))
     return out.view(np.float16), scale
 
 
+@intrinsic
+def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
+    def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
+        return builder.bitcast(args[0], ir.FloatType())
+
+    return types.float32(types.uint32), generate
+
+
 @numba.njit(parallel=True, fastmath=True, cache=True)
-def _fold(out, spans, pairs, values, idle, edited, taps):  # type: ignore[no-untyped-def]
+def _fold(out, spans, steps, values, idle, places, taps):  # type: ignore[no-untyped-def]
+    """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
     bands, _, points = out.shape
+    shift, mask, idle_shift, idle_mask = places
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
         first = block * TOGETHER
         count = min(TOGETHER, points - first)
         rows = np.zeros((TOGETHER, bands, 4), np.float32)
         before = np.empty((bands, 4), np.float32)
         for i in range(count):
-            row = rows[i]
+            row, pair, last = rows[i], -1, 0
+            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
             for n in range(spans[first + i, 0], spans[first + i, 1]):
-                j, k = pairs[n, edited], pairs[n, 1 - edited]
-                row[j, 0] += idle[k, 0] * float_of_half(values[n, 0])  # type: ignore[call-arg]
-                row[j, 1] += idle[k, 1] * float_of_half(values[n, 1])
-                row[j, 2] += idle[k, 2] * float_of_half(values[n, 2])
+                pair += steps[n]
+                j, k = pair >> shift & mask, pair >> idle_shift & idle_mask
+                if j != last:  # sums stay in registers: most entries have the band of the one before
+                    row[last, 0] += red
+                    row[last, 1] += green
+                    row[last, 2] += blue
+                    red, green, blue = np.float32(0), np.float32(0), np.float32(0)
+                    last = j
+                bits = values[n]
+                unit = _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg,var-annotated]
+                red += idle[k, 0] * unit * np.float32(bits & 511)
+                green += idle[k, 1] * unit * np.float32(bits >> 9 & 511)
+                blue += idle[k, 2] * unit * np.float32(bits >> 18 & 511)
+            row[last, 0] += red
+            row[last, 1] += green
+            row[last, 2] += blue
             _to_wavelets(row, before, taps)
         for j in range(bands):
             for c in range(3):

@@ -50,6 +50,15 @@ class History(Generic[State]):
             self._future.clear()
 
     @property
+    def in_stroke(self) -> bool:
+        return bool(self._stroke)
+
+    @property
+    def previous(self) -> State | None:
+        """The state before the open stroke, else before the last step; None where there is none."""
+        return next(iter(self._stroke or self._past[-1:]), None)
+
+    @property
     def can_undo(self) -> bool:
         return bool(self._past) or any(before != self.now for before in self._stroke)
 

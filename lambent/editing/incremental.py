@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.editing.products import Halves, Pixels, add_rows
+from lambent.editing.products import Halves, HostProducts, Pixels, Products
 
 TERMS = 30  # a frame
 RENEWED_IN = 64  # frames until every pixel was computed anew
@@ -23,23 +23,25 @@ class IncrementalPicture:
     Parameters
     ----------
     transport
-        (J, C, P) float16, of bands or, better, of wavelets (`core.wavelets`).
+        (J, C, P) float16, of bands or, better, of wavelets (`core.wavelets`); or the products that hold it elsewhere.
 
     Attributes
     ----------
-    picture : (C, P) float32
-        Radiance by channel and pixel.
     wanted, effective : (J, C) float64
         Coefficients of the curve, and those that `picture` shows.
     """
 
-    def __init__(self, transport: Halves) -> None:
-        self.transport = transport
-        bands, channels, pixels = transport.shape
+    def __init__(self, transport: Halves | Products) -> None:
+        self._products = HostProducts(transport) if isinstance(transport, np.ndarray) else transport
+        bands, channels, self._pixels = self._products.shape
         self.wanted: Floats = np.zeros((bands, channels))
         self.effective: Floats = np.zeros((bands, channels))
-        self.picture: Pixels = np.zeros((channels, pixels), np.float32)
         self._next_block = 0
+
+    @property
+    def picture(self) -> Pixels:
+        """(C, P) float32: radiance by channel and pixel."""
+        return self._products.picture
 
     @property
     def is_exact(self) -> bool:
@@ -57,7 +59,7 @@ class IncrementalPicture:
         rows = np.flatnonzero(size)
         if len(rows) > terms:
             rows = np.sort(np.argpartition(-size, terms - 1)[:terms])
-        add_rows(self.picture, self.transport, rows, change[rows])
+        self._products.add_rows(rows, change[rows])
         self.effective[rows] = self.wanted[rows]  # effective + change, without its rounding
         self._renew(self._next_block, RENEWED_IN)
         self._next_block = (self._next_block + 1) % RENEWED_IN
@@ -65,7 +67,7 @@ class IncrementalPicture:
     def clear(self) -> None:
         """Show nothing: effective coefficients of 0."""
         self.effective[:] = 0
-        self.picture[:] = 0
+        self._renew(0, 1)
 
     def draw(self) -> None:
         """The exact picture at once, from every coefficient."""
@@ -74,8 +76,6 @@ class IncrementalPicture:
 
     def _renew(self, block: int, blocks: int) -> None:
         """Compute one of `blocks` blocks of pixels from the effective coefficients."""
-        pixels = self.picture.shape[1]
-        part = slice(pixels * block // blocks, pixels * (block + 1) // blocks)
-        self.picture[:, part] = 0
+        part = slice(self._pixels * block // blocks, self._pixels * (block + 1) // blocks)
         rows = np.flatnonzero(self.effective.any(axis=1))
-        add_rows(self.picture, self.transport, rows, self.effective[rows], part)
+        self._products.add_rows(rows, self.effective[rows], part, anew=True)

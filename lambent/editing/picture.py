@@ -7,19 +7,19 @@ Scales, textures and curves of the viewer multiply whole pixels, so their edits 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Image, Indices
 from lambent.core.discovery import known
+from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
-from lambent.editing.products import Pixels
+from lambent.editing.products import Products
 from lambent.editing.rows import PairTransport, Rows, coefficients_of
-from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
+from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
 
@@ -74,10 +74,18 @@ class EditedPicture:
         Linear radiance of what is not edited; 0, or anything, where a part is.
     parts
         By name of the material.
+    canvas
+        Makes what holds the picture; by default in memory.
+
+    Attributes
+    ----------
+    canvas : Canvas
     """
 
-    def __init__(self, background: Image, parts: Mapping[str, Part]) -> None:
-        self._background = np.array(background, np.float32)
+    def __init__(
+        self, background: Image, parts: Mapping[str, Part], canvas: Callable[[Image], Canvas] = HostCanvas
+    ) -> None:
+        self.canvas = canvas(background)
         self._covered = np.zeros(background.shape[0] * background.shape[1], np.int64)
         self._parts: dict[str, Part] = {}
         self._terms: dict[str, list[_TermPicture]] = {}
@@ -86,7 +94,8 @@ class EditedPicture:
 
     def put(self, material: str, part: Part) -> None:
         """Add a material, or replace its transport (of more lights, of another quotient), and draw `part.start`."""
-        terms = [_TermPicture(*pair, part) for pair in zip(part.start.terms, part.transport, strict=True)]
+        made = zip(part.start.terms, part.transport, strict=True)
+        terms = [_TermPicture(term, transport, part, self.canvas) for term, transport in made]
         for term, start in zip(terms, part.start.terms, strict=True):
             term.show(part.start.curves, start)
             term.draw()
@@ -95,7 +104,7 @@ class EditedPicture:
             self._covered[before.pixel] -= 1
         self._covered[part.pixel] += 1
         assert self._covered.max(initial=0) <= 1, f"a pixel of {material} shows another material too"
-        self._background.reshape(-1, 3)[part.pixel] = 0
+        self.canvas.clear(part.pixel)
         self._parts[material], self._terms[material] = part, terms
 
     def show(self, material: str, edited: Editable) -> None:
@@ -148,38 +157,33 @@ class EditedPicture:
         """Whether it does and every pixel was computed anew since: another frame would change no bit."""
         return all(term.is_settled for terms in self._terms.values() for term in terms)
 
+    def compose(self) -> None:
+        """Bring the canvas up to date: where it is shown from a GPU's memory, frames end with this."""
+        self.canvas.compose([(t.layer, t.scale) for terms in self._terms.values() for t in terms])
+
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""
-        image = self._background.copy()
-        for name, terms in self._terms.items():
-            for term in terms:
-                _compose(
-                    image.reshape(-1, 3), self._parts[name].pixel, term.picture.picture, term.scale, term.multiplier
-                )  # fmt: skip
-        return image
-
-
-def is_diffuse(term: Term) -> bool:
-    """Whether the texture of the diffuse colour multiplies a term: its curves know neither highlight nor Fresnel."""
-    return bool(term.factors) and all(factor.over in ("theta_i", "theta_o") for factor in term.factors)
+        self.compose()
+        return self.canvas.image()
 
 
 class _TermPicture:
     """One term: its incremental picture over the active curve, and what multiplies it."""
 
-    def __init__(self, term: Term, transport: Rows | PairTransport, part: Part) -> None:
+    def __init__(self, term: Term, transport: Rows | PairTransport, part: Part, canvas: Canvas) -> None:
         self.name, self._factors, self._start = term.name, term.factors, part.start.curves
         self._transport = transport
         self._counts = _counts(transport, len(term.factors))
-        texture = part.diffuse if is_diffuse(term) else part.specular
-        self._texture = np.ascontiguousarray(np.ones((3, 1)) if texture is None else texture.T, np.float32)
-        self._theta_o = np.asarray(part.theta_o, np.float32)
+        texture = part.diffuse if term.is_diffuse else part.specular
+        self.layer = canvas.layer(part.pixel, part.theta_o, texture)
         self._viewer: Curve | None = None
         self._shown, self._colour = self._start, term.scale
         self._to_renew = 0  # blocks of pixels that are older than the last edit
-        self.multiplier = self._texture
         self._active = transport.over if isinstance(transport, Rows) else 0
-        self._use(transport if isinstance(transport, Rows) else self._folded())
+        if isinstance(transport, Rows):
+            self._use(self.layer.hold(transport.values), transport.unit)
+        else:
+            self._use(*self._folded())
 
     @property
     def is_settled(self) -> bool:
@@ -198,7 +202,7 @@ class _TermPicture:
         viewer = curves[term.viewer] if term.viewer else None
         if viewer is not self._viewer:
             self._viewer = viewer
-            self.multiplier = self._texture if viewer is None else _viewed(self._texture, self._theta_o, viewer)
+            self.layer.view(viewer)
         if self._pairs is not None and self._changed(before, 1 - self._active):
             self._refold(self._active if self._changed(before, self._active) else 1 - self._active)
         self._want()
@@ -236,21 +240,20 @@ class _TermPicture:
             self.picture.want(wanted)
             self._to_renew = RENEWED_IN
 
-    def _use(self, rows: Rows) -> None:
-        self._unit = rows.unit
-        self.picture = IncrementalPicture(rows.values)
+    def _use(self, products: Products, unit: float) -> None:
+        self._unit, self.picture = unit, IncrementalPicture(products)
 
     def _refold(self, active: int) -> None:
         self._active = active
-        self._use(self._folded())
+        self._use(*self._folded())
         self._want()
         self.draw()
 
-    def _folded(self) -> Rows:
-        """Rows over the active curve, with the idle one as it is shown."""
+    def _folded(self) -> tuple[Products, float]:
+        """Products over the active curve, with the idle one as it is shown, and the radiance of a value of 1."""
         assert self._pairs is not None
         idle = 1 - self._active
-        return self._pairs.fold(idle, self._shown[self._factors[idle].curve].band_means(self._counts[idle]))
+        return self.layer.fold(self._pairs, idle, self._shown[self._factors[idle].curve].band_means(self._counts[idle]))
 
     def _coefficients(self, curves: Mapping[str, Curve], factor: int) -> Floats:
         return coefficients_of(curves[self._factors[factor].curve], self._counts[factor])
@@ -267,29 +270,3 @@ def _counts(transport: Rows | PairTransport, factors: int) -> dict[int, int]:
         return dict(enumerate(transport.counts))
     assert transport.over < max(factors, 1), "rows are over a curve that the term has"
     return {transport.over: len(transport.values)}
-
-
-def _viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
-    """(3, P): a texture (3, P), or (3, 1), times f_o(theta_o)."""
-    texture = np.ascontiguousarray(np.broadcast_to(texture, (3, len(theta_o))))
-    return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
-
-
-@numba.njit(parallel=True, cache=True)
-def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
-    out = np.empty_like(texture)
-    last = len(values) - 2
-    for p in numba.prange(len(step)):
-        k = min(max(int(step[p]), 0), last)
-        share = min(max(step[p] - k, np.float32(0)), np.float32(1))
-        for c in range(len(texture)):
-            out[c, p] = texture[c, p] * (values[k, c] + share * (values[k + 1, c] - values[k, c]))
-    return out
-
-
-@numba.njit(parallel=True, fastmath=True, cache=True)
-def _compose(image, pixel, picture, scale, multiplier):  # type: ignore[no-untyped-def]
-    step = 0 if multiplier.shape[1] == 1 else 1
-    for p in numba.prange(len(pixel)):
-        for c in range(3):
-            image[pixel[p], c] += scale[c] * multiplier[c, p * step] * picture[c, p]

@@ -7,6 +7,7 @@ rows of it, and those whole; the reads are in sequence, and half the bytes of fl
 from __future__ import annotations
 
 import os
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -76,3 +77,39 @@ def add_rows(
     """picture (C, P) += sum over k of weights[k] (C,) transport[rows[k]] (C, P), in place, in `part` of the pixels."""
     begin, end, _ = part.indices(picture.shape[1])
     _add(picture, transport.view(np.uint16), np.asarray(rows, np.int64), np.asarray(weights, np.float32), begin, end)
+
+
+class Products(Protocol):
+    """A picture of sums of transport rows, in memory (`HostProducts`) or on a GPU (`lambent.realtime.edited`)."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(J, C, P) of the transport."""
+
+    @property
+    def picture(self) -> Pixels:
+        """(C, P) float32: the sums so far, 0 at first."""
+
+    def add_rows(
+        self, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None), *, anew: bool = False
+    ) -> None:
+        """picture (C, P) += sum over k of weights[k] (C,) transport[rows[k]] (C, P) in `part` of the pixels.
+
+        With `anew` the sum takes the place of what was there.
+        """
+
+
+class HostProducts:
+    """`Products` of transport (J, C, P) float16 in memory, summed by all cores."""
+
+    def __init__(self, transport: Halves) -> None:
+        self._transport = transport
+        self.shape = transport.shape
+        self.picture: Pixels = np.zeros(transport.shape[1:], np.float32)
+
+    def add_rows(
+        self, rows: NDArray[np.integer], weights: Floats, part: slice = slice(None), *, anew: bool = False
+    ) -> None:
+        if anew:
+            self.picture[:, part] = 0
+        add_rows(self.picture, self._transport, rows, weights, part)

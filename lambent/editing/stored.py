@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Image
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
+from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
-from lambent.editing.products import Halves
 from lambent.editing.rows import PairTransport, Rows
 from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
@@ -33,19 +33,21 @@ class StoredPairs:
     """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
-    pairs: NDArray[np.uint8]
-    values: Halves
+    steps: NDArray[np.uint8]
+    values: NDArray[np.uint32]
     unit: float
     counts: tuple[int, int]
 
     def fold(self, curve_index: int, means: Floats) -> Rows:
         """Rows over the other curve, see `rows.PairTransport`."""
         edited = 1 - curve_index
-        rows, scale = folded(self.spans, self.pairs, self.values, means, edited, self.counts[edited])
+        rows, scale = folded(self.spans, self.steps, self.values, means, edited, self.counts[edited])
         return Rows(rows, self.unit * scale, edited)
 
 
-def edited_picture(store: Store, session: Session, lights: int | None = None) -> EditedPicture:
+def edited_picture(
+    store: Store, session: Session, lights: int | None = None, canvas: Callable[[Image], Canvas] = HostCanvas
+) -> EditedPicture:
     """The picture of a session's view, drawn exactly as the session has edited it.
 
     Materials of the view that the session does not edit are drawn as the scene has them.
@@ -54,6 +56,8 @@ def edited_picture(store: Store, session: Session, lights: int | None = None) ->
     ----------
     lights
         Which of the stored transports to take; the one with the most lights where it is None.
+    canvas
+        As for `EditedPicture`.
 
     Raises
     ------
@@ -77,7 +81,7 @@ def edited_picture(store: Store, session: Session, lights: int | None = None) ->
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
-    picture = EditedPicture(backdrop.astype(np.float32), parts)
+    picture = EditedPicture(backdrop.astype(np.float32), parts, canvas)
     for name in view.materials:
         known("material", name, scene, file=store.folder, field="materials")
         if name in parts:
@@ -135,5 +139,5 @@ def _transport(store: Store, name: str, said: Mapping[str, Any]) -> Rows | PairT
     curves, unit = said["curves"], float(said["scale"])
     if len(curves) < 2:
         return Rows(store.read(f"{name}/rows"), unit)
-    spans, pairs, values = (store.read(f"{name}/{array}") for array in ("spans", "pairs", "values"))
-    return StoredPairs(spans, pairs, values, unit, (curves[0][1], curves[1][1]))
+    spans, steps, values = (store.read(f"{name}/{array}") for array in ("spans", "steps", "values"))
+    return StoredPairs(spans, steps, values, unit, (curves[0][1], curves[1][1]))

@@ -39,6 +39,13 @@ WEBGPU_LIMITS: Mapping[str, int] = {
     "max-vertex-buffer-array-stride": 2048,
     "max-color-attachments": 8,
     "max-color-attachment-bytes-per-sample": 32,
+    "max-dynamic-storage-buffers-per-pipeline-layout": 4,
+    "max-compute-workgroup-storage-size": 16 << 10,
+    "max-compute-invocations-per-workgroup": 256,
+    "max-compute-workgroup-size-x": 256,
+    "max-compute-workgroup-size-y": 256,
+    "max-compute-workgroup-size-z": 64,
+    "max-compute-workgroups-per-dimension": 65535,
 }
 OPTIONAL_FEATURES = ("timestamp-query",)
 

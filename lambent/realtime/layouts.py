@@ -14,6 +14,8 @@ _UNFILTERED = {"sample_type": "unfilterable-float"}
 KINDS: dict[str, dict[str, Any]] = {
     "uniform": {"buffer": {"type": "uniform"}},
     "storage": {"buffer": {"type": "read-only-storage"}},
+    "moving storage": {"buffer": {"type": "read-only-storage", "has_dynamic_offset": True}},
+    "written storage": {"buffer": {"type": "storage"}},
     "sampler": {"sampler": {"type": "filtering"}},
     "flat": {"texture": {"sample_type": "float", "view_dimension": "2d"}},
     "layers": {"texture": {"sample_type": "float", "view_dimension": "2d-array"}},
@@ -42,7 +44,7 @@ class Layouts:
         return self.of("uniform", "cube", "storage", *look_up)
 
     def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:
-        """Layout of bindings of these `KINDS`."""
+        """Layout of bindings of these `KINDS`, for the stages of `visibility`."""
         entries = [{"binding": i, "visibility": visibility, **KINDS[kind]} for i, kind in enumerate(kinds)]
         return self.device.create_bind_group_layout(entries=entries)
 

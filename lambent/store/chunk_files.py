@@ -49,9 +49,13 @@ class ChunkFiles:
 
     def create(self) -> None:
         """Make the array's folder anew, without chunks."""
+        self.remove()
+        self.describe()
+
+    def remove(self) -> None:
+        """Delete the array's folder."""
         if self._folder.exists():
             shutil.rmtree(self._folder)
-        self.describe()
 
     def describe(self) -> None:
         """Write `zarr.json`."""

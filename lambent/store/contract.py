@@ -33,14 +33,16 @@ To edit the materials of a view, with the image's size in its key:
     view/KEY/view_points/backdrop          (height, width, 3) float16, W/(sr m^2), what is seen without reflection: the
                                            environment, and what surfaces emit
     view/KEY/visibility/LIGHTS             (ceil(M / 32), P) uint32, bit m % 32 of word m // 32: is light m seen?
-                                           LIGHTS is the number of lights asked for, meta["lights"] that found, M
+                                           LIGHTS is the number of lights asked for, meta["lights"] that found, M.
+                                           Lights behind the shading normal count as hidden, but where a term transmits
     view/KEY/transport/LIGHTS/MATERIAL/TERM/rows    (J, 3, Q) float16: direct light of one term of a material by wavelet
                                            (core.wavelets) of its curve, at the Q points of the material in their order.
                                            TERM is the term's number in its Editable
-    .../pairs, values, spans               of a term with two curves instead: (N, 2) uint8 bands j, k of its curves, and
-                                           (N, 3) float16 light by these; (Q, 2) uint32, first entry of each point and
-                                           the one past its last. Pairs that nobody can see are left out
-
+    .../steps, values, spans               of a term with two curves instead: (Q, 2) uint32 spans, first entry of each
+                                           point and the one past its last; (N,) uint32 light by pairs of bands j, k,
+                                           RGB9E5 (core.shared_exponent); (N,) uint8 steps from one entry's pair to the
+                                           next. Pairs are numbered j K + k; each point begins at -1. Black pairs are
+                                           absent, except where a step would be longer than 255
     view/KEY/transport/LIGHTS/terms        (T,) uint32, Q of each term; written last. meta["terms"] has for each
                                            "material", "term", "fixed": its quotient and angles (Term.fixed), "curves":
                                            names and numbers of bands, and "scale". meta["environment"] is None, or
@@ -50,7 +52,7 @@ To edit the materials of a view, with the image's size in its key:
 Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum over wavelets, or pairs, of the array
 times the curves' coefficients. Coefficients of pairs are means over equal bands from 0 to 90 degrees, those of rows the
 wavelets of such means; f_q and f_o are the term's. Textures are in the array. The first set of LIGHTS is small and soon
-there; `transport_lights` lists those that are complete, the last being the best.
+there; `transport_lights` lists those that are complete, the last being the best, and `forget_lights` drops one.
 
 The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
 objects. Times are the document "timings". Every array is absent, partial or complete (`Store.availability`); of a
@@ -194,6 +196,13 @@ def transport_lights(store: Store, camera: Camera, width: int, height: int) -> l
         a.name.removeprefix(start) for a in store.artefacts("transport") if a.name.startswith(start) and a.complete
     ]
     return sorted(int(name.removesuffix("/terms")) for name in names if name.endswith("/terms"))
+
+
+def forget_lights(store: Store, camera: Camera, width: int, height: int, lights: int) -> None:
+    """Drop the visibility and the transport of one set of lights of a view; the next bake makes it anew."""
+    start = f"{VIEW}/{view_key(camera, width, height)}"
+    mine = f"{start}/transport/{lights}/"
+    store.forget([f"{start}/visibility/{lights}", *(a.name for a in store.artefacts() if a.name.startswith(mine))])
 
 
 def probe_name(object_name: str, part: str) -> str:

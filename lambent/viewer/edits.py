@@ -3,45 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
+from lambent.editing.history import History
 from lambent.materials.document import Material
 
-UNDO_LIMIT = 200
 
-
-@dataclass
 class MaterialEdits:
     """Materials that differ from the scene's, with undo and redo.
 
     A stroke is what one drag of a slider does: any number of `change`, then one `end_stroke`. It is undone as a whole.
+
+    Attributes
+    ----------
+    scene
+        The materials of the scene, by name.
+    saved
+        Materials as they were saved last.
     """
 
-    scene: Mapping[str, Material]
-    edited: dict[str, Material] = field(default_factory=dict)
-    saved: dict[str, Material] = field(default_factory=dict)  # as they were saved last
-    _undo: list[dict[str, Material]] = field(default_factory=list)
-    _redo: list[dict[str, Material]] = field(default_factory=list)
-    _before: dict[str, Material] | None = None  # at the start of the open stroke
+    def __init__(self, scene: Mapping[str, Material]) -> None:
+        self.scene = scene
+        self.saved: dict[str, Material] = {}
+        self._history: History[Mapping[str, Material]] = History({})
+
+    @property
+    def edited(self) -> Mapping[str, Material]:
+        """The materials that differ from the scene's."""
+        return self._history.now
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
 
     def change(self, name: str, material: Material) -> None:
-        if self._before is None:
-            self._before = dict(self.edited)
-        self.edited[name] = material
-        if material == self.scene[name]:
-            del self.edited[name]
+        """One moment of the stroke that is under way, or the first of a new one."""
+        if not self.in_stroke:
+            self._history.begin_stroke()
+        others = {other: edited for other, edited in self.edited.items() if other != name}
+        self._history.change(others if material == self.scene[name] else {**others, name: material})
 
     def end_stroke(self) -> None:
-        before, self._before = self._before, None
-        if before is not None and before != self.edited:
-            self._undo = [*self._undo, before][-UNDO_LIMIT:]
-            self._redo.clear()
+        self._history.end_stroke()
 
     def reset(self, name: str) -> None:
         """Back to the scene's material, as a stroke of its own."""
@@ -52,32 +56,26 @@ class MaterialEdits:
     @property
     def in_stroke(self) -> bool:
         """Whether something is being changed at this moment."""
-        return self._before is not None
+        return self._history.in_stroke
 
     def previous(self, name: str) -> Material | None:
         """The material before the last stroke, or before the one under way; None where there was none."""
-        before = self._before if self._before is not None else self._undo[-1] if self._undo else None
+        before = self._history.previous
         return None if before is None else before.get(name, self.scene[name])
 
     @property
     def can_undo(self) -> bool:
-        return bool(self._undo) or self._before is not None
+        return self._history.can_undo
 
     @property
     def can_redo(self) -> bool:
-        return bool(self._redo)
+        return self._history.can_redo
 
     def undo(self) -> None:
-        self.end_stroke()
-        if self._undo:
-            self._redo.append(self.edited)
-            self.edited = self._undo.pop()
+        self._history.undo()
 
     def redo(self) -> None:
-        self.end_stroke()
-        if self._redo:
-            self._undo.append(self.edited)
-            self.edited = self._redo.pop()
+        self._history.redo()
 
 
 def rescue(edits: MaterialEdits, names: Iterable[str], folder: Path) -> Iterator[Path]:

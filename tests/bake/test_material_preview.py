@@ -9,9 +9,11 @@ import pytest
 
 from lambent.bake.reference import material_preview
 from lambent.bake.reference.material_preview import FOV_DEG, preview
+from lambent.core.images import write_image
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.half_vector_grid import GridShape
 from lambent.materials.measured.synthetic import ANISOTROPIC, ISOTROPIC, synthesise
+from lambent.scenes.scene import ImageEnvironment
 
 SMALL = {"size_px": 48, "spp": 16}
 CLEAN = {"noise": 0.0, "floor": 0.0, "sector_deg": 0.0, "step_deg": 6.0, "fine_deg": 3.0}
@@ -49,3 +51,18 @@ def test_a_lamp_shines_through():
     row, column = np.unravel_index(seen.model.sum(axis=-1).argmax(), seen.ball.shape)
     assert row > 24 and column > 24  # below and to the right of the middle, where it hangs
     assert seen.figures["psnr_db"] > 25
+
+
+def test_the_lamp_is_as_bright_as_the_environment_is_scaled(tmp_path):
+    """One exposure serves lamp and environment: a scale of the environment that the lamp ignored would be seen."""
+    rows = np.linspace(2.0, 0.2, 16)[:, None, None] * np.ones((1, 32, 3))
+    write_image(tmp_path / "sky.exr", rows.astype(np.float32))
+    material = Material(name="paper", kd=0.3, kt_d=0.3)
+    table = synthesise(material, replace(ISOTROPIC, **CLEAN))
+    dim, bright = (
+        preview(table, material, ImageEnvironment(tmp_path / "sky.exr", scale), **SMALL) for scale in (1, 50)
+    )
+    red, _, blue = dim.model[dim.ball].mean(axis=0)
+    assert dim.lamp and red > 1.1 * blue, "the lamp, which is warmer than the sky, is seen"
+    np.testing.assert_allclose(bright.model, dim.model, atol=2e-3)
+    np.testing.assert_allclose(bright.measured, dim.measured, atol=2e-3)

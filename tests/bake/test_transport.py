@@ -12,6 +12,7 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.core.directions import normalize
 from lambent.core.latlong import lat_long_directions
+from lambent.core.shared_exponent import unpacked_rgb
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.curve import END_RAD, Curve
 from lambent.materials.factored.of_lobes import of_material
@@ -22,6 +23,7 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
 from tests.bake.small_scenes import GREY
+from tests.tools.pair_numbers import pair_numbers
 
 SIZE = 10
 CAMERA = Camera("front", (0.0, 1.6, 2.4), (0.0, 0.35, 0.0))
@@ -58,7 +60,7 @@ class View:
 
     def picture(self, editable: Editable, *counts: int) -> np.ndarray:
         """(P, 3) direct light by bands of a material."""
-        from lambent.bake.transport.bands import Bands, pair_transport, transport
+        from lambent.bake.transport.bands import Bands, Pairs, pair_transport, transport
 
         total = np.zeros((len(self.points), 3))
         for term in editable.terms:
@@ -68,8 +70,10 @@ class View:
                 rows = transport(self.points, self.lights, self.seen, term, bands[0])
                 total += np.einsum("jc,jcp->pc", means[0], rows) * term.scale
                 continue
-            found = pair_transport(self.points, self.lights, self.seen, term, bands, 0.0)
-            share = found.values * means[0][found.bands[:, 0]] * means[1][found.bands[:, 1]]
+            blocks = pair_transport(self.points, self.lights, self.seen, term, bands, 1 / 256)
+            found = Pairs(*map(np.concatenate, zip(*blocks, strict=True)))
+            j, k = np.divmod(pair_numbers(found.counts, found.steps), counts[1])
+            share = unpacked_rgb(found.light) / 256 * means[0][j] * means[1][k]
             np.add.at(total, np.repeat(np.arange(len(total)), found.counts), share * term.scale)
         return total
 
@@ -113,17 +117,17 @@ def _small(corners: np.ndarray, cuts: int) -> np.ndarray:
     return surface_triangles(corners[None], np.ones((1, 3)), longest / cuts * 1.0001).centres
 
 
-def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SIZE)) -> View:
+def view(scene: Scene, lights: TriangleLights, size: tuple[int, int] = (SIZE, SIZE), camera: Camera = CAMERA) -> View:
     from lambent.bake.engine import engine
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.bands import visibility
     from lambent.bake.transport.view_points import view_points
+    from lambent.bake.transport.visibility import visibility
 
     builder = SceneBuilder(scene)
     traced = builder.build()
-    points = view_points(builder, traced, CAMERA, *size)
+    points = view_points(builder, traced, camera, *size)
     return View(scene, lights, points, visibility(traced, points, lights))
 
 

@@ -15,16 +15,18 @@ from lambent.bake.view import View
 from lambent.core.errors import UserError
 from lambent.core.images import write_image
 from lambent.core.progress import Cancelled
+from lambent.core.shared_exponent import unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, MaterialTextures, Scene, SceneObject, Texture
-from lambent.store.contract import baked_views, transport_lights, view_artefact_name
+from lambent.store.contract import baked_views, forget_lights, transport_lights, view_artefact_name
 from lambent.store.store import Store
 from tests.bake.small_scenes import GREY
 from tests.bake.test_transport import CAMERA, GLOSSY, ball_on_floor, view
+from tests.tools.pair_numbers import pair_numbers
 
 SIZE = (12, 10)
 HOW = Settings(sharp=64, smooth=16, sharp_of_two=64, smooth_of_two=16)
@@ -68,9 +70,11 @@ def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.nda
         if len(means) == 1:
             light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
         else:
-            pairs, values = store.read(f"{start}pairs"), store.read(f"{start}values").astype(float)
-            share = values * means[0][pairs[:, 0]] * means[1][pairs[:, 1]]
-            light = np.array([share[a:b].sum(axis=0) for a, b in store.read(f"{start}spans")]).reshape(-1, 3)
+            spans, steps, values = (store.read(start + part) for part in ("spans", "steps", "values"))
+            light = np.zeros((len(spans), 3))
+            for p, (a, b) in enumerate(spans):
+                j, k = np.divmod(pair_numbers(np.array([b - a]), steps[a:b]), len(means[1]))
+                light[p] = (unpacked_rgb(values[a:b]) * means[0][j] * means[1][k]).sum(axis=0)
         total[worn == term["material"]] += light * of_term.scale * term["scale"]
     return total
 
@@ -184,6 +188,35 @@ def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, t
     assert store.read(name("transport", "60/other/0/rows")).shape == (16, 3, 0)
     assert store.read(name("transport", "60/other/1/spans")).shape == (0, 2)
     assert np.isfinite(picture(store, 60, editables(more))).all()
+
+
+def test_light_from_behind_shows_where_a_material_transmits(tmp_path: Path) -> None:
+    """Under even light a sheet of kd = .3 and kt_d = .5 shows .8 of it; only its visibility has both sides."""
+    sheet = SceneObject("sheet", patch((-9, 0, 9), (18, 0, 0), (0, 0, -18)), "sheet")
+    wall = SceneObject("wall", patch((-9, 0.2, -9), (18, 0, 0), (0, 9, 0)), "grey")
+    materials = {"sheet": Material(kd=0.3, kt_d=0.5), "grey": GREY}
+    even = ConstantEnvironment((1.0, 1.0, 1.0))
+    store = bake_view(Scene("sheet", (sheet,), materials, even), tmp_path / "s")
+    found = picture(store, 200, editables(Scene("sheet", (sheet,), materials, even)))
+    assert np.allclose(found, 0.8, rtol=0.02)
+    both = bake_view(Scene("both", (sheet, wall), materials, even), tmp_path / "both")
+    seen, objects = both.read(name("visibility", "200")), both.read(name("view_points", "object"))
+    lights = both.artefact(name("visibility", "200")).meta["lights"]
+    share = np.bitwise_count(seen).sum(axis=0) / lights
+    assert (share[objects == 0] > 0.7).all()
+    assert (share[objects == 1] < 0.6).all()
+
+
+def test_a_set_of_lights_can_be_forgotten(scene: Scene, tmp_path: Path) -> None:
+    store = bake_view(scene, tmp_path / "s")
+    forget_lights(store, CAMERA, *SIZE, 60)
+    left = Store.open(tmp_path / "s")
+    assert transport_lights(left, CAMERA, *SIZE) == [200]
+    assert name("visibility", "60") not in left
+    assert not (tmp_path / "s" / name("transport", "60/grey/0/rows")).exists()
+    assert np.isfinite(picture(left, 200, editables(scene))).all()
+    store.close()
+    assert transport_lights(bake_view(scene, tmp_path / "s"), CAMERA, *SIZE) == [60, 200]
 
 
 def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> None:

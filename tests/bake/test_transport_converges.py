@@ -48,8 +48,8 @@ def direct_light(of: Scene, count: int = 10_000) -> np.ndarray:
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.transport.bands import visibility
     from lambent.bake.transport.view_tracer import ViewTracer
+    from lambent.bake.transport.visibility import visibility
 
     tracer = ViewTracer(of)
     fine = SIZE * SAMPLED

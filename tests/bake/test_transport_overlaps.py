@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.bake.transport.overlaps import in_order, share_below
+from lambent.bake.transport.overlaps import share_below, spread
 from lambent.materials.lobes import NUMPY
 
 
@@ -18,7 +18,7 @@ from lambent.materials.lobes import NUMPY
     ],
 )  # fmt: skip
 def test_known_shares(corners: tuple[float, ...], y: float, expected: float) -> None:
-    assert share_below(y, *in_order(*map(np.float64, corners), NUMPY), NUMPY) == pytest.approx(expected)
+    assert share_below(y, spread(*map(np.float64, corners), NUMPY), NUMPY) == pytest.approx(expected)
 
 
 def test_shares_are_those_of_random_points() -> None:
@@ -26,7 +26,7 @@ def test_shares_are_those_of_random_points() -> None:
     inside = rng.dirichlet((1, 1, 1), 100_000)
     for corners in rng.normal(size=(20, 3)):
         edges = np.linspace(corners.min() - 0.1, corners.max() + 0.1, 12)
-        found = share_below(edges, *in_order(*corners, NUMPY), NUMPY)
+        found = share_below(edges, spread(*corners, NUMPY), NUMPY)
         counted = (inside @ corners < edges[:, None]).mean(axis=1)
         assert np.allclose(found, counted, atol=0.006)
         assert (np.diff(found) >= 0).all()
@@ -37,6 +37,6 @@ def test_bands_add_up_to_one() -> None:
     corners = rng.uniform(0, 1, (3, 5000)).astype(np.float32)
     corners[1, :1000] = corners[0, :1000]
     edges = np.linspace(0, 1, 129, dtype=np.float32)
-    shares = np.diff(share_below(edges[:, None], *in_order(*corners, NUMPY), NUMPY), axis=0)
+    shares = np.diff(share_below(edges[:, None], spread(*corners, NUMPY), NUMPY), axis=0)
     assert shares.min() >= -1e-5
     assert np.allclose(shares.sum(axis=0), 1, atol=1e-6)

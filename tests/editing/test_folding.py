@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.core.wavelets import transformed
 from lambent.editing.folding import folded
 from lambent.editing.incremental import IncrementalPicture
@@ -13,23 +14,26 @@ Sparse = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def sparse(points: int, bands: tuple[int, int], per_point: int, seed: int = 0) -> Sparse:
-    """Spans, pairs and values of random transport; spans leave gaps, and the last point has none."""
+    """Spans, steps and values of random transport; spans leave gaps, and the last point has none."""
     rng = np.random.default_rng(seed)
     counts = rng.integers(per_point // 2, per_point + 1, points)
     counts[-1] = 0
     begin = np.concatenate([[0], np.cumsum(counts + 3)[:-1]])
     entries = int(begin[-1]) + 3
-    pairs = np.stack([rng.integers(0, n, entries) for n in bands], axis=1).astype(np.uint8)
-    values = rng.random((entries, 3), np.float32).astype(np.float16)
-    return np.stack([begin, begin + counts], axis=1).astype(np.uint32), pairs, values
+    steps = rng.integers(0, bands[0] * bands[1] // per_point + 1, entries).astype(np.uint8)
+    steps[begin] = 1
+    values = packed_rgb(rng.random((entries, 3), np.float32))
+    return np.stack([begin, begin + counts], axis=1).astype(np.uint32), steps, values
 
 
 def matrix(transport: Sparse, bands: tuple[int, int]) -> np.ndarray:
     """(P, J, K, 3) of the same."""
-    spans, pairs, values = transport
+    spans, steps, values = transport
     whole = np.zeros((len(spans), *bands, 3))
     for p, (begin, end) in enumerate(spans):
-        np.add.at(whole[p], tuple(pairs[begin:end].T), values[begin:end].astype(float))
+        np.add.at(
+            whole[p], np.divmod(np.cumsum(steps[begin:end].astype(int)) - 1, bands[1]), unpacked_rgb(values[begin:end])
+        )
     return whole
 
 

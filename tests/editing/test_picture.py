@@ -11,7 +11,7 @@ import pytest
 
 from lambent.core.camera import Camera
 from lambent.editing.operators import Region
-from lambent.editing.picture import EditedPicture, Part, TransportNeeded, is_diffuse
+from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.rows import DensePairs, Rows
 from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
@@ -53,7 +53,7 @@ def direct(part: Part, bands: dict[str, np.ndarray], material: Editable) -> np.n
         means += [np.ones((1, 3))] * (2 - len(means))
         light = np.einsum("jkcp,jc,kc->pc", bands[term.name].astype(float), *means)
         viewer = material.curves[term.viewer].at(part.theta_o) if term.viewer else 1.0
-        total += np.array(term.scale) * (part.diffuse if is_diffuse(term) else part.specular) * viewer * light
+        total += np.array(term.scale) * (part.diffuse if term.is_diffuse else part.specular) * viewer * light
     return total
 
 
@@ -255,7 +255,7 @@ def test_no_edit_is_no_work(tray: Editable, monkeypatch: pytest.MonkeyPatch) -> 
     part, _ = part_of(tray, np.arange(40), 5)
     picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"tray": part})
     picture.show("tray", tray)
-    monkeypatch.setattr("lambent.editing.incremental.add_rows", None)
+    monkeypatch.setattr("lambent.editing.products.add_rows", None)
     picture.step()
     assert picture.is_settled
 

@@ -11,6 +11,7 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.images import read_image
+from lambent.core.shared_exponent import packed_rgb
 from lambent.core.wavelets import transformed
 from lambent.editing.operators import Region
 from lambent.editing.session import Session
@@ -61,11 +62,11 @@ def store(tmp_path: Path) -> Store:
                 put("transport", f"200/{name}/{k}/rows", transformed(light[:, 0].astype(np.float32)).astype(np.float16))
                 continue
             j, n, _, points = light.shape
-            pairs = np.tile(np.stack(np.divmod(np.arange(j * n), n), axis=1), (points, 1))
             begin = np.arange(points) * j * n
             put("transport", f"200/{name}/{k}/spans", np.stack([begin, begin + j * n], axis=1).astype(np.uint32))
-            put("transport", f"200/{name}/{k}/pairs", pairs.astype(np.uint8))
-            put("transport", f"200/{name}/{k}/values", np.moveaxis(light, 3, 0).reshape(-1, 3))
+            put("transport", f"200/{name}/{k}/steps", np.ones(points * j * n, np.uint8))
+            values = packed_rgb(np.moveaxis(light, 3, 0).reshape(-1, 3))
+            put("transport", f"200/{name}/{k}/values", values)
     put("transport", "200/terms", np.ones(len(said), np.uint32), terms=said)
     record = SceneRecord(name="room", objects=(), materials=MATERIALS, cameras=(CAMERA,), bounds=((0, 0, 0), (1, 1, 1)))
     write_scene_record(store, record)

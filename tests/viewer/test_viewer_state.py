@@ -2,6 +2,7 @@
 
 import errno
 
+import numpy as np
 import pytest
 
 from lambent.materials.document import load_material
@@ -38,6 +39,26 @@ def test_a_stroke_is_undone_as_a_whole(state):
     edits.redo()
     edits.redo()
     assert edits.current("brass").lobes[0].mx == 0.5 and not edits.can_redo
+
+
+def test_undo_has_no_limit_and_shares_the_history_of_curves(state):
+    edits, brass = state.materials.edits, state.scene.materials["brass"]
+    for mx in np.linspace(0.2, 0.9, 300):
+        edits.change("brass", rougher(brass, mx))
+        edits.end_stroke()
+    for _ in range(300):
+        edits.undo()
+    assert edits.edited == {} and not edits.can_undo
+
+
+def test_edits_handed_out_stay_as_they_were(state):
+    """A frame and a step of undo hold the same mapping, so that no later change may reach into it."""
+    edits, brass = state.materials.edits, state.scene.materials["brass"]
+    edits.change("brass", rougher(brass, 0.2))
+    handed_out = edits.edited
+    edits.change("brass", rougher(brass, 0.4))
+    assert handed_out["brass"].lobes[0].mx == 0.2
+    assert edits.previous("brass") == brass
 
 
 def test_a_new_stroke_forgets_what_was_undone(state):

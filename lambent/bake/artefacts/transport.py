@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lambent.bake.artefacts.visibility import lights_key, trace
+from lambent.bake.behind import Behind, behind
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import key_of, texture_inputs
@@ -26,9 +28,10 @@ if TYPE_CHECKING:
 KIND = "transport"
 NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
-REVISION = 1
-POINTS, BYTES = 1 << 15, 1 << 31  # a chunk, and the memory that pairs of bands may take meanwhile
-ENTRIES = 1 << 16  # of pairs, a chunk
+REVISION = 2
+POINTS = 1 << 15  # a chunk
+LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
+ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk
 SMOOTH = ("theta_i", "theta_o", "theta_d")  # angles over which curves have no narrow peaks
 
 
@@ -66,7 +69,7 @@ class _Part:
 
     @property
     def arrays(self) -> tuple[str, ...]:
-        return ("spans", "pairs", "values") if len(self.bands) == 2 else ("rows",)
+        return ("spans", "steps", "values") if len(self.bands) == 2 else ("rows",)
 
     def said(self, scale: float) -> dict[str, Any]:
         curves = [[factor.curve, count] for factor, count in self.bands]
@@ -102,13 +105,15 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
     seen = context.store.read(view.name("visibility", str(count)))
     worn = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))
-    for part in parts:
-        mine = worn == part.material
-        sizes.append(np.count_nonzero(mine))
-        if context.stale(KIND) & {part.name(array) for array in part.arrays}:
-            what = f"{part.material}: {part.term.name}, {len(lights)} lights"
-            baking = _Baking(part, points.where(mine), lights, seen[:, mine], scale, what, context.progress)
-            (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
+    for material, terms in groupby(parts, lambda part: part.material):
+        mine = worn == material
+        own = points.where(mine), lights, seen[:, mine], scale
+        for part in terms:
+            sizes.append(np.count_nonzero(mine))
+            if context.stale(KIND) & {part.name(array) for array in part.arrays}:
+                what = f"{part.material}: {part.term.name}, {len(lights)} lights"
+                baking = _Baking(part, *own, what, context.progress)
+                (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
     said = {**view.meta, "terms": [part.said(scale) for part in parts], "environment": _environment(context)}
     context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
 
@@ -132,34 +137,43 @@ class _Baking:
 
         bands, many = self._bands(), len(self.points)
         writer = self._begin(store, "rows", (bands[0].count, 3, many), (bands[0].count, 3, POINTS), "float16")
-        for chunk in self._missing(writer):
-            some = writer.artefact.region(chunk)[2]
-            found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
-            writer.write(chunk, wavelet_rows(found * self._texture(some).T, self.scale))
+        with behind() as after:
+            for chunk in self._missing(writer):
+                some = writer.artefact.region(chunk)[2]
+                found = transport(self.points.where(some), self.lights, self.seen[:, some], self.part.term, bands[0])
+                texture = self._texture(some).T
+                after.do(lambda c, light: writer.write(c, wavelet_rows(light, self.scale)), chunk, found * texture)
         writer.finish()
 
     def pairs(self, store: Store) -> None:
         """Transport by pairs of bands: the entries of a block of points are written before its spans."""
         from lambent.bake.transport.bands import pair_transport
-        from lambent.bake.transport.stored import LEAST, halves
 
-        bands, many = self._bands(), len(self.points)
-        spans = self._begin(store, "spans", (many, 2), (_points_at_once(bands), 2), "uint32")
-        pairs = self._begin(store, "pairs", (0, 2), (ENTRIES, 2), "uint8", growing=True)
-        values = self._begin(store, "values", (0, 3), (ENTRIES, 3), "float16", growing=True)
-        for chunk in self._missing(spans):
-            some = spans.artefact.region(chunk)[0]
-            begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
-            begin = -(-begin // ENTRIES) * ENTRIES
-            seen, least = self.seen[:, some], LEAST * self.scale
-            found = pair_transport(self.points.where(some), self.lights, seen, self.part.term, bands, least)
-            texture = np.repeat(self._texture(some), found.counts, axis=0)
-            light = halves(found.values * texture / np.float32(self.scale))
-            for writer, array in ((pairs, found.bands), (values, light)):
-                _append(writer, begin, array)
-            ends = begin + np.cumsum(found.counts)
-            spans.write(chunk, np.stack([ends - found.counts, ends], axis=1).astype(np.uint32))
-        for writer in (pairs, values, spans):
+        bands, many, term = self._bands(), len(self.points), self.part.term
+        least = LEAST if bands[1].factor.over in SMOOTH else 0.0
+        spans = self._begin(store, "spans", (many, 2), (POINTS, 2), "uint32")
+        steps = self._begin(store, "steps", (0,), (ENTRIES,), "uint8", growing=True)
+        values = self._begin(store, "values", (0,), (ENTRIES,), "uint32", growing=True)
+        begin = None
+        with behind() as after:
+            for chunk in self._missing(spans):
+                if begin is None:
+                    begin = int(spans.read_chunk((chunk[0] - 1, 0)).max(initial=0)) if chunk[0] else 0
+                begin = -(-begin // ENTRIES) * ENTRIES
+                some = spans.artefact.region(chunk)[0]
+                points, seen, texture = self.points.where(some), self.seen[:, some], self._texture(some)
+                streams, counts = [_Stream(writer, begin, after) for writer in (steps, values)], []
+                for found in pair_transport(points, self.lights, seen, term, bands, self.scale, texture, least):
+                    counts.append(found.counts)
+                    streams[0].add(found.steps)
+                    streams[1].add(found.light)
+                for stream in streams:
+                    stream.end()
+                many_each = np.concatenate(counts)
+                ends = begin + np.cumsum(many_each)
+                after.do(spans.write, chunk, np.stack([ends - many_each, ends], axis=1).astype(np.uint32))
+                begin = int(ends[-1])
+        for writer in (steps, values, spans):
             writer.finish()
 
     def _bands(self) -> list[Any]:
@@ -168,9 +182,8 @@ class _Baking:
         return [Bands(*pair) for pair in self.part.bands or ((Factor("", "theta_i"), 1),)]
 
     def _texture(self, some: slice) -> np.ndarray:
-        """(points, 3) factors of textures: those of diffuse light where the curves say nothing of a highlight."""
-        is_diffuse = all(factor.over in ("theta_i", "theta_o") for factor in self.part.term.factors)
-        return (self.points.diffuse if is_diffuse else self.points.specular)[some]
+        """(points, 3) factors of textures."""
+        return (self.points.diffuse if self.part.term.is_diffuse else self.points.specular)[some]
 
     def _begin(
         self,
@@ -194,18 +207,33 @@ class _Baking:
         self.progress(total, total, self.what)
 
 
-def _points_at_once(bands: list[Any]) -> int:
-    return max(1, min(POINTS, BYTES // (12 * int(bands[0].count) * int(bands[1].count))))
+class _Stream:
+    """Writes entries into whole chunks from `begin`, the last one filled with zeros."""
 
+    def __init__(self, writer: Writer, begin: int, after: Behind) -> None:
+        self._writer, self._next, self._after = writer, begin // ENTRIES, after
+        self._chunk, self._filled = np.zeros(ENTRIES, writer.artefact.dtype), 0
 
-def _append(writer: Writer, begin: int, entries: np.ndarray) -> None:
-    """Write entries into whole chunks from `begin`, the last one filled with zeros."""
-    size = -(-len(entries) // ENTRIES) * ENTRIES
-    padded = np.concatenate([entries, np.zeros((size - len(entries), entries.shape[1]), entries.dtype)])
-    if begin + size > writer.artefact.shape[0]:
-        writer.extend(begin + size - writer.artefact.shape[0])
-    for first in range(0, size, ENTRIES):
-        writer.write(((begin + first) // ENTRIES, 0), padded[first : first + ENTRIES])
+    def add(self, entries: np.ndarray) -> None:
+        while len(entries):
+            room = ENTRIES - self._filled
+            here, entries = entries[:room], entries[room:]
+            self._chunk[self._filled : self._filled + len(here)] = here
+            self._filled += len(here)
+            if self._filled == ENTRIES:
+                self.end()
+
+    def end(self) -> None:
+        if self._filled:
+            self._after.do(self._write, self._next, self._chunk)
+            self._chunk, self._filled = np.zeros(ENTRIES, self._writer.artefact.dtype), 0
+            self._next += 1
+
+    def _write(self, number: int, chunk: np.ndarray) -> None:
+        missing = (number + 1) * ENTRIES - self._writer.artefact.shape[0]
+        if missing > 0:
+            self._writer.extend(missing)
+        self._writer.write((number,), chunk)
 
 
 def _parts(context: BakeContext, view: View, count: int) -> Iterator[_Part]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from lambent.bake.artefacts.view_points import points_key
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
@@ -15,7 +17,7 @@ from lambent.bake.view import View
 KIND = "visibility"
 NEEDS = ("view_points",)
 OF_VIEWS = True
-REVISION = 1
+REVISION = 2
 POINTS = 1 << 16  # a chunk
 BITS = 32
 
@@ -36,7 +38,14 @@ SETTINGS = {
 
 def lights_key(context: BakeContext, view: View, count: int) -> str:
     """The key of what a view's points see of so many lights, and of these."""
-    return key_of(KIND, REVISION, points_key(context, view), light_inputs(context.in_views), count)
+    scene = context.in_views
+    return key_of(KIND, REVISION, points_key(context, view), light_inputs(scene), count, *_through(context))
+
+
+def _through(context: BakeContext) -> list[bool]:
+    """By object, whether light that comes from behind it counts."""
+    materials = (context.editable(o.material) for o in context.in_views.objects)
+    return [any(term.side == "transmission" for term in material.terms) for material in materials]
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -53,19 +62,20 @@ def bake(context: BakeContext) -> None:
 def trace(context: BakeContext, view: View, count: int) -> None:
     """Go on with the visibility of so many lights until it is complete."""
     engine()  # before Mitsuba is imported
-    from lambent.bake.transport.bands import visibility
+    from lambent.bake.transport.visibility import visibility
 
     name = view.name(KIND, str(count))
     if name not in context.stale(KIND):
         return
     tracer = context.view_tracer
     points, lights = tracer.points(view), tracer.lights(count)
+    behind = np.array(_through(context), bool)[points.object]
     shape = -(-len(lights) // BITS), len(points)
     meta = {**view.meta, "lights": len(lights)}
     chunks = max(1, shape[0]), max(1, min(POINTS, shape[1]))
     writer = context.store.begin(name, KIND, shape, chunks, "uint32", key=context.keys(KIND)[name], meta=meta)
     run_tiles(
-        writer, lambda region, _: visibility(tracer.scene, points.where(region[1]), lights),
+        writer, lambda region, _: visibility(tracer.scene, points.where(region[1]), lights, behind[region[1]]),
         seed=0, progress=context.progress, what=f"visibility of {len(lights)} lights",
     )  # fmt: skip
     writer.finish()

@@ -119,9 +119,9 @@ def intersect(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
     return _behind_holes(scene, mi.Ray3f(ray), mi.Bool(active))
 
 
-def in_shadow(scene: Any, ray: Any, active: Any, holes: bool) -> Any:
-    """Whether anything without a hole blocks a ray."""
-    return intersect(scene, ray, active, True).is_valid() if holes else scene.ray_test(ray, active)
+def in_shadow(scene: Any, ray: Any, active: Any, holes: bool, coherent: bool = False) -> Any:
+    """Whether anything without a hole blocks a ray; `coherent` is a hint that neighbours are nearly parallel."""
+    return intersect(scene, ray, active, True).is_valid() if holes else scene.ray_test(ray, coherent, active)
 
 
 def hidden(scene: Any, p: Any, n: Any, target: Any, active: Any, holes: bool) -> Any:

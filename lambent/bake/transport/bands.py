@@ -2,13 +2,14 @@
 
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
-Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights and
-touches only the bands that each of them meets. With two curves, rows are pairs of bands (4.15).
+Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights,
+touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, bands are
+pairs of bands (4.15).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -18,30 +19,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.tracing.array_ops import array_ops
-from lambent.bake.tracing.rays import array_of, has_holes, hidden, in_shadow, leaving, vectors
-from lambent.bake.transport.overlaps import in_order, share_below
+from lambent.bake.tracing.rays import vectors
+from lambent.bake.transport.overlaps import share_below
+from lambent.bake.transport.pieces import (
+    cuts_of,
+    in_bands,
+    means,
+    orders,
+    orders_of_piece,
+    piece,
+    solid_angle,
+)
 from lambent.bake.transport.view_points import ViewPoints
-from lambent.materials.factored.curve import END_RAD
+from lambent.bake.transport.visibility import BITS
+from lambent.core.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
-BEND, BEND_BY_ANGLE, MOST_BEND = 0.25, 1 / 16, 2.0  # bands that an angle may be from linear within a piece; more, in
-# proportion to the angle, where curves have no narrow peaks
-WIDEST = 2  # bands that a piece may span in both of two curves
-MOST_CUTS = 32  # an edge
-BITS = 32
+BLOCK = 1 << 14  # threads that Dr.Jit gives to one core together
+PAIRS_AT_ONCE = 1 << 24  # of points and pairs of bands: 128 MB
+LONGEST = 255  # step from an entry to the next
+OWN_PAIRS = 1 << 11  # of bands that threads hold at a time: 400 kB for 16 threads that run as one vector
 
 
 class Pairs(NamedTuple):
     """Transport by pairs of bands: of each point the number of its entries, and all entries, point after point.
 
-    counts (P,); bands (N, 2) of the first and the second curve; values (N, 3).
+    counts (P,); steps (N,) uint8 from one entry's pair to the next: pairs are numbered j K + k, and each point begins
+    at -1; light (N,) RGB9E5 (`core.shared_exponent`). Black entries stand where a step would be too long.
     """
 
     counts: NDArray[np.int64]
-    bands: NDArray[np.uint8]
-    values: NDArray[np.float32]
+    steps: NDArray[np.uint8]
+    light: NDArray[np.uint32]
 
 
 @dataclass(frozen=True)
@@ -50,39 +61,6 @@ class Bands:
 
     factor: Factor
     count: int
-
-
-def visibility(scene: Any, points: ViewPoints, lights: TriangleLights) -> NDArray[np.uint32]:
-    """(ceil(M / 32), P) words: bit m % 32 of word m // 32 is set where light m's centre is seen."""
-    words = -(-len(lights) // BITS)
-    holes = has_holes(scene)
-    centres = vectors(mi.Vector3f, lights.centres)
-    near = mi.Bool(lights.near)
-    p, flat = vectors(mi.Point3f, points.p), vectors(mi.Vector3f, points.flat)
-    thread = dr.arange(mi.UInt32, len(points) * words)
-    count = dr.opaque(mi.UInt32, len(points))
-    at = thread % count
-    seen = _seen(
-        scene, dr.gather(mi.Point3f, p, at), dr.gather(mi.Vector3f, flat, at), thread // count * BITS,
-        dr.opaque(mi.UInt32, len(lights)), centres, near, bool(lights.near.any()), holes,
-    )  # fmt: skip
-    return np.array(seen).reshape(words, len(points))
-
-
-@dr.syntax
-def _seen(scene, p, n, first, lights, centres, near, any_near, holes):  # type: ignore[no-untyped-def]
-    word, i = mi.UInt32(0), mi.UInt32(0)
-    while i < BITS:
-        m = first + i
-        here = m < lights
-        centre = dr.gather(mi.Vector3f, centres, m, here)
-        is_near = dr.gather(mi.Bool, near, m, here) if dr.hint(any_near, mode="scalar") else mi.Bool(False)
-        blocked = in_shadow(scene, leaving(scene, p, n, centre), here & ~is_near, holes)
-        if dr.hint(any_near, mode="scalar"):
-            blocked |= hidden(scene, p, n, mi.Point3f(centre), here & is_near, holes) & is_near
-        word |= dr.select(here & ~blocked, mi.UInt32(1) << i, 0)
-        i += 1
-    return word
 
 
 def transport(
@@ -97,7 +75,10 @@ def transport(
     bands
         Those of the term's curve, or of the first of two if the other is constant.
     """
-    total = _traced(points, lights, seen, term, [bands])
+    total = dr.empty(mi.Float, bands.count * 3 * len(points))
+    row, pixel, active = _Lit(points, lights, seen, term, [bands]).rows(0, bands.count)
+    _write(total, row, pixel, dr.opaque(mi.UInt32, len(points)), active, bands.count)
+    dr.eval(total)
     return np.array(total).reshape(bands.count, 3, len(points))
 
 
@@ -107,61 +88,136 @@ def pair_transport(
     seen: NDArray[np.uint32],
     term: Term,
     bands: Sequence[Bands],
-    least: float,
-) -> Pairs:
-    """Transport of a term with two curves as `transport`, without the entries of a sum below `least`.
+    unit: float,
+    texture: NDArray[np.float32] | None = None,
+    least: float = 0.0,
+) -> Iterator[Pairs]:
+    """Transport of a term with two curves as `transport`, times `texture` (P, 3), in multiples of `unit`.
 
-    Hazard: it takes 12 bytes for every pair of bands of every point.
+    Of each band of the first curve, entries of less than `least` of its light are added to the last larger one before
+    them, or to the first. What rounds to black is left out. The points come in blocks, so that little memory is needed.
     """
-    counts = [b.count for b in bands]
-    total = _traced(points, lights, seen, term, bands)
-    at = dr.arange(mi.UInt32, len(points) * counts[0] * counts[1])
-    values = dr.gather(mi.Vector3f, total, at)
-    kept = dr.compress(values.x + values.y + values.z > dr.opaque(mi.Float, least))
-    point, pair = np.divmod(np.array(kept), np.uint32(counts[0] * counts[1]))
-    entries = np.stack(np.divmod(pair, np.uint32(counts[1])), axis=1).astype(np.uint8)
-    return Pairs(np.bincount(point, minlength=len(points)), entries, array_of(dr.gather(mi.Vector3f, total, kept)))
+    size = bands[0].count * bands[1].count
+    at_once = max(1, PAIRS_AT_ONCE // size)
+    own = max(1, OWN_PAIRS // bands[1].count)  # bands of the first curve
+    for first in range(0, len(points), at_once):
+        some = slice(first, first + at_once)
+        few = points.where(some)
+        factor = np.full((len(few), 3), 1 / unit, np.float32) if texture is None else texture[some] / np.float32(unit)
+        lit = _Lit(few, lights, seen[:, some], term, bands)
+        last = dr.full(mi.UInt32, 0xFFFFFFFF, len(few))
+        parts = range(0, bands[0].count, own)
+        yield _joined([_pairs(lit, begin, min(own, bands[0].count), factor, last, least) for begin in parts])
 
 
-def _traced(
-    points: ViewPoints, lights: TriangleLights, seen: NDArray[np.uint32], term: Term, bands: Sequence[Bands]
-) -> Any:
-    """Transport on the device: (J, 3, P) of one curve, (P, J, K, 3) of two."""
-    counts, pixels = [b.count for b in bands], len(points)
-    total = dr.zeros(mi.Float, int(np.prod(counts)) * 3 * pixels)
-    axes = [vectors(mi.Vector3f, axis) for axis in (points.t, points.b, points.n)]
-    wo, ops = tuple(vectors(mi.Vector3f, points.wo)), array_ops()
-    mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
+def _joined(parts: list[Pairs]) -> Pairs:
+    """The entries of several ranges of bands of the same points, point after point."""
+    if len(parts) == 1:
+        return parts[0]
+    counts = np.stack([part.counts for part in parts], axis=1)
+    begins = np.cumsum(counts.ravel()).reshape(counts.shape) - counts
+    joined = Pairs(counts.sum(axis=1), *(np.empty(counts.sum(), part.dtype) for part in parts[0][1:]))
+    for k, part in enumerate(parts):
+        at = np.arange(len(part.light)) + np.repeat(begins[:, k] - (np.cumsum(part.counts) - part.counts), part.counts)
+        joined.steps[at], joined.light[at] = part.steps, part.light
+    return joined
 
-    # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
-    def local(w: Any) -> Any:
-        return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
 
-    def steps(w: Any) -> list[Any]:
-        """The angles of a direction, in bands."""
-        wi = local(w)
-        angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
-        return [_in_bands(angle, b.count) for angle, b in zip(angles, bands, strict=True)]
+def _pairs(lit: _Lit, begin: int, count: int, factor: NDArray[np.float32], last: Any, least: float) -> Pairs:
+    """Pairs of `count` bands of the first curve from `begin`; `last` (P,) is each point's last entry."""
+    size, points = count * lit.counts[1], len(lit)
+    row, pixel, active = lit.rows(begin, count)
+    scale = dr.gather(mi.Vector3f, vectors(mi.Vector3f, factor), pixel, active)
+    places = _entries(size * points)
+    found = dr.empty(mi.UInt32, points)
+    if least:
+        _merge(row, active, dr.opaque(mi.Float, least), lit.counts[1], size)
+    _pack(places, found, last, row, pixel, active, scale, dr.opaque(mi.UInt32, begin * lit.counts[1]), size)
+    dr.eval(places, found, last)
+    ends = dr.cumsum(found)
+    total = int(ends[points - 1])
+    dense = _entries(max(total, 1))
+    pixel, active = _threads(points)
+    own, to = (dr.gather(mi.UInt32, of, pixel, active) for of in (found, ends - found))
+    _move(dense, places, pixel, own, to, size)
+    dr.eval(dense)
+    return Pairs(found.numpy().astype(np.int64), *(one.numpy()[:total] for one in dense))
 
-    def height(w: Any) -> Any:
-        return dr.dot(w, axes[2]) * mirrored
 
-    def weight(w: Any) -> Any:
-        """rho_q cos of a direction on the side that the term scatters from."""
-        wi = local(w)
-        quotient = term.quotient.evaluate(wi, wo, ops)
-        value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
-        return value * wi[2]
+def _entries(count: int) -> list[Any]:
+    """Memory for steps and light of so many entries."""
+    return [dr.empty(dr.uint8_array_t(mi.UInt32), count), dr.empty(mi.UInt32, count)]
 
-    pixel, width = dr.arange(mi.UInt32, pixels), dr.opaque(mi.UInt32, pixels)
-    row = _accumulate(
-        total, pixel, width, vectors(mi.Point3f, points.p), lights_on_device(lights), mi.UInt32(seen.ravel()),
-        dr.opaque(mi.UInt32, len(lights)), steps, height, weight, counts,
-    )  # fmt: skip
-    if len(bands) == 1:
-        _write(total, row, pixel, width, counts[0])
-    dr.eval(total)
-    return total
+
+def _threads(points: int) -> tuple[Any, Any]:
+    """The point of every thread, and whether it has one: every core has as many, and pieces of work of its own."""
+    cores = dr.thread_count() if "llvm" in mi.variant() else 1
+    blocks = cores * -(-points // (cores * BLOCK)) if cores > 1 else 1
+    own = -(-points // blocks)
+    own = min(BLOCK, -(-own // 16) * 16) if cores > 1 else own  # whole vectors
+    thread = dr.arange(mi.UInt32, (blocks - 1) * BLOCK + own)
+    within = thread % BLOCK if blocks > 1 else thread
+    pixel = (thread // BLOCK) * dr.opaque(mi.UInt32, own) + within if blocks > 1 else thread
+    return pixel, (within < dr.opaque(mi.UInt32, own)) & (pixel < dr.opaque(mi.UInt32, points))
+
+
+class _Lit:
+    """Points on the device, and the lights that they see by one term."""
+
+    def __init__(
+        self,
+        points: ViewPoints,
+        lights: TriangleLights,
+        seen: NDArray[np.uint32],
+        term: Term,
+        bands: Sequence[Bands],
+    ) -> None:
+        self._bands, self._term, self._many = bands, term, len(points)
+        self.counts = [b.count for b in bands]
+        self._arrays = [vectors(mi.Vector3f, of) for of in (points.p, points.t, points.b, points.n, points.wo)]
+        self._lights, self._number = lights_on_device(lights), dr.opaque(mi.UInt32, len(lights))
+        self._seen = mi.UInt32(seen.ravel())
+
+    def __len__(self) -> int:
+        return self._many
+
+    def rows(self, begin: int, count: int) -> tuple[Any, Any, Any]:
+        """Transport by `count` bands of the first curve from `begin`, (count, 3) or (count, K, 3), of each thread.
+
+        Also its point, and whether it has one.
+        """
+        pixel, active = _threads(self._many)
+        p, *axes, seen_from = (dr.gather(mi.Vector3f, array, pixel, active) for array in self._arrays)
+        wo, ops, term, bands = tuple(seen_from), array_ops(), self._term, self._bands
+        mirrored, turned = -1.0 if term.side == "transmission" else 1.0, -1.0 if term.side == "retro" else 1.0
+
+        # Dr.Jit's loops take dataclasses apart, and frozen ones cannot be put together again: they are in functions.
+        def local(w: Any) -> Any:
+            return dr.dot(w, axes[0]) * turned, dr.dot(w, axes[1]) * turned, dr.dot(w, axes[2]) * mirrored
+
+        def steps(w: Any) -> list[Any]:
+            """The angles of a direction, in bands."""
+            wi = local(w)
+            angles = [angle_of(b.factor.over, wi, wo, b.factor.stretch, dr) for b in bands]
+            return [in_bands(angle, b.count) for angle, b in zip(angles, bands, strict=True)]
+
+        def height(w: Any) -> Any:
+            return dr.dot(w, axes[2]) * mirrored
+
+        def weight(w: Any) -> Any:
+            """rho_q cos of a direction on the side that the term scatters from."""
+            wi = local(w)
+            quotient = term.quotient.evaluate(wi, wo, ops)
+            value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
+            return value * wi[2]
+
+        row = dr.alloc_local(mi.Float, 3 * count * int(np.prod(self.counts[1:])), value=mi.Float(0))
+        part = dr.opaque(mi.UInt32, begin), dr.opaque(mi.UInt32, begin + count)
+        row = _accumulate(
+            row, part, pixel, active, dr.opaque(mi.UInt32, self._many), p, self._lights, self._seen, self._number,
+            steps, height, weight, self.counts,
+        )  # fmt: skip
+        return row, pixel, active
 
 
 def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
@@ -185,25 +241,24 @@ def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
 
 @dr.syntax
 def _accumulate(  # type: ignore[no-untyped-def]
-    total, pixel, pixels, p, lights, seen, count, steps, height, weight, counts
+    row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
 ):
-    row = dr.alloc_local(mi.Float, 3 * counts[0] if len(counts) == 1 else 1, value=mi.Float(0))
     m = mi.UInt32(0)
-    while m < count:
+    while active & (m < count):
         bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
         centre, a, b, c, power = _light(lights, m, p)
         if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
             power *= weight(centre)
             corners = [steps(a), steps(b), steps(c)]
             middles = [steps(dr.normalize(a + b)), steps(dr.normalize(b + c)), steps(dr.normalize(c + a))]
-            n = _cuts(corners, middles)
+            n = cuts_of(corners, middles)
             power /= mi.Float(n * n)
             s = mi.UInt32(0)
             while s < n * n:
-                orders = _orders(corners, _means(middles), counts)
+                found = orders(corners, means(middles), counts)
                 if n > 1:
-                    orders = _orders_of_piece(_piece(a, b, c, n, s), steps, counts)
-                _add_piece(total, row, pixel, power, orders, counts)
+                    found = orders_of_piece(piece(a, b, c, n, s), steps, counts)
+                _add_piece(row, part, power, found, counts)
                 s += 1
         m += 1
     return row
@@ -222,7 +277,7 @@ def _light(lights: dict[str, Any], m: Any, p: Any) -> tuple[Any, ...]:
     to = centre - here
     facing, is_point = dr.dot(across, to) < 0, dr.all(a == b)
     a, b, c, centre = [dr.select(near, dr.normalize(v - here), v) for v in (a, b, c, centre)]
-    share = dr.select(facing, _solid_angle(a, b, c), 0.0)
+    share = dr.select(facing, solid_angle(a, b, c), 0.0)
     if "cone" in lights:
         angle = dr.acos(dr.clip(-dr.dot(centre, dr.gather(mi.Vector3f, lights["axes"], m)), -1, 1))
         outer, width = [dr.gather(mi.Float, one, m) for one in lights["cone"]]
@@ -232,110 +287,109 @@ def _light(lights: dict[str, Any], m: Any, p: Any) -> tuple[Any, ...]:
 
 
 @dr.syntax
-def _write(total, row, pixel, pixels, count):  # type: ignore[no-untyped-def]
-    """Write each thread's row once."""
-    j = mi.UInt32(0)
-    while j < 3 * count:
-        dr.scatter(total, row[j], j * pixels + pixel)
-        j += 1
-
-
-@dr.syntax
-def _add_piece(total, row, pixel, power, orders, counts):  # type: ignore[no-untyped-def]
-    """Add a piece of a light to the bands, or pairs of bands, that it meets."""
-    low, middle, high = orders[0]
-    j = dr.minimum(mi.UInt32(low), counts[0] - 1)
-    below = mi.Float(0)
-    while (mi.Float(j) <= high) & (j < counts[0]):
-        up_to = share_below(mi.Float(j + 1), low, middle, high, dr)
-        share = up_to - below
+def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def]
+    """Add a piece of a light to the bands, or pairs of bands, that it meets; of the first curve those of a part."""
+    begin, end = part
+    low, high = orders[0][0], orders[0][2]
+    j = dr.maximum(dr.minimum(mi.UInt32(low), counts[0] - 1), begin)
+    below = share_below(mi.Float(j), orders[0], dr)
+    while (mi.Float(j) <= high) & (j < end):
+        up_to = share_below(mi.Float(j + 1), orders[0], dr)
+        share = power * (up_to - below)
         below = up_to
         if dr.hint(len(counts) == 1, mode="scalar"):
-            row[3 * j] += power[0] * share
-            row[3 * j + 1] += power[1] * share
-            row[3 * j + 2] += power[2] * share
+            _add(row, 3 * (j - begin), share)
         else:
-            low_2, middle_2, high_2 = orders[1]
+            low_2, high_2 = orders[1][0], orders[1][2]
             k = dr.minimum(mi.UInt32(low_2), counts[1] - 1)
             under = mi.Float(0)
             while (mi.Float(k) <= high_2) & (k < counts[1]):
-                over = share_below(mi.Float(k + 1), low_2, middle_2, high_2, dr)
-                at = ((pixel * counts[0] + j) * counts[1] + k) * 3
-                _add(total, at, power * (share * (over - under)))
+                over = share_below(mi.Float(k + 1), orders[1], dr)
+                _add(row, 3 * ((j - begin) * counts[1] + k), share * (over - under))
                 under = over
                 k += 1
         j += 1
 
 
-def _means(middles: list[list[Any]]) -> list[Any]:
-    """Mean angles over a triangle, by curve: exact for angles that are quadratic in it."""
-    return [(a + b + c) / 3 for a, b, c in zip(*middles, strict=True)]
-
-
-def _orders_of_piece(piece: list[Any], steps: Any, counts: list[int]) -> list[Any]:
-    """`_orders` of a piece; for the mean the centre counts 3/4 (Simpson's rule on a triangle)."""
-    centre, corners = steps(dr.normalize(piece[0] + piece[1] + piece[2])), list(map(steps, piece))
-    means = [0.75 * at + (a + b + c) / 12 for at, a, b, c in zip(centre, *corners, strict=True)]
-    return _orders(corners, means, counts)
-
-
-def _orders(corners: list[Any], means: list[Any], counts: list[int]) -> list[Any]:
-    """The angles at a piece's corners in order, by curve, moved so that their mean is that of the whole piece.
-
-    Angles are convex along most edges: without the correction they would be too large in the mean, and highlights too
-    dark.
-    """
-    found = []
-    for at, mean, end in zip(zip(*corners, strict=True), means, counts, strict=True):
-        shift = mean - (at[0] + at[1] + at[2]) / 3
-        a, b, c = (dr.clip(angle + shift, 0.0, dr.maximum(angle, end)) for angle in at)
-        found.append(in_order(a, b, c, dr))
-    return found
-
-
-def _in_bands(angle: Any, count: int) -> Any:
-    """An angle in bands; the end of the last band where rounding puts 90 degrees beyond it."""
-    step = angle * (count / END_RAD)
-    return dr.select(step < count * (1 + 1e-5), dr.minimum(step, count), step)
-
-
-def _add(total: Any, at: Any, value: Any) -> None:
+def _add(row: Any, at: Any, value: Any) -> None:
     for c in range(3):
-        dr.scatter_add(total, value[c], at + c, mode=dr.ReduceMode.NoConflicts)
+        row[at + c] += value[c]
 
 
-def _cuts(corners: list[Any], middles: list[Any]) -> Any:
-    """Cuts of an edge after which the angles are nearly linear in each piece: their error falls with the square.
-
-    Two angles that vary together in a piece are counted as if they did not (4.15), so one must vary little.
-    """
-    cuts = mi.Float(1)
-    for at, between in zip(zip(*corners, strict=True), zip(*middles, strict=True), strict=True):
-        bends = [dr.abs(m - (x + y) / 2) for m, x, y in zip(between, at, (*at[1:], at[0]), strict=True)]
-        least = dr.minimum(dr.minimum(*at[:2]), at[2])
-        allowed = dr.clip(least * BEND_BY_ANGLE, BEND, MOST_BEND)
-        cuts = dr.maximum(cuts, dr.sqrt(dr.maximum(dr.maximum(*bends[:2]), bends[2]) / allowed))
-    if len(corners[0]) == 2:
-        spans = (high - low for low, _, high in (in_order(x, y, z, dr) for x, y, z in zip(*corners, strict=True)))
-        cuts = dr.maximum(cuts, dr.minimum(*spans) / WIDEST)
-    return dr.clip(mi.UInt32(dr.ceil(cuts)), 1, MOST_CUTS)
+@dr.syntax
+def _write(total, row, pixel, pixels, active, count):  # type: ignore[no-untyped-def]
+    """Write each thread's row once."""
+    j = mi.UInt32(0)
+    while j < 3 * count:
+        dr.scatter(total, row[j], j * pixels + pixel, active)
+        j += 1
 
 
-def _piece(a: Any, b: Any, c: Any, n: Any, s: Any) -> list[Any]:
-    """Corners, unit, of piece s of the n^2 equal pieces of a flat triangle, counted in rows from a."""
-    row = mi.UInt32(dr.sqrt(mi.Float(s) + 0.5))
-    k = s - row * row
-    j, turned = k // 2, k % 2 == 1
-    u, v = (b - a) / mi.Float(n), (c - b) / mi.Float(n)
+@dr.syntax
+def _merge(row, active, share, second, size):  # type: ignore[no-untyped-def]
+    """Add each band's small entries to the last large one before them, or to the first."""
+    begin = mi.UInt32(0)
+    while active & (begin < size):
+        light, k = mi.Float(0), mi.UInt32(0)
+        while k < second:
+            light += _sum(row, begin + k)
+            k += 1
+        least, to, k = share * light, mi.UInt32(0xFFFFFFFF), mi.UInt32(0)
+        before = mi.Vector3f(0)
+        while (k < second) & (light > 0):
+            at = begin + k
+            if _sum(row, at) >= least:
+                to = mi.UInt32(at)
+                _add(row, 3 * at, before)
+                before = mi.Vector3f(0)
+            else:
+                value = mi.Vector3f(row[3 * at], row[3 * at + 1], row[3 * at + 2])
+                if to == 0xFFFFFFFF:
+                    before += value
+                else:
+                    _add(row, 3 * to, value)
+                _add(row, 3 * at, -value)
+            k += 1
+        begin += second
 
-    def at(i: Any, k: Any) -> Any:
-        return dr.normalize(a + u * mi.Float(i) + v * mi.Float(k))
 
-    second, third = at(row + 1, j), at(row + 1, j + 1)
-    return [at(row, j), dr.select(turned, third, second), dr.select(turned, at(row, j + 1), third)]
+def _sum(row: Any, at: Any) -> Any:
+    return row[3 * at] + row[3 * at + 1] + row[3 * at + 2]
 
 
-def _solid_angle(a: Any, b: Any, c: Any) -> Any:
-    """Of unit directions (van Oosterom and Strackee 1983, eq. 8)."""
-    volume = dr.abs(dr.dot(a, dr.cross(b, c)))
-    return 2 * dr.atan2(volume, 1 + dr.dot(a, b) + dr.dot(b, c) + dr.dot(c, a))
+@dr.syntax
+def _pack(places, counts, last, row, pixel, active, scale, first, size):  # type: ignore[no-untyped-def]
+    """Write those pairs of each thread that are not black at the beginning of its `size` places."""
+    code, found = mi.UInt32(0), mi.UInt32(0)
+    before = dr.gather(mi.UInt32, last, pixel, active)
+    while active & (code < size):
+        rgb = [dr.clip(row[3 * code + c] * scale[c], 0, LARGEST) for c in range(3)]
+        bits = packed(tuple(rgb), _bits, _floats, mi.UInt32, dr)
+        step = first + code - before
+        kept = ((bits & ONES) > 0) | (step == LONGEST)
+        at = pixel * size + found
+        dr.scatter(places[0], type(places[0])(step), at, kept)
+        dr.scatter(places[1], bits, at, kept)
+        found += dr.select(kept, 1, 0)
+        before = dr.select(kept, first + code, before)
+        code += 1
+    dr.scatter(counts, found, pixel, active)
+    dr.scatter(last, before, pixel, active)
+
+
+def _bits(value: Any) -> Any:
+    return dr.reinterpret_array(mi.UInt32, value)
+
+
+def _floats(bits: Any) -> Any:
+    return dr.reinterpret_array(mi.Float, bits)
+
+
+@dr.syntax
+def _move(to, places, pixel, count, begin, size):  # type: ignore[no-untyped-def]
+    """Bring what each thread has at its places together, from `begin`."""
+    i = mi.UInt32(0)
+    while i < count:
+        for k in range(2):
+            dr.scatter(to[k], dr.gather(type(places[k]), places[k], pixel * size + i), begin + i)
+        i += 1

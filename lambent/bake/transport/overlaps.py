@@ -10,21 +10,24 @@ from typing import Any
 LEAST = 1e-12  # of the difference of two corners: the area below such an edge is all or nothing
 
 
-def in_order(a: Any, b: Any, c: Any, ops: Any) -> tuple[Any, Any, Any]:
-    """The smallest, the middle and the largest."""
+Spread = tuple[Any, Any, Any, Any, Any]
+
+
+def spread(a: Any, b: Any, c: Any, ops: Any) -> Spread:
+    """The values at the corners in order, and shares of the area by square of the distance from first and last."""
     low, high = ops.minimum(ops.minimum(a, b), c), ops.maximum(ops.maximum(a, b), c)
     middle = ops.maximum(ops.minimum(a, b), ops.minimum(ops.maximum(a, b), c))
-    return low, middle, high
+    width = ops.maximum(high - low, LEAST)
+    below, above = (width * ops.maximum(difference, LEAST) for difference in (middle - low, high - middle))
+    return low, middle, high, 1 / below, 1 / above
 
 
-def share_below(y: Any, low: Any, middle: Any, high: Any, ops: Any) -> Any:
-    """Share of a triangle's area where a linear function with these values at its corners, in order, is below y (4.10).
+def share_below(y: Any, of: Spread, ops: Any) -> Any:
+    """Share of a triangle's area where a linear function with this spread is below y (4.10).
 
     All of it where all corners are at y.
     """
+    low, middle, high, from_low, from_high = of
     rise, fall = y - low, high - y
-    width = ops.maximum(high - low, LEAST)
-    lower = rise * rise / (width * ops.maximum(middle - low, LEAST))
-    upper = 1 - fall * fall / (width * ops.maximum(high - middle, LEAST))
-    inside = ops.select(y < middle, lower, upper)
+    inside = ops.select(y < middle, rise * rise * from_low, 1 - fall * fall * from_high)
     return ops.select(y >= high, 1.0, ops.select(y <= low, 0.0, inside))

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from lambent.core.wavelets import transformed
 from lambent.scenes.triangle_lights import TriangleLights
 
-LEAST = 2.0**-23  # of the scale: a sum of three colours that is less is next to nothing even in half floats
 STEPS = 256  # parts of the scale that half floats have left above 1: quotients are larger than 1 at grazing angles
 HALF_MAX = float(np.finfo(np.float16).max)
 
@@ -21,9 +20,4 @@ def scale_of(lights: TriangleLights) -> float:
 
 def wavelet_rows(bands: NDArray[np.float32], scale: float) -> NDArray[np.float16]:
     """(J, 3, P) half floats, wavelets, of transport (J, 3, P) by bands."""
-    return halves(transformed(bands) / np.float32(scale))
-
-
-def halves(values: NDArray[np.float32]) -> NDArray[np.float16]:
-    """Half floats, as near as they come."""
-    return np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16)
+    return np.asarray(np.clip(transformed(bands) / np.float32(scale), -HALF_MAX, HALF_MAX), np.float16)

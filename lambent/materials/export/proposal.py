@@ -8,19 +8,26 @@ from lambent.core.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Subject
+from lambent.materials.measured.retro import retro
 
 _WIDTHS = (0.004, 0.02, 0.08, 0.3)  # of the lobes of the proposal for a table
+_MOST_TUPLES = 100_000  # of a table, that tell whether it is retro-reflective
 _ASKED_DEG, _TURN_DEG = (1.0, 20.0, 45.0, 70.0), 45.0  # theta at which light from behind is looked for, steps of phi
 
 
 def proposal_of(subject: Subject) -> MaterialBSDF:
-    """A material itself; for a table, a material with lobes of every width a measured one can have."""
+    """A material itself; for a table, a material with lobes of every width a measured one can have.
+
+    A table that is retro-reflective gets them about the light, too.
+    """
     if isinstance(subject, Material):
         return MaterialBSDF(subject)
     white, part = (1.0, 1.0, 1.0), (1 / len(_WIDTHS),) * 3
     lobes = [Lobe(distribution="ggx", mx=m, my=m, r0=white, k=part) for m in _WIDTHS]
+    if retro(subject, subject.samples(_MOST_TUPLES))[0] > 1:
+        lobes += [lobe.of_kind("retro") for lobe in lobes]
     if subject.info.transmits:
-        lobes += [lobe.model_copy(update={"side": "transmission", "r0": BLACK}) for lobe in lobes]
+        lobes += [lobe.model_copy(update={"side": "transmission", "r0": BLACK}) for lobe in lobes if lobe.mirrors]
     quarter = (0.25, 0.25, 0.25)
     return MaterialBSDF(Material(kd=quarter, kt_d=quarter if subject.info.transmits else BLACK, lobes=tuple(lobes)))
 

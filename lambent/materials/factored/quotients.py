@@ -151,3 +151,6 @@ def _fifth_power(cosine: Any, ops: Any) -> Any:
     m = ops.maximum(1 - cosine, 0.0)
     m2 = m * m
     return m2 * m2 * m
+
+
+DIFFUSE = (One, CoupledDiffuse, AshikhminDiffuse, OrenNayarPart)  # those of light from below the surface

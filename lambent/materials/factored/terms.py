@@ -19,6 +19,7 @@ from lambent.materials.bsdf import components
 from lambent.materials.document import Kind
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.quotients import DIFFUSE
 from lambent.materials.lobes import NUMPY, Vector
 
 MOST_CURVES = 2  # besides f_o that one term may have
@@ -62,6 +63,18 @@ class Term:
         """Names of its curves, each once."""
         names = [factor.curve for factor in self.factors] + ([self.viewer] if self.viewer else [])
         return tuple(dict.fromkeys(names))
+
+    @property
+    def is_diffuse(self) -> bool:
+        """Whether the texture of the diffuse colour multiplies it, not that of highlights.
+
+        Curves over angles other than theta_i and theta_o know a highlight or Fresnel's factor. A term without `factors`
+        has the shape of its quotient: light from below the surface for one of `quotients.DIFFUSE`, so that a constant
+        is Lambertian; any other quotient is a highlight that cannot be edited.
+        """
+        if not self.factors:
+            return isinstance(self.quotient, DIFFUSE)
+        return all(factor.over in ("theta_i", "theta_o") for factor in self.factors)
 
     @property
     def fixed(self) -> str:

@@ -124,7 +124,11 @@ class GonioTable(MeasuredTable):
         return TableInfo(file, self.format, isotropic, transmits, channels, self.stored, sizes, self.notes)
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
-        """f (..., C) in 1/sr; a pair seen from below is the same pair seen from above (a two-sided sheet)."""
+        """f (..., C) in 1/sr; a pair seen from below is the same pair seen from above (a two-sided sheet).
+
+        Readings below zero are interpolated as they are, so that they cancel the noise above it; what is left of them
+        becomes 0.
+        """
         return on_flat_pairs(self._eval, wi, wo)
 
     def _eval(self, wi: Floats, wo: Floats) -> Floats:
@@ -133,7 +137,7 @@ class GonioTable(MeasuredTable):
         for sheets, side in ((self.reflected, product > 0), (self.transmitted, product < 0)):
             if sheets and side.any():
                 f[side] = self._eval_side(sheets, *self._reduced(raised(wi[side]), raised(wo[side])))
-        return f
+        return np.maximum(f, 0)
 
     def _reduced(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats]:
         """The pair, turned or mirrored to the table's range of incident directions."""

@@ -228,7 +228,7 @@ def collect(
     grazing = (np.abs(wi[:, 2]) < _COS_GRAZING) | (np.abs(wo[:, 2]) < _COS_GRAZING)
     used = np.ones(len(f), dtype=bool)
     counts = []
-    for reason in (shadowed, ~finite | _too_negative(f, wo, ~shadowed & finite), grazing):
+    for reason in (shadowed, ~finite | too_negative(f, wo, ~shadowed & finite), grazing):
         counts.append(int((used & reason).sum()))
         used &= ~reason
     left_out = LeftOut(*counts)
@@ -240,7 +240,7 @@ def collect(
     return MeasuredSamples(wi[chosen], wo[chosen], f[chosen], weight[chosen], left_out, info)
 
 
-def _too_negative(f: Floats, wo: Floats, measured: Flags) -> Flags:
+def too_negative(f: Floats, wo: Floats, measured: Flags) -> Flags:
     """(N,) whether f cos theta_o is further below zero than any measured one is above it: a mark, not noise."""
     p = np.where(measured[:, None], f, 0) * np.abs(wo[:, 2:])
     return np.asarray(p.min(axis=1) < -p.max(initial=0))

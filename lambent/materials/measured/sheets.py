@@ -15,6 +15,7 @@ import numpy as np
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import HALF_TURN, angles, direction
 from lambent.core.sequences import r2
+from lambent.materials.measured.protocol import too_negative
 from lambent.materials.measured.table import bracket, fill_holes, sensible
 
 LookUp = Callable[[Floats], Floats]
@@ -68,14 +69,14 @@ class Sheet:
 
     @cached_property
     def _whole(self) -> Floats:
-        """(T, P + 1, C) without holes or negative values, the first column repeated at the end."""
+        """(T, P + 1, C) without holes, the first column repeated at the end."""
         f = self.values.reshape(self.f.shape)
-        usable = sensible(f)
-        filled = np.maximum(fill_holes(f, usable, periodic_axis=1), 0) if usable.any() else np.zeros_like(f)
+        usable = _usable(self.values, self.directions).reshape(f.shape[:2])
+        filled = fill_holes(f, usable, periodic_axis=1) if usable.any() else np.zeros_like(f)
         return np.concatenate([filled, filled[:, :1]], axis=1)
 
     def at(self, w: Floats, *, about_light: bool = False) -> Floats:
-        """f (N, C) of directions (N, 3), bilinear; beyond the grid's theta, that of its last ring."""
+        """f (N, C) of directions (N, 3), bilinear, negative as read; beyond the grid's theta, that of its last ring."""
         theta, phi = angles(w if self.frame is None else w @ self.frame.T)
         t, t1, u = bracket(self.theta_deg, np.degrees(theta))
         turn = np.append(self.phi_deg, self.phi_deg[0] + 360)
@@ -139,8 +140,8 @@ class ScatteredSheet:
         return self._lookup_about(self.specular * HALF_TURN)
 
     def _lookup_about(self, frame: Floats) -> LookUp:
-        usable = sensible(self.values)
-        w, f = self.directions[usable], np.maximum(self.values[usable], 0)
+        usable = _usable(self.values, self.directions)
+        w, f = self.directions[usable], self.values[usable]
         if len(w) == 0:
             return lambda asked: np.zeros((len(asked), f.shape[1]))
         if np.abs(w @ self.specular[1]).max() < _IN_PLANE:
@@ -148,7 +149,7 @@ class ScatteredSheet:
         return _triangulated(w, f)
 
     def at(self, w: Floats, *, about_light: bool = False) -> Floats:
-        """f (N, C) of directions (N, 3).
+        """f (N, C) of directions (N, 3), negative as read.
 
         A scan in the plane of incidence is looked up by the angle from the mirror direction, or from the light; the
         lobe is taken as turned about it from one half of the plane to the other. Other sets are interpolated linearly
@@ -167,6 +168,12 @@ class ScatteredSheet:
         share = share.clip(np.pi / count, max(_HEAVIEST * float(np.median(share)), 1e-6))
         aside = np.abs(self.directions @ self.specular[1]) > _IN_PLANE
         return share * np.where(aside & self.images.any(), 2.0, 1.0)
+
+
+def _usable(f: Floats, w: Floats) -> Flags:
+    """(N,) whether values (N, C) are readings: possible ones, and not marks below zero."""
+    possible = sensible(f)
+    return np.asarray(possible & ~too_negative(f, w, possible))
 
 
 def _plane_scan(w: Floats, f: Floats, frame: Floats) -> LookUp:

@@ -10,9 +10,11 @@ import pytest
 from lambent.core.directions import direction
 from lambent.core.errors import UserError
 from lambent.materials.measured import load
+from lambent.materials.measured.gonio import AnySheet, GonioTable
 from lambent.materials.measured.inspection import inspect_table
 from lambent.materials.measured.lbnl_xml import read as read_xml
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect, negative_readings
+from lambent.materials.measured.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.table import MARKS
 from tests.materials.measured.lbnl_files import lbnl_xml, words
@@ -147,3 +149,42 @@ def test_what_is_drawn_is_nowhere_negative(tmp_path: Path) -> None:
     wi, wo = (direction(np.arccos(rng.random(500)), 2 * np.pi * rng.random(500)) for _ in range(2))
     f = load(path).eval(wi, wo)
     assert (f >= 0).all() and f.max() > 0.05
+
+
+THETA_DEG, PHI_DEG = np.arange(0, 81, 10.0), np.arange(0, 360, 30.0)
+
+
+def sheets_of(f: np.ndarray) -> dict[str, AnySheet]:
+    """The readings f (T, P, 1) as a grid, as scattered directions, and one column of them as a scan in a plane."""
+    grid = Sheet(THETA_DEG, PHI_DEG, f)
+    once = np.r_[0, len(PHI_DEG) : f[..., 0].size]
+    scan = once[once % len(PHI_DEG) == 0]
+    images = np.zeros(len(once), bool)
+    return {
+        "grid": grid,
+        "scattered": ScatteredSheet(grid.directions[once], grid.values[once], np.eye(3), images),
+        "scan": ScatteredSheet(grid.directions[scan], grid.values[scan], np.eye(3), images[: len(scan)]),
+    }
+
+
+def gonio(sheet: AnySheet) -> GonioTable:
+    return GonioTable("dark", np.zeros(1), np.zeros(1), ((sheet,),), reconstruction="quadrilinear")
+
+
+@pytest.mark.parametrize("kind", ["grid", "scattered", "scan"])
+def test_gonio_readings_below_zero_cancel_those_above(kind: str) -> None:
+    """Half-way between readings of .03 and -.01 f is .01; clamped at the readings it would be .015."""
+    f = np.where(np.arange(len(THETA_DEG))[:, None, None] % 2, -0.01, 0.03) * np.ones((1, len(PHI_DEG), 1))
+    table = gonio(sheets_of(f)[kind])
+    theta = np.radians(np.array([25.0, 45.0, 30.0, 40.0]))
+    found = table.eval(np.broadcast_to([0.0, 0.0, 1.0], (4, 3)), direction(theta, 0 * theta))
+    np.testing.assert_allclose(found[:, 0], [0.01, 0.01, 0.0, 0.03], atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["grid", "scattered", "scan"])
+def test_a_mark_below_zero_darkens_no_gonio_reading_beside_it(kind: str) -> None:
+    f = np.full((len(THETA_DEG), len(PHI_DEG), 1), 0.2)
+    f[3, 0] = -32768
+    theta = np.radians(np.array([25.0, 29.0, 33.0]))
+    found = gonio(sheets_of(f)[kind]).eval(np.broadcast_to([0.0, 0.0, 1.0], (3, 3)), direction(theta, 0 * theta))
+    np.testing.assert_allclose(found, 0.2, rtol=1e-6)

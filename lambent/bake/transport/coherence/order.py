@@ -14,6 +14,7 @@ from lambent.core.arrays import Indices
 
 SPACING = 16  # pixels of the coarsest grid
 OUTSIDE = -1
+STRAIGHT, DIAGONAL = ((-1, 0), (0, -1), (0, 1), (1, 0)), ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
 @dataclass(frozen=True)
@@ -41,16 +42,21 @@ def grid(width: int, height: int) -> Iterator[Pass]:
     step = SPACING // 2
     while step:
         r, c = row % (2 * step), column % (2 * step)
-        diagonal = ((-step, -step), (-step, step), (step, -step), (step, step))
-        yield _pass(np.flatnonzero((r == step) & (c == step)), diagonal, width, height)
-        straight = ((-step, 0), (0, -step), (0, step), (step, 0))
+        yield _pass(np.flatnonzero((r == step) & (c == step)), DIAGONAL, width, height, step)
         sides = np.flatnonzero(((r == 0) & (c == step)) | ((r == step) & (c == 0)))
-        yield _pass(sides, straight, width, height, finest=step == 1)
+        yield _pass(sides, STRAIGHT, width, height, step, finest=step == 1)
         step //= 2
 
 
-def _pass(pixels: Indices, offsets: tuple[tuple[int, int], ...], width: int, height: int, finest: bool = False) -> Pass:
-    shift = np.array(offsets, np.int64).reshape(-1, 2)
+def side_by_side(width: int, height: int) -> Pass:
+    """All pixels, with those that share a side with each of them."""
+    return _pass(np.arange(width * height), STRAIGHT, width, height)
+
+
+def _pass(
+    pixels: Indices, offsets: tuple[tuple[int, int], ...], width: int, height: int, step: int = 1, finest: bool = False
+) -> Pass:
+    shift = step * np.array(offsets, np.int64).reshape(-1, 2)
     row, column = pixels[:, None] // width + shift[:, 0], pixels[:, None] % width + shift[:, 1]
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
     return Pass(pixels, np.where(inside, row * width + column, OUTSIDE), finest)

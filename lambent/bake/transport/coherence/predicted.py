@@ -2,6 +2,10 @@
 
 Ben-Artzi 2007, chapter 8 (Ben-Artzi, Ramamoorthi and Agrawala 2006). It traces few rays, but a ray of a modern tracer
 costs less than a prediction (docs/performance.md): `bands.visibility` traces all of them. Lights are at infinity.
+
+The last sweep is not of the thesis. A sliver of light between two shadows, narrower than the coarse grid, lies between
+pixels that all tell of a blocker; a finer pixel that is doubted for another reason finds a part of it, and the pixels
+around that part were predicted dark before. The sweep goes on from the part to the whole.
 """
 
 from __future__ import annotations
@@ -11,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from lambent.bake.tiles import slices
 from lambent.bake.transport.coherence.light_cells import neighbours
-from lambent.bake.transport.coherence.order import OUTSIDE, Pass, grid, scanline
+from lambent.bake.transport.coherence.order import OUTSIDE, Pass, grid, scanline, side_by_side
 from lambent.bake.transport.coherence.shadow_rays import ShadowRays
-from lambent.bake.transport.coherence.votes import Same, Votes, Warped
+from lambent.bake.transport.coherence.votes import AT_ONCE, Same, Votes, Warped
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.core.arrays import Flags, Floats, Indices
 
@@ -34,7 +39,8 @@ class Variant:
     boundary : bool
         What is traced first: lights next to one of other visibility, or those on which informing pixels disagree.
     sparing : bool
-        Whether tracing spreads only to neighbours predicted otherwise, and not at all on the finest grid.
+        Whether tracing spreads only to neighbours predicted otherwise, and not at all on the finest grid. A last sweep
+        then traces predictions that a pixel beside contradicts.
     """
 
     grid: bool
@@ -90,13 +96,15 @@ def predicted_visibility(
     run = _Run(scene, points, directions, width * height, variant)
     for step in grid(width, height) if variant.grid else scanline(width, height):
         run.evaluate(step)
+    if variant.sparing:
+        run.sweep(side_by_side(width, height))
     return Predicted(run.seen, run.rays.facing, run.rays.count, run.rays.seconds)
 
 
 class _Run:
     def __init__(self, scene: Any, points: ViewPoints, directions: Floats, pixels: int, variant: Variant) -> None:
         self.rays = ShadowRays(scene, points, directions)
-        self.seen = np.zeros(self.rays.facing.shape, bool)
+        self.seen, self._traced = np.zeros((2, *self.rays.facing.shape), bool)
         self._variant, self._object, self._neighbours = variant, points.object, neighbours(directions)
         self._point = np.full(pixels + 1, OUTSIDE)  # the last one is of pixels outside the picture
         self._point[points.pixel] = np.arange(len(points))
@@ -104,16 +112,49 @@ class _Run:
 
     def evaluate(self, step: Pass) -> None:
         """Find the visibility of the pixels of a pass."""
-        point, informers = self._point[step.pixels], self._point[step.informers]
-        shown = point != OUTSIDE
-        point, informers = point[shown], informers[shown]
-        alike = (step.informers[shown] == OUTSIDE) | (
-            (informers != OUTSIDE) & (self._object[informers] == self._object[point][:, None])
-        )
+        shown = self._point[step.pixels] != OUTSIDE
+        point, informers = self._point[step.pixels[shown]], self._point[step.informers[shown]]
+        alike = (step.informers[shown] == OUTSIDE) | self._on_one_object(point, informers)
         informed = alike.all(axis=1) & ((informers != OUTSIDE).sum(axis=1) >= FEWEST_INFORMERS)
         self._trace_all(point[~informed])
         if informed.any():
             self._predict(point[informed], informers[informed], floods=not (self._variant.sparing and step.finest))
+
+    def sweep(self, step: Pass) -> None:
+        """Trace what a pixel beside contradicts, and on from each light that is not as predicted to the pixels beside.
+
+        Pixels of `step` are all pixels, each informed by those beside it.
+        """
+        shown = self._point[step.pixels] != OUTSIDE
+        point, informers = self._point[step.pixels[shown]], self._point[step.informers[shown]]
+        beside = np.full((len(self.seen), informers.shape[1]), OUTSIDE)
+        beside[point] = np.where(self._on_one_object(point, informers), informers, OUTSIDE)
+        every = [self._contradicted(beside, some) for some in slices(len(beside), AT_ONCE)]
+        row, light = (np.concatenate(found) for found in zip(*every, strict=True))
+        while len(row):
+            predicted = self.seen[row, light]
+            wrong = self._trace(row, light) != predicted
+            others, lights = beside[row[wrong]], light[wrong][:, None]
+            at, k = np.nonzero(
+                (others != OUTSIDE)
+                & self.rays.facing[others, lights]
+                & ~self._traced[others, lights]
+                & (self.seen[others, lights] == predicted[wrong][:, None])
+            )
+            keys = np.unique(others[at, k] * self.seen.shape[1] + lights[at, 0])
+            row, light = np.divmod(keys, self.seen.shape[1])
+
+    def _contradicted(self, beside: Indices, some: slice) -> tuple[Indices, Indices]:
+        """Points and lights, predicted alone, that a point beside sees otherwise."""
+        found = np.zeros_like(self.seen[some])
+        for other in beside[some].T:
+            tells = self.rays.facing[other] & (other != OUTSIDE)[:, None]
+            found |= tells & (self.seen[other] != self.seen[some])
+        row, light = np.nonzero(found & self.rays.facing[some] & ~self._traced[some])
+        return row + some.start, light
+
+    def _on_one_object(self, point: Indices, informers: Indices) -> Flags:
+        return np.asarray((informers != OUTSIDE) & (self._object[informers] == self._object[point][:, None]))
 
     def _trace_all(self, point: Indices) -> None:
         row, light = np.nonzero(self.rays.facing[point])
@@ -126,7 +167,7 @@ class _Run:
             self._votes.keep(point[blocked], light[blocked], place[blocked])
         else:
             blocked = self.rays.blocked(point, light)
-        self.seen[point, light] = ~blocked
+        self.seen[point, light], self._traced[point, light] = ~blocked, True
         return ~blocked
 
     def _predict(self, point: Indices, informers: Indices, floods: bool) -> None:

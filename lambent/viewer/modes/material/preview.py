@@ -80,7 +80,7 @@ class Preview:
                 raise UserError("not a lat-long picture", file=self.files[name], got=got, expected="2:1")
             cube = from_lat_long(picture[..., :3])
         cube = np.maximum(np.nan_to_num(cube, posinf=0.0, neginf=0.0), 0)
-        mean = float((luminance(cube) * texel_solid_angles(cube.shape[1])).sum() / (4 * np.pi))
+        mean = _mean_radiance(cube)
         if mean <= 0:
             raise UserError("the environment is black", file=self.files.get(name))
         return np.asarray(cube * (MEAN_RADIANCE / mean), np.float32)
@@ -93,5 +93,9 @@ def with_lamp(cube: Floats) -> Floats:
     edge = 2 / cube.shape[1]  # a texel's angle: the rim is as soft as the cube is coarse
     away = np.arccos(np.clip(w @ normalize(np.array(LAMP_TOWARDS)), -1, 1))
     inside = np.clip((np.radians(LAMP_RADIUS_DEG) - away) / edge + 0.5, 0, 1)[..., None]
-    radiance = LAMP_SHARE * 4 * np.pi * MEAN_RADIANCE / (2 * np.pi * (1 - cosine))
+    radiance = LAMP_SHARE * 4 * np.pi * _mean_radiance(cube) / (2 * np.pi * (1 - cosine))
     return np.asarray(cube + inside * (radiance - cube), np.float32)
+
+
+def _mean_radiance(cube: Floats) -> float:
+    return float((luminance(cube) * texel_solid_angles(cube.shape[1])).sum() / (4 * np.pi))

@@ -1,0 +1,120 @@
+"""What an edited picture is drawn on: terms, pixel by pixel, added to what is not edited.
+
+`HostCanvas` is in memory and the truth. `lambent.realtime.edited` has the same on a GPU; the window joins them
+(`lambent.viewer.edited`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats, Image, Indices
+from lambent.editing.products import Halves, HostProducts, Pixels, Products
+from lambent.editing.rows import PairTransport
+from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
+
+
+class Layer(Protocol):
+    """One term of one material: products of its transport, and what multiplies them."""
+
+    def hold(self, transport: Halves) -> Products:
+        """Take transport (J, 3, P) float16; the layer shows its products from now on."""
+
+    def fold(self, pairs: PairTransport, idle: int, means: Floats) -> tuple[Products, float]:
+        """Take transport with curve `idle` folded in (`PairTransport.fold`); products, and radiance of a value of 1."""
+
+    def view(self, curve: Curve | None) -> None:
+        """Multiply by the curve of the viewer's angle."""
+
+
+class Canvas(Protocol):
+    """The picture (H, W) of all layers."""
+
+    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> Layer:
+        """A new layer over pixels (P,), with the viewer's angle (P,) and a texture (P, 3) or none."""
+
+    def clear(self, pixel: Indices) -> None:
+        """Nothing but layers shows at these pixels."""
+
+    def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
+        """Draw the sum of layers, each with its scale (3,)."""
+
+    def image(self) -> Image:
+        """(H, W, 3) float32, linear radiance, as last composed."""
+
+
+class HostLayer:
+    """`Layer` in memory."""
+
+    products: HostProducts
+
+    def __init__(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> None:
+        self.pixel = pixel
+        self._texture = np.ascontiguousarray(np.ones((3, 1)) if texture is None else texture.T, np.float32)
+        self._theta_o = np.asarray(theta_o, np.float32)
+        self.multiplier = self._texture
+
+    def hold(self, transport: Halves) -> Products:
+        self.products = HostProducts(transport)
+        return self.products
+
+    def fold(self, pairs: PairTransport, idle: int, means: Floats) -> tuple[Products, float]:
+        rows = pairs.fold(idle, means)
+        return self.hold(rows.values), rows.unit
+
+    def view(self, curve: Curve | None) -> None:
+        self.multiplier = self._texture if curve is None else _viewed(self._texture, self._theta_o, curve)
+
+
+class HostCanvas:
+    """`Canvas` in memory; `background` (H, W, 3) is what is not edited."""
+
+    def __init__(self, background: Image) -> None:
+        self._background = np.array(background, np.float32)
+        self._image = self._background.copy()
+
+    def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> HostLayer:
+        return HostLayer(pixel, theta_o, texture)
+
+    def clear(self, pixel: Indices) -> None:
+        self._background.reshape(-1, 3)[pixel] = 0
+
+    def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
+        self._image = self._background.copy()
+        for layer, scale in shown:
+            assert isinstance(layer, HostLayer)
+            _compose(self._image.reshape(-1, 3), layer.pixel, layer.products.picture, scale, layer.multiplier)
+
+    def image(self) -> Image:
+        return self._image
+
+
+def _viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
+    """(3, P): a texture (3, P), or (3, 1), times f_o(theta_o)."""
+    texture = np.ascontiguousarray(np.broadcast_to(texture, (3, len(theta_o))))
+    return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
+
+
+@numba.njit(parallel=True, cache=True)
+def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
+    out = np.empty_like(texture)
+    last = len(values) - 2
+    for p in numba.prange(len(step)):
+        k = min(max(int(step[p]), 0), last)
+        share = min(max(step[p] - k, np.float32(0)), np.float32(1))
+        for c in range(len(texture)):
+            out[c, p] = texture[c, p] * (values[k, c] + share * (values[k + 1, c] - values[k, c]))
+    return out
+
+
+@numba.njit(parallel=True, fastmath=True, cache=True)
+def _compose(image, pixel, picture, scale, multiplier):  # type: ignore[no-untyped-def]
+    step = 0 if multiplier.shape[1] == 1 else 1
+    for p in numba.prange(len(pixel)):
+        for c in range(3):
+            image[pixel[p], c] += scale[c] * multiplier[c, p * step] * picture[c, p]

@@ -1,0 +1,165 @@
+"""The curve editor: a material's curves, one of them on a plot to be pulled, its layers, colours and quantities."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from lambent.editing.operators import Region
+from lambent.editing.session import Session
+from lambent.materials.factored.parametrisations import PARAMETRISATIONS
+from lambent.materials.factored.terms import Editable
+from lambent.viewer.modes.edit.curves import layers, plot, quantities, toolbar
+from lambent.viewer.modes.edit.curves.axes import Axes
+from lambent.viewer.modes.edit.curves.state import CurveState, Shown
+from lambent.viewer.panels.widgets import AMBER, coloured, explain
+
+WIDE_PX, CONTROLS_PX = 680.0, 340.0  # wider than that, the controls stand left of the plot
+LEAST_PX, MOST_PX = 220.0, 420.0  # height of a plot in a column
+MOST_ROWS = 7
+HINTS = {
+    "translate": "Drag in the region: Shift keeps angles, Ctrl values. Drag beside it: a new region.",
+    "amplify": "Drag in the region to scale it about the base. Drag beside it: a new region.",
+    "draw": "Draw with the left button. Esc drops the stroke.",
+}
+
+
+class CurveEditor:
+    """Draws the curves of one material of a session, and edits the session.
+
+    A drag is one step of undo. Errors of an edit appear as a line, and nothing is raised.
+    """
+
+    def __init__(self) -> None:
+        self.state = CurveState()
+        self.axes: Axes | None = None  # where the plot was drawn last
+        self._outlined: Region | None = None
+
+    @property
+    def active_curve(self) -> str | None:
+        """Name of the curve that is being pulled or drawn at this moment."""
+        return self.state.active_curve
+
+    def curve(self, session: Session, material: str) -> str:
+        """Name of the curve on the plot."""
+        return self.state.curve(material, self.state.shown(session, material))
+
+    def choose(self, material: str, curve: str) -> None:
+        """Put a curve on the plot."""
+        self.state.chosen[material] = curve
+
+    def transported(self, session: Session, material: str) -> None:
+        """Tell that transport was made for the material as it is now."""
+        self.state.transported(session, material)
+
+    def draw(self, session: Session, material: str) -> None:
+        """Draw into the current window, as wide as there is room."""
+        state = self.state
+        if state.hold is not None and state.hold.material != material:
+            state.release(session)
+        if state.hold is None and not imgui.is_any_item_active():
+            state.strokes.end(session)
+        shown = state.shown(session, material)
+        name = state.curve(material, shown)
+        imgui.push_id(f"curves of {material}")
+        room = imgui.get_content_region_avail()
+        if room.x >= WIDE_PX:
+            imgui.begin_child("controls", (CONTROLS_PX, 0))
+            imgui.push_item_width(-88)
+            self._curves(shown, material, name)
+            self._controls(session, material, shown, name)
+            imgui.pop_item_width()
+            imgui.end_child()
+            imgui.same_line()
+            imgui.begin_child("plot", (0, 0))
+            self._plot(session, material, shown, name, imgui.get_content_region_avail().y)
+            imgui.end_child()
+        else:
+            self._curves(shown, material, name)
+            self._plot(session, material, shown, name, min(max(0.75 * room.x, LEAST_PX), MOST_PX) + 110)
+            self._controls(session, material, shown, name)
+        imgui.pop_id()
+
+    def _curves(self, shown: Shown, material: str, chosen: str) -> None:
+        """The list of curves, with their angles and the terms that they act in."""
+        editable, line = shown.editable, imgui.get_text_line_height_with_spacing()
+        rows = min(len(editable.curves), MOST_ROWS) + 1
+        flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_fixed_fit
+        if not imgui.begin_table("list", 3, flags, (0, rows * line + 6)):
+            return
+        imgui.table_setup_scroll_freeze(0, 1)
+        for heading in ("curve", "angle"):
+            imgui.table_setup_column(heading)
+        imgui.table_setup_column("in the terms", imgui.TableColumnFlags_.width_stretch)
+        imgui.table_headers_row()
+        for name in editable.curves:
+            over, terms = _role(editable, name)
+            edit = shown.edit(name)
+            star = " *" if edit.layers or edit.drawn is not None else ""
+            imgui.table_next_row()
+            imgui.table_next_column()
+            if imgui.selectable(f"{name}{star}##curve", name == chosen, imgui.SelectableFlags_.span_all_columns)[0]:
+                self.choose(material, name)
+            explain(f"{name}: {_meaning(over)}\nin {', '.join(terms)}" + ("\n* edited" if star else ""))
+            imgui.table_next_column()
+            imgui.text_disabled(_title(over))
+            imgui.table_next_column()
+            imgui.text_disabled(", ".join(terms))
+        imgui.end_table()
+
+    def _plot(self, session: Session, material: str, shown: Shown, name: str, height: float) -> None:
+        state, top = self.state, imgui.get_cursor_pos_y()
+        curve = shown.editable.curves[name]
+        view = state.view(material, name, curve)
+        toolbar.draw(state, view, curve.values, curve is not shown.original.curves[name])
+        below = 2 * imgui.get_text_line_height_with_spacing() + imgui.get_style().item_spacing.y
+        width = imgui.get_content_region_avail().x
+        left = max(height - (imgui.get_cursor_pos_y() - top) - below, 60.0)
+        over, _ = _role(shown.editable, name)
+        axes = plot.draw(state, session, material, shown, name, (width, left), _title(over), self._outlined)
+        self.axes = axes or self.axes
+        self._status()
+
+    def _status(self) -> None:
+        """Two lines below the plot: an error, what the drag does, or what the mouse can do."""
+        state = self.state
+        at, hold = imgui.get_cursor_pos_y(), state.hold
+        imgui.push_text_wrap_pos()
+        if state.strokes.message:
+            coloured(state.strokes.message, AMBER)
+        elif hold is not None and hold.layers:
+            imgui.text_unformatted(", ".join(layers.words(layer) for layer in hold.layers))
+        else:
+            imgui.text_disabled(HINTS[state.tool])
+        imgui.pop_text_wrap_pos()
+        rest = 2 * imgui.get_text_line_height_with_spacing() - (imgui.get_cursor_pos_y() - at)
+        if rest > imgui.get_style().item_spacing.y:
+            imgui.dummy((1, rest - imgui.get_style().item_spacing.y))
+
+    def _controls(self, session: Session, material: str, shown: Shown, name: str) -> None:
+        state = self.state
+        curve = shown.editable.curves[name]
+        imgui.separator_text("region")
+        toolbar.draw_region(state, state.view(material, name, curve), curve)
+        imgui.separator_text("layers")
+        self._outlined = layers.draw(state, session, material, shown, name)
+        imgui.separator_text("colours of the terms")
+        quantities.draw_tints(state, session, material, shown)
+        title = quantities.title(shown)
+        if title is not None:
+            imgui.separator_text(title)
+            quantities.draw_numbers(state, session, material, shown)
+
+
+def _role(editable: Editable, curve: str) -> tuple[str, list[str]]:
+    """The angle that a curve runs over (a key of `PARAMETRISATIONS`), and the names of the terms that it is in."""
+    terms = [term for term in editable.terms if curve in term.curves]
+    over = next((factor.over for term in terms for factor in term.factors if factor.curve == curve), "theta_o")
+    return over, [term.name for term in terms]
+
+
+def _title(over: str) -> str:
+    return PARAMETRISATIONS[over].title
+
+
+def _meaning(over: str) -> str:
+    return PARAMETRISATIONS[over].meaning

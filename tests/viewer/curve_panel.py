@@ -1,0 +1,115 @@
+"""Drives the curve editor without a window: real Dear ImGui and ImPlot frames, a mouse, keys and the wheel."""
+
+import time
+
+from imgui_bundle import imgui, implot
+
+from lambent.core.camera import Camera
+from lambent.editing.session import Session
+from lambent.viewer import layout
+from lambent.viewer.modes.edit.curves import CurveEditor
+from tests.viewer import panel_driver
+from tests.viewer.panel_driver import point_of, recording
+
+NARROW, WIDE = (370, 1100), (1100, 700)
+
+
+class Panel:
+    """The editor in a window of its own; `rects` are the controls by label."""
+
+    def __init__(self, monkeypatch, starts, material, size=NARROW):
+        camera = Camera(name="front", position=(0, 1, 3), target=(0, 1, 0))
+        self.session, self.material, self.size = Session.new("room", camera, starts), material, size
+        self.editor, self.rects, self.seconds = CurveEditor(), {}, []
+        self._context = imgui.create_context()
+        imgui.set_current_context(self._context)
+        self.io = imgui.get_io()
+        self.io.set_ini_filename("")
+        self.io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
+        self.io.display_size = size
+        self.io.config_input_trickle_event_queue = False
+        layout.set_style()
+        monkeypatch.setattr(panel_driver, "RECORDED", (*panel_driver.RECORDED, "drag_float"))
+        recording(monkeypatch.setattr, self.rects)
+        self.frame(2)
+
+    def close(self):
+        implot.destroy_context()
+        imgui.destroy_context(self._context)
+
+    def frame(self, count=1):
+        for _ in range(count):
+            self.rects.clear()
+            self.io.delta_time = 1 / 30
+            imgui.new_frame()
+            imgui.set_next_window_pos((0, 0))
+            imgui.set_next_window_size(self.size)
+            imgui.begin("window", None, layout.FIXED)
+            imgui.push_item_width(-layout.LABEL_PX)
+            begin = time.perf_counter()
+            self.editor.draw(self.session, self.material)
+            self.seconds.append(time.perf_counter() - begin)
+            imgui.pop_item_width()
+            imgui.end()
+            imgui.render()
+
+    def move(self, x, y):
+        self.io.add_mouse_pos_event(x, y)
+        self.frame()
+
+    def button(self, down, which=0):
+        self.io.add_mouse_button_event(which, down)
+        self.frame()
+
+    def click(self, label, along=0.5):
+        self.move(*point_of(self.rects[label], along))
+        self.button(True)
+        self.button(False)
+        self.io.add_mouse_pos_event(-1, -1)
+        self.frame(20)  # the next press is no double click
+
+    def pull(self, begin, *ends, which=0):
+        """Drag over the plot, in degrees and values of the axes as they are at first."""
+        axes = self.editor.axes
+        self.move(*axes.pixel(*begin))
+        self.button(True, which)
+        for end in ends:
+            self.move(*axes.pixel(*end))
+        self.button(False, which)
+        self.frame(20)
+
+    def slide(self, label, begin, end):
+        rect = self.rects[label]
+        self.move(*point_of(rect, begin))
+        self.button(True)
+        for share in (0.5, 1.0):
+            self.move(*point_of(rect, begin + share * (end - begin)))
+        self.button(False)
+        self.frame(20)
+
+    def key(self, key, down):
+        self.io.add_key_event(key, down)
+        self.frame()
+
+    def tap(self, key):
+        self.key(key, True)
+        self.key(key, False)
+
+    def undo(self):
+        self.session.undo()
+        self.frame(2)
+
+    def redo(self):
+        self.session.redo()
+        self.frame(2)
+
+    @property
+    def edit(self):
+        return self.session.document.materials[self.material]
+
+    def layers(self, curve="highlight"):
+        return self.edit.curves[curve].layers
+
+    @property
+    def view(self):
+        return self.editor.state.views[self.material, self.editor.curve(self.session, self.material)]
