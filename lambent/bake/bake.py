@@ -27,7 +27,7 @@ from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.scenes.textures import prepared
 from lambent.store.contract import TIMINGS
 from lambent.store.source import changed_inputs, inputs_of, write_source
@@ -49,6 +49,7 @@ def bake(
     probes: str | None = None,
     views: Sequence[View] = (),
     editables: Mapping[str, Editable] | None = None,
+    environment: ImageEnvironment | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -70,6 +71,8 @@ def bake(
         alone, without light map and probes, `only` is {"transport"}.
     editables : mapping, optional
         Terms and curves of materials, by name, that are to be edited as something else than their documents say.
+    environment : ImageEnvironment, optional
+        What lights the views instead of the scene's own environment.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def bake(
     order = in_order(kinds, kinds if only is None else only)
     of_views = [kind for kind in only or () if getattr(kinds[kind], "OF_VIEWS", False)]
     if of_views and not views:
-        raise UserError("is baked for views alone", field=of_views[0], hint="give `views` to bake() in Python")
+        raise UserError("is baked for views alone", field=of_views[0], hint="name them with --view CAMERA")
     if not scene.objects:
         raise UserError("scene has no objects", field=scene.name)
     scene = replace(scene, textures=prepared(scene.textures))
@@ -107,7 +110,17 @@ def bake(
         if not resume:
             store.forget_all()
         context = BakeContext(
-            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {}
+            scene,
+            store,
+            kinds,
+            quality,
+            methods,
+            seed,
+            progress,
+            undivided,
+            tuple(views),
+            editables or {},
+            environment,
         )
         for kind in order:
             if context.stale(kind):

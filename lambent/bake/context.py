@@ -14,7 +14,7 @@ A kind of artefact is a module of `artefacts/`, found by its file:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,7 +25,7 @@ from lambent.bake.view import View
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.store.contract import is_two_sided
 from lambent.store.store import Array, Store, Writer
 
@@ -51,7 +51,8 @@ class BakeContext:
     """One bake: the scene as it is baked, the store that it goes to, and what several artefacts share.
 
     `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
-    them whole, as views show them. `editables` are terms of materials that are not those of their documents.
+    them whole, as views show them. `editables` are terms of materials that are not those of their documents;
+    `environment` lights the views instead of the scene's own.
     """
 
     scene: Scene
@@ -64,6 +65,7 @@ class BakeContext:
     undivided: Scene | None = None
     views: Sequence[View] = ()
     editables: Mapping[str, Editable] = field(default_factory=dict)
+    environment: ImageEnvironment | None = None
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:
@@ -129,8 +131,9 @@ class BakeContext:
 
     @cached_property
     def in_views(self) -> Scene:
-        """The scene with whole objects."""
-        return self.undivided or self.scene
+        """The scene with whole objects, in the light of the views."""
+        scene = self.undivided or self.scene
+        return scene if self.environment is None else replace(scene, environment=self.environment)
 
     @cached_property
     def view_tracer(self) -> ViewTracer:

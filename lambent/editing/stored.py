@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats, Image
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.inputs import sha256_of
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
@@ -21,6 +22,10 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import scene_record, transport_lights, view_artefact_name
 from lambent.store.store import Store
+
+
+class NotBaked(UserError):
+    """A store has no transport that serves a session."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,11 @@ def edited_picture(
 
     Raises
     ------
+    NotBaked
+        The store has no transport of the view, or one under another environment, or of other terms than the materials
+        have.
     UserError
-        The store has no transport of the view, or one of other terms than the materials have.
+        The session names materials that the scene does not have, or the store cannot be read.
     """
     view = session.document
     counts = transport_lights(store, view.camera, *view.size)
@@ -65,10 +73,11 @@ def edited_picture(
     if lights is None or lights not in counts:
         found = ", ".join(map(str, counts)) or "none"
         what = f"no transport of camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
-        raise UserError(
+        raise NotBaked(
             what, file=store.folder, field="lights", got=lights or found, expected=found if counts else None,
             hint="bake the view for editing first",
         )  # fmt: skip
+    _check_environment(store, session, lights)
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
@@ -81,11 +90,22 @@ def edited_picture(
     return picture
 
 
+def _check_environment(store: Store, session: Session, lights: int) -> None:
+    view, wanted = session.document, None
+    if view.environment is not None:
+        image = session.path(view.environment.file)
+        wanted = {"sha256": sha256_of(image), **view.environment.model_dump(include={"scale", "rotation_deg"})}
+    terms = view_artefact_name(view.camera, *view.size, "transport", f"{lights}/terms")
+    if store.artefact(terms).meta.get("environment") != wanted:
+        what = "transport is of another environment than the session's"
+        raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
+
+
 def _show(picture: EditedPicture, name: str, session: Session, store: Store) -> None:
     try:
         picture.show(name, session.editable(name))
     except TransportNeeded as error:
-        raise UserError(str(error), file=store.folder, hint="bake the view for editing again") from error
+        raise NotBaked(str(error), file=store.folder, hint="bake the view for editing again") from error
 
 
 def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], lights: int) -> dict[str, Part]:
@@ -105,7 +125,7 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
             continue
         baked = {one["term"]: one for one in said if one["material"] == material}
         if {k: one.get("fixed") for k, one in baked.items()} != {k: t.fixed for k, t in enumerate(start.terms)}:
-            raise UserError(
+            raise NotBaked(
                 "transport is of other terms than the material has", file=store.folder, field=material,
                 hint="bake the view for editing again",
             )  # fmt: skip

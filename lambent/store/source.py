@@ -57,6 +57,8 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
     scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
     record = scene_record(store)
+    if not record.objects:  # a store of edited views alone
+        return replace(scene, materials={**scene.materials, **record.materials})
     baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
     if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
         _fits(parts, o.mesh.bounds, len(o.mesh.faces)) for parts, o in zip(baked.values(), scene.objects, strict=True)
