@@ -118,7 +118,7 @@ class EditMode(Mode):
         return lines
 
     def drop(self, path: str) -> None:
-        self.state.files.open(path)
+        self.state.files.open(path, self.state.material)
 
     def rescue(self) -> None:
         rescued("the unsaved session", self.state.files.rescue)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
+from importlib import import_module, util
 
 from imgui_bundle import imgui
 
-from lambent.core.discovery import names_in
 from lambent.core.errors import UserError
 from lambent.core.plain import triple
 from lambent.editing.session import Session
 from lambent.viewer.look import VIEW_TRANSFORMS
-from lambent.viewer.modes import edit
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.widgets import (
@@ -49,7 +47,7 @@ def draw_scene(state: EditState) -> None:
     wrapped([line for line in (state.trouble, *state.subject.scene.warnings[:3]) if line], AMBER)
     text = typed_field("environment", state.files.typed, "light", "another .hdr or .exr, lat-long...")
     if text is not None:
-        state.files.open(text)
+        state.files.open(text, state.material)
 
 
 def draw_material(state: EditState, draw_curves: DrawCurves) -> None:
@@ -78,7 +76,7 @@ def draw_material(state: EditState, draw_curves: DrawCurves) -> None:
     text = typed_field("become", state.files.typed, "open", "a material document or a table...")
     explain("let the material begin as something else; a file can be dropped onto the window, too")
     if text is not None:
-        state.files.open(text)
+        state.files.open(text, state.material)
 
 
 def draw_compare(state: EditState) -> None:
@@ -121,9 +119,10 @@ def draw_files(state: EditState) -> None:
 
 def curves() -> DrawCurves:
     """The curve editor where there is one, else the colours of terms alone."""
-    if "curves" not in names_in(edit):
+    name = f"{__package__}.curves"
+    if util.find_spec(name) is None:
         return draw_tints
-    drawn: DrawCurves = import_module(f"{edit.__name__}.curves").CurveEditor().draw
+    drawn: DrawCurves = import_module(name).CurveEditor().draw
     return drawn
 
 

@@ -69,7 +69,7 @@ class EditState:
         self.painter = Painter(self.session.document.size[::-1])
         self.loading = Loading(self.painter, subject.store)
         self.baking: Baking | None = None
-        self.files = Files(self, tables or Tables())
+        self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())
         self._bake = bake
         self._sources: Sequence[object] = ()  # for which transport was seen to last
         self._fixed: Fixed | None = None
