@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,35 +20,40 @@ from lambent.viewer.work import Work
 
 LIGHTS = (400, 4000)
 WORKER = "lambent.viewer.modes.edit.worker"
-TWO_CURVES = 8.0  # transport of two curves takes so many times as long as that of one
+ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole view shows it; visibility takes 1
+LEAST_DONE = 0.02  # before it, nobody can say how long it takes
 LAST_CHARACTERS = 300  # of what a worker wrote before it died
 _NUMBER = re.compile(r"(\d+) lights$")
 
 
 @dataclass
 class Stage:
-    """How far the transport for so many lights is: its steps, by name, and their weights."""
+    """How far the transport for so many lights is: its steps, by name, and their weights; that of visibility is 1."""
 
-    weights: dict[str, float]
+    weights: Mapping[str, float]
     began_s: float
     lights: int = 0
     step: str = ""
-    done: float = 0.0  # weight of the steps before
+    before: float = 0.0  # weight of the steps before
     share: float = 0.0  # of the step
+    reported_s: float = 0.0
 
     def take(self, what: str, share: float, lights: int, now_s: float) -> None:
         """A step of the bake goes on."""
         if lights != self.lights:
-            self.lights, self.step, self.done, self.began_s = lights, what, 0.0, now_s
+            self.lights, self.step, self.before, self.began_s = lights, what, 0.0, now_s
         elif what != self.step:
-            self.done, self.step = self.done + self._weight(self.step), what
-        self.share = share
+            self.before, self.step = self.before + self._weight(self.step), what
+        self.share, self.reported_s = share, now_s
 
     def left_s(self, now_s: float) -> float | None:
         """Seconds until these lights are there, if it goes on like this; None while that is anybody's guess."""
         total = 1.0 + sum(self.weights.values())
-        done = (self.done + self.share * self._weight(self.step)) / total
-        return (now_s - self.began_s) * (1 - done) / done if done > 0.02 else None
+        done = (self.before + self.share * self._weight(self.step)) / total
+        if done < LEAST_DONE:
+            return None
+        left_s = (self.reported_s - self.began_s) * (1 - done) / done
+        return max(left_s - (now_s - self.reported_s), 1.0)
 
     def _weight(self, step: str) -> float:
         return self.weights.get(_NUMBER.sub("", step).rstrip(", "), 1.0)
@@ -78,8 +83,9 @@ class Baking:
         self.has_view = False
         self._clock, self._lights = clock, lights
         terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
-        weights = {f"{name}: {t.name}": TWO_CURVES if len(t.factors) == 2 else 1.0 for name, t in terms}
-        self._stage = Stage(weights, clock())
+        self._curves = {(name, t.name): len(t.factors) for name, t in terms}
+        self._stage = Stage({}, clock())
+        self.weigh({name: 1 / len(self.document.materials) for name in self.document.materials})
         copy = Session(session.document, session.folder)
         self._process: subprocess.Popen[str] | None = None
         self._work: Work | None = Work(lambda progress: self._run(copy, progress), lambda _: None, self._failed)
@@ -97,6 +103,13 @@ class Baking:
         left_s, stage = self._stage.left_s(self._clock()), self._stage
         step = f"{self.what} {100 * stage.share:.0f} %"
         return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
+
+    def weigh(self, shares: Mapping[str, float]) -> None:
+        """Tell which share of the view's points each material has."""
+        self._stage.weights = {
+            f"{name}: {term}": shares.get(name, 0.0) * (TWO_CURVES if curves == 2 else ONE_CURVE)
+            for (name, term), curves in self._curves.items()
+        }
 
     def close(self) -> None:
         """End the process; what it has finished stays in the store."""

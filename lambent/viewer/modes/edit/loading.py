@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -39,11 +39,22 @@ class ViewMap:
     object: NDArray[np.int32]
     objects: tuple[tuple[str, str], ...]
 
-    @property
+    @cached_property
     def materials(self) -> tuple[str, ...]:
         """Those that are seen, in the order of the objects."""
         seen = [self.objects[number][1] for number in np.unique(self.object) if number >= 0]
         return tuple(dict.fromkeys(seen))
+
+    @cached_property
+    def shares(self) -> dict[str, float]:
+        """Share of the points that each material has."""
+        counts = np.bincount(self.object[self.object >= 0], minlength=len(self.objects)) / max(
+            np.sum(self.object >= 0), 1
+        )
+        shares: dict[str, float] = {}
+        for (_, material), share in zip(self.objects, counts, strict=True):
+            shares[material] = shares.get(material, 0.0) + float(share)
+        return shares
 
     def at(self, x: float, y: float) -> tuple[str, str] | None:
         """Object and material at shares of the picture."""

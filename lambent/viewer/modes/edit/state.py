@@ -73,6 +73,7 @@ class EditState:
         self._bake = bake
         self._sources: Sequence[object] = ()  # for which transport was seen to last
         self._fixed: Fixed | None = None
+        self._weighed: Baking | None = None  # the one that knows what the view shows
         self._document: SessionDocument | None = None
         self._now: dict[str, Editable] = {}
         self._wish = Wish()
@@ -152,6 +153,9 @@ class EditState:
     def _take_baked(self) -> None:
         if self.baking is None:
             return
+        if self.loading.view is not None and self._weighed is not self.baking:
+            self._weighed = self.baking
+            self.baking.weigh(self.loading.view.shares)
         if not self.loading.busy and self.baking.arrived:
             self._load(self.baking.arrived.pop(0))
         elif not self.loading.busy and self.baking.has_view and self.loading.view is None:

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
-from lambent.core.colour import HALF_MAX, luminance, shown
+from lambent.core.colour import HALF_MAX, luminance, neutral, shown
 from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE
 from lambent.realtime.frame_state import FALSE_COLOUR
 
 Bytes = NDArray[np.uint8]
+ROWS = 64  # at once: the steps of a transform stay in the cache
 BY_CHANNEL = ("filmic", "linear")  # each channel by itself: a table of all half floats holds the transform
 
 
@@ -31,7 +32,10 @@ def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> B
     elif view in BY_CHANNEL:
         out[..., :3] = _table(view, exposure_ev)[_half_bits(radiance)]
     else:
-        out[..., :3] = to_bytes(shown(radiance, view, exposure_ev))
+        assert view == "neutral", view
+        for top in range(0, len(out), ROWS):
+            rows = slice(top, top + ROWS)
+            out[rows, :, :3] = _table("linear", 0.0)[_half_bits(neutral(radiance[rows], exposure_ev))]
     return out
 
 
