@@ -48,9 +48,8 @@ class ViewMap:
     @cached_property
     def shares(self) -> dict[str, float]:
         """Share of the points that each material has."""
-        counts = np.bincount(self.object[self.object >= 0], minlength=len(self.objects)) / max(
-            np.sum(self.object >= 0), 1
-        )
+        numbers = self.object[self.object >= 0]
+        counts = np.bincount(numbers, minlength=len(self.objects)) / max(len(numbers), 1)
         shares: dict[str, float] = {}
         for (_, material), share in zip(self.objects, counts, strict=True):
             shares[material] = shares.get(material, 0.0) + float(share)

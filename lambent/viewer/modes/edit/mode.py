@@ -110,6 +110,8 @@ class EditMode(Mode):
         lines = [state.trouble] if state.trouble else []
         if state.baking is not None:
             lines.append(state.baking.line)
+        elif state.loading.busy:
+            lines.append("reading transport")
         if state.files.busy:
             lines.append(state.files.doing)
         frame = state.painter.frame
@@ -132,7 +134,7 @@ def columns(state: EditState) -> tuple[Panel, ...]:
     """The column, each panel on the state."""
     return (
         Panel("Scene", partial(panels.draw_scene, state), opened=True),
-        Panel("Material", partial(panels.draw_material, state, panels.curves()), opened=True),
+        Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),
         Panel("Compare", partial(panels.draw_compare, state), opened=True),
         Panel("View", partial(panels.draw_look, state), opened=True),
         Panel("Save", partial(panels.draw_files, state), opened=True),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from importlib import import_module, util
+from typing import Any
 
 from imgui_bundle import imgui
 
-from lambent.core.errors import UserError
 from lambent.core.plain import triple
 from lambent.editing.session import Session
 from lambent.viewer.look import VIEW_TRANSFORMS
@@ -27,7 +27,6 @@ from lambent.viewer.panels.widgets import (
     wrapped,
 )
 
-DrawCurves = Callable[[Session, str], None]
 TINTS = (0.0, 4.0)
 
 
@@ -50,7 +49,7 @@ def draw_scene(state: EditState) -> None:
         state.files.open(text, state.material)
 
 
-def draw_material(state: EditState, draw_curves: DrawCurves) -> None:
+def draw_material(state: EditState, curves: Curves) -> None:
     """The selected material, what it is made of, and its curves."""
     names = state.materials
     if not names:
@@ -69,10 +68,7 @@ def draw_material(state: EditState, draw_curves: DrawCurves) -> None:
         ("redo", history.can_redo, session.redo, "Ctrl+Shift+Z"),
         ("reset", _is_edited(session, chosen), lambda: session.reset(chosen), "drop all edits of this material"),
     ])  # fmt: skip
-    try:
-        draw_curves(session, chosen)
-    except UserError as error:
-        state.screen.say(str(error))
+    curves.draw(chosen)
     text = typed_field("become", state.files.typed, "open", "a material document or a table...")
     explain("let the material begin as something else; a file can be dropped onto the window, too")
     if text is not None:
@@ -117,13 +113,31 @@ def draw_files(state: EditState) -> None:
         wrapped(found.warnings, AMBER)
 
 
-def curves() -> DrawCurves:
-    """The curve editor where there is one, else the colours of terms alone."""
-    name = f"{__package__}.curves"
-    if util.find_spec(name) is None:
-        return draw_tints
-    drawn: DrawCurves = import_module(name).CurveEditor().draw
-    return drawn
+class Curves:
+    """The curve editor where there is one, else the brightness of terms alone."""
+
+    def __init__(self, state: EditState) -> None:
+        self._state = state
+        self._active: str | None = None
+        self._needed: frozenset[str] = frozenset()
+        name = f"{__package__}.curves"
+        self._editor: Any = import_module(name).CurveEditor() if util.find_spec(name) else None
+
+    def draw(self, material: str) -> None:
+        """Draw the curves of a material; the one that is grabbed becomes active in the picture."""
+        state, editor = self._state, self._editor
+        if editor is None:
+            draw_tints(state.session, material)
+            return
+        editor.draw(state.session, material)
+        if editor.active_curve != self._active:
+            self._active = editor.active_curve
+            if self._active is not None:
+                state.painter.run(partial(state.painter.activate, material, self._active))
+        needed = state.painter.frame.needed if state.painter.frame is not None else frozenset()
+        for name in self._needed - needed:
+            editor.transported(state.session, name)
+        self._needed = needed
 
 
 def draw_tints(session: Session, material: str) -> None:

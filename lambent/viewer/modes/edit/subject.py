@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -169,13 +170,12 @@ def camera_named(scene: Scene, base: Path | None, name: str | None) -> Camera:
 
 
 def default_store(folder: Path, name: str, environment: Surroundings | None, base: Path = Path()) -> Path:
-    """NAME.edit.store, or NAME-ENVIRONMENT-HASH.edit.store: the hash tells images of the same name apart."""
+    """NAME.edit.store, or NAME-ENVIRONMENT-HASH.edit.store: the hash tells images of one name apart."""
     stem = plain_name(name, "scene")
     if environment is not None:
         file = base / environment.file
-        stem += f"-{plain_name(file.stem)}-{sha256_of(file)[:6]}"
-        if (environment.scale, environment.rotation_deg) != (1.0, 0.0):
-            stem += f"-{environment.scale:g}-{environment.rotation_deg:g}"
+        said = sha256_of(file) + environment.model_dump_json(exclude={"file"})
+        stem += f"-{plain_name(file.stem)}-{hashlib.sha256(said.encode()).hexdigest()[:6]}"
     return folder / f"{stem}{STORE_ENDING}"
 
 
@@ -197,8 +197,8 @@ def relit(scene: Scene, environment: Surroundings | None, base: Path) -> Scene:
     """The scene under the image of a session; its own environment where there is none."""
     if environment is None:
         return scene
-    image = ImageEnvironment((base / environment.file).resolve(), environment.scale, environment.rotation_deg)
-    return replace(scene, environment=image)
+    file = (base / environment.file).resolve()
+    return replace(scene, environment=ImageEnvironment(file, **environment.model_dump(exclude={"file"})))
 
 
 def scene_for(session: Session) -> Scene:
