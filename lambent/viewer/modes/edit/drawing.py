@@ -32,7 +32,9 @@ class EditDrawing(Drawing):
         self._state, self._ratio = state, 1.0
         width, height = state.session.document.size
         self._textures = [self._texture(width, height) for _ in "AB"]
-        self._views = [texture.create_view() for texture in self._textures]
+        self._pair = [texture.create_view() for texture in self._textures]
+        # Another view of B: Dear ImGui's backend forgets a view a frame after it had another name.
+        self._alone = [self._textures[1].create_view()]
         self._uploaded: list[Bytes | None] = [None, None]
         self._outline: tuple[object, Image] | None = None
         self._frame: Frame | None = None
@@ -41,7 +43,7 @@ class EditDrawing(Drawing):
     @property
     def views(self) -> list[Any]:
         """A and B where two are compared, else the picture alone."""
-        return self._views if self.divider is not None else self._views[1:]
+        return self._pair if self.divider is not None else self._alone
 
     @property
     def divider(self) -> Divider | None:
