@@ -13,11 +13,12 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
 from lambent.scenes.scene import Scene
-from lambent.store.contract import ObjectRecord, SceneRecord, scene_record
+from lambent.store.contract import SCENE, ObjectRecord, SceneRecord, scene_record
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
+SURROUNDINGS = "surroundings"  # document: the image that lights views instead of the scene's environment, if any
 SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
 log = logging.getLogger(__name__)
 
@@ -56,6 +57,8 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     if not isinstance(place, str):
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
     scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
+    if SCENE not in store.documents:  # baked for edited views alone
+        return scene
     record = scene_record(store)
     if not record.objects:  # a store of edited views alone
         return replace(scene, materials={**scene.materials, **record.materials})
