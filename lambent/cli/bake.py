@@ -75,7 +75,6 @@ def _edited(scene: Scene, store: Path, names: list[str], session: Path | None) -
     """What `bake` gets for the views of these names, cameras or saved views, and for that of a session."""
     from lambent.bake.view import View, view_named
     from lambent.editing.session import Session
-    from lambent.scenes.scene import ImageEnvironment
     from lambent.store.views import read_views
 
     views = [view_named(name, (*read_views(store).cameras, *scene.cameras)) for name in names]
@@ -85,9 +84,8 @@ def _edited(scene: Scene, store: Path, names: list[str], session: Path | None) -
     document = opened.document
     for name in document.materials:
         known("material", name, scene.materials, file=session, field="materials")
-    around = document.environment
     return {
         "views": [*views, View(document.camera, *document.size)],
         "editables": {name: opened.original(name) for name in document.materials},
-        "environment": around and ImageEnvironment(opened.path(around.file), around.scale, around.rotation_deg),
+        "environment": opened.environment,
     }

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats, Image
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.inputs import sha256_of
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.folding import folded
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
@@ -21,6 +20,7 @@ from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import scene_record, transport_lights, view_artefact_name
+from lambent.store.source import environment_note
 from lambent.store.store import Store
 
 
@@ -91,10 +91,7 @@ def edited_picture(
 
 
 def _check_environment(store: Store, session: Session, lights: int) -> None:
-    view, wanted = session.document, None
-    if view.environment is not None:
-        image = session.path(view.environment.file)
-        wanted = {"sha256": sha256_of(image), **view.environment.model_dump(include={"scale", "rotation_deg"})}
+    view, wanted = session.document, environment_note(session.environment)
     terms = view_artefact_name(view.camera, *view.size, "transport", f"{lights}/terms")
     if store.artefact(terms).meta.get("environment") != wanted:
         what = "transport is of another environment than the session's"

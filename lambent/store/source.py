@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.store.contract import SCENE, ObjectRecord, SceneRecord, scene_record
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
@@ -26,6 +27,13 @@ log = logging.getLogger(__name__)
 def inputs_of(scene: Scene) -> dict[str, str]:
     """SHA-256 of the files a scene was read from, by file name."""
     return {path.name: sha256_of(path) for path in (*scene.sources, *scene.measured.values())}
+
+
+def environment_note(image: ImageEnvironment | None) -> dict[str, Any] | None:
+    """What arrays note of an image that lights them instead of their scene's environment; None without one."""
+    if image is None:
+        return None
+    return {**asdict(image), "file": sha256_of(image.file)}
 
 
 def changed_inputs(store: Store, scene: Scene) -> list[str]:

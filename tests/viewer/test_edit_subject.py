@@ -16,7 +16,7 @@ from lambent.scenes.scene import ImageEnvironment
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
 from lambent.viewer import edit
-from lambent.viewer.modes.edit.subject import kind_of, opened, scene_for
+from lambent.viewer.modes.edit.subject import kind_of, opened
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -66,8 +66,7 @@ def test_another_light_means_another_store(tmp_path, sky):
     assert lit.store_for(None) == plain.store and lit.store_for(lit.lit_by) == lit.store
     bright = Surroundings(file=str(sky), scale=2.0)
     assert len({lit.store_for(bright), lit.store, plain.store}) == 3
-    scene = scene_for(lit.session)
-    assert scene.environment == ImageEnvironment(sky.resolve())
+    assert lit.session.environment == ImageEnvironment(sky.resolve())
     with pytest.raises(UserError, match=r"no such file.*--environment|--environment.*no such file"):
         opened(box, tmp_path, environment=tmp_path / "none.hdr")
 
@@ -87,7 +86,7 @@ def test_a_store_opens_under_the_light_that_it_was_baked_with(tmp_path, sky):
         store.set_document(SURROUNDINGS, {"file": "../sky.hdr"})
     subject = opened(tmp_path / "lit", tmp_path)
     assert subject.store == tmp_path / "lit" and subject.lit_by == Surroundings(file=str(sky.resolve()))
-    assert scene_for(subject.session).environment == ImageEnvironment(sky.resolve())
+    assert subject.session.environment == ImageEnvironment(sky.resolve())
     write_image(tmp_path / "dusk.hdr", np.full((4, 8, 3), 0.25, np.float32))
     other = opened(tmp_path / "lit", tmp_path, environment=tmp_path / "dusk.hdr")
     assert other.store != tmp_path / "lit" and other.store_for(subject.lit_by) != other.store

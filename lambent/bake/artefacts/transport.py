@@ -16,10 +16,10 @@ from lambent.bake.engine import engine
 from lambent.bake.keys import key_of, texture_inputs
 from lambent.bake.quality import QualityName
 from lambent.bake.view import View
-from lambent.core.inputs import sha256_of
 from lambent.core.progress import Progress
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
+from lambent.store.source import environment_note
 from lambent.store.store import Store, Writer
 
 if TYPE_CHECKING:
@@ -85,7 +85,9 @@ def keys(context: BakeContext) -> dict[str, str]:
             parts = list(_parts(context, view, count))
             found |= {part.name(array): part.key for part in parts for array in part.arrays}
             curves = [(p.material, p.number, p.key, p.term.curves) for p in parts]
-            found[_terms_name(view, count)] = key_of(KIND, REVISION, curves, *filter(None, [_environment(context)]))
+            found[_terms_name(view, count)] = key_of(
+                KIND, REVISION, curves, *filter(None, [environment_note(context.environment)])
+            )
     return found
 
 
@@ -115,7 +117,11 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
                 what = f"{part.material}: {part.term.name}, {len(lights)} lights"
                 baking = _Baking(part, *own, what, context.progress)
                 (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
-    said = {**view.meta, "terms": [part.said(scale) for part in parts], "environment": _environment(context)}
+    said = {
+        **view.meta,
+        "terms": [part.said(scale) for part in parts],
+        "environment": environment_note(context.environment),
+    }
     context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
 
 
@@ -267,14 +273,6 @@ def _count(context: BakeContext, factor: Factor, curves: int) -> int:
     if factor.over in SMOOTH:
         return how.smooth if curves == 1 else how.smooth_of_two
     return how.sharp if curves == 1 else how.sharp_of_two
-
-
-def _environment(context: BakeContext) -> dict[str, Any] | None:
-    """What lights the views instead of the scene's own environment, as sessions name it."""
-    image = context.environment
-    if image is None:
-        return None
-    return {"sha256": sha256_of(image.file), "scale": image.scale, "rotation_deg": image.rotation_deg}
 
 
 def _terms_name(view: View, count: int) -> str:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from importlib import import_module, util
-from typing import Any
 
 from imgui_bundle import imgui
 
-from lambent.core.plain import triple
-from lambent.editing.session import Session
 from lambent.viewer.look import VIEW_TRANSFORMS
+from lambent.viewer.modes.edit.curves.editor import CurveEditor
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.widgets import (
@@ -22,12 +19,9 @@ from lambent.viewer.panels.widgets import (
     coloured,
     explain,
     rows,
-    slider,
     typed_field,
     wrapped,
 )
-
-TINTS = (0.0, 4.0)
 
 
 def draw_scene(state: EditState) -> None:
@@ -66,7 +60,6 @@ def draw_material(state: EditState, curves: Curves) -> None:
     buttons([
         ("undo", history.can_undo, session.undo, "Ctrl+Z"),
         ("redo", history.can_redo, session.redo, "Ctrl+Shift+Z"),
-        ("reset", _is_edited(session, chosen), lambda: session.reset(chosen), "drop all edits of this material"),
     ])  # fmt: skip
     curves.draw(chosen)
     text = typed_field("become", state.files.typed, "open", "a material document or a table...")
@@ -114,21 +107,17 @@ def draw_files(state: EditState) -> None:
 
 
 class Curves:
-    """The curve editor where there is one, else the brightness of terms alone."""
+    """The curve editor, and what the picture has to know of it."""
 
     def __init__(self, state: EditState) -> None:
         self._state = state
         self._active: str | None = None
         self._needed: frozenset[str] = frozenset()
-        name = f"{__package__}.curves"
-        self._editor: Any = import_module(name).CurveEditor() if util.find_spec(name) else None
+        self._editor = CurveEditor()
 
     def draw(self, material: str) -> None:
         """Draw the curves of a material; the one that is grabbed becomes active in the picture."""
         state, editor = self._state, self._editor
-        if editor is None:
-            draw_tints(state.session, material)
-            return
         editor.draw(state.session, material)
         if editor.active_curve != self._active:
             self._active = editor.active_curve
@@ -138,24 +127,3 @@ class Curves:
         for name in self._needed - needed:
             editor.transported(state.session, name)
         self._needed = needed
-
-
-def draw_tints(session: Session, material: str) -> None:
-    """A slider for the brightness of each term."""
-    tints = session.document.materials[material].tints
-    for term in session.original(material).terms:
-        before = tints.get(term.name, (1.0, 1.0, 1.0))
-        mean = sum(before) / 3
-        after = slider(term.name, mean, *TINTS)
-        if imgui.is_item_activated():
-            session.history.begin_stroke()
-        if after != mean:
-            colour = triple(x * after / mean for x in before) if mean > 0 else (after, after, after)
-            session.tint(material, term.name, colour)
-        if imgui.is_item_deactivated():
-            session.history.end_stroke()
-
-
-def _is_edited(session: Session, material: str) -> bool:
-    one = session.document.materials[material]
-    return bool(one.curves or one.tints)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +16,7 @@ from lambent.core.plain import plain_name, triple
 from lambent.editing.document import Surroundings
 from lambent.editing.session import Factorise, Session
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
-from lambent.scenes.scene import ImageEnvironment, Scene
+from lambent.scenes.scene import Scene
 from lambent.store.source import SURROUNDINGS, scene_of
 from lambent.store.store import MANIFEST, Store
 from lambent.store.views import read_views
@@ -193,21 +193,10 @@ def check_store(folder: Path, place: str) -> None:
         raise UserError("store of another scene", file=folder, got=source, expected=place, hint="name another with -o")
 
 
-def relit(scene: Scene, environment: Surroundings | None, base: Path) -> Scene:
-    """The scene under the image of a session; its own environment where there is none."""
-    if environment is None:
-        return scene
-    file = (base / environment.file).resolve()
-    return replace(scene, environment=ImageEnvironment(file, **environment.model_dump(exclude={"file"})))
-
-
 def scene_for(session: Session) -> Scene:
-    """The scene of a session, lit as the session says."""
-    document = session.document
-    place = session.path(document.scene)
-    return relit(
-        _scene_at(str(place) if place.exists() else document.scene), document.environment, session.folder
-    )  # fmt: skip
+    """The scene of a session."""
+    place = session.path(session.document.scene)
+    return _scene_at(str(place) if place.exists() else session.document.scene)
 
 
 def _scene_at(place: str) -> Scene:

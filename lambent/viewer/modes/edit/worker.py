@@ -36,7 +36,14 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
     for end in range(len(lights)):
         quality = quality_named("normal").changed(visibility={"lights": tuple(lights[: end + 1])})
         with bake(
-            scene, folder, quality=quality, only={"transport"}, views=[view], editables=editables, progress=_progress
+            scene,
+            folder,
+            quality=quality,
+            only={"transport"},
+            views=[view],
+            editables=editables,
+            progress=_progress,
+            environment=opened.environment,
         ) as store:
             _note_environment(store, opened)
         _say(lights=lights[end])
