@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from lambent.core.camera import Camera
+from lambent.core.shared_exponent import packed_rgb
 from lambent.core.wavelets import transformed
 from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
@@ -63,11 +64,10 @@ def write_view(folder, session, lights, seed=0):
                 if len(counts) == 1:
                     put("transport", f"{lights}/{name}/{k}/rows", transformed(light).astype(np.float16))
                     continue
-                pairs = np.tile(np.stack(np.divmod(np.arange(64), 8), axis=1), (len(pixels), 1))
                 begin = np.arange(len(pixels)) * 64
                 put("transport", f"{lights}/{name}/{k}/spans", np.stack([begin, begin + 64], axis=1).astype(np.uint32))
-                put("transport", f"{lights}/{name}/{k}/pairs", pairs.astype(np.uint8))
-                values = np.moveaxis(light, 3, 0).reshape(-1, 3).astype(np.float16)
+                put("transport", f"{lights}/{name}/{k}/steps", np.ones(64 * len(pixels), np.uint8))  # all pairs in turn
+                values = packed_rgb(np.moveaxis(light, 3, 0).reshape(-1, 3))
                 put("transport", f"{lights}/{name}/{k}/values", values)
         put("transport", f"{lights}/terms", np.ones(len(said), np.uint32), terms=said)
 
