@@ -51,7 +51,7 @@ def objects() -> tuple[SceneObject, ...]:
 @cache
 def textured() -> dict[str, tuple[Material, MaterialTextures]]:
     """The floor with its grain; the books and the toys, whose colours are the texels of a row."""
-    varnish = Lobe(mx=0.06, my=0.06, r0=(0.06,) * 3, alpha=0.5)
+    varnish = Lobe(mx=0.1, my=0.1, r0=(0.06,) * 3, alpha=0.5)
     boards = ((0.0, 1 / BOARDS_M[0], 0.0), (1 / BOARDS_M[1], 0.0, 0.0))
     rows = {name: painted(name, colours[None]) for name, colours in COLOURS.items()}
     return {"floor": painted("floor", wood(), varnish, uv_transform=boards), **rows}

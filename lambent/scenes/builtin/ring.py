@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
+
 from lambent.scenes.builtin.placing import POLISHED_SCALE, block, thing
 from lambent.scenes.geometry import lathe
 from lambent.scenes.scene import SceneObject
@@ -18,14 +20,12 @@ HALF, THICK = 0.06, 0.01  # half the side of the table, its thickness
 @cache
 def objects() -> tuple[SceneObject, ...]:
     """The ring about the axis of y on a square table, whose top is y = 0."""
-    inside = [(INNER, HIGH - EDGE), (INNER, EDGE)]
-    outside = [(OUTER, EDGE), (OUTER, HIGH - EDGE)]
-    middle = (INNER + OUTER) / 2
-    slope = EDGE * 0.3
-    foot = [inside[1], (INNER + slope, slope), (INNER + EDGE, 0.0), (middle, 0.0), (OUTER - EDGE, 0.0),
-            (OUTER - slope, slope), outside[0]]  # fmt: skip
-    rim = [(r, HIGH - y) for r, y in reversed(foot)]
+    arc = np.linspace(0, np.pi / 2, 7)
+    low = [(OUTER - EDGE + EDGE * np.sin(a), EDGE - EDGE * np.cos(a)) for a in arc]
+    high = [(r, HIGH - y) for r, y in reversed(low)]
+    corners = [low, high, *([(INNER + OUTER - r, y) for r, y in reversed(corner)] for corner in (high, low))]
+    sides = [[corner[-1], following[0]] for corner, following in zip(corners, corners[1:] + corners[:1], strict=True)]
     return (
         thing("table", "table", block((-HALF, -THICK, -HALF), (HALF, 0.0, HALF), 0.002, segments=3)),
-        thing("ring", "ring", lathe([inside, foot, outside, rim], 192, 4), light_map_scale=POLISHED_SCALE),
+        thing("ring", "ring", lathe([*corners, *sides], 192, 1), light_map_scale=POLISHED_SCALE),
     )

@@ -35,9 +35,9 @@ def objects() -> tuple[SceneObject, ...]:
     stems, heads = [], []
     for height, lean_deg, towards_deg, scale in FLOWERS:
         lean, out = np.radians(lean_deg), turn("y", -towards_deg) @ [1.0, 0.0, 0.0]
-        off = np.array([-0.05, 0.04, 0.065, 0.0]) * np.sin(lean)  # the stem passes the neck and leans on the lip
+        off = np.array([-0.03, 0.04, 0.055, 0.0]) * np.sin(lean)  # the stem passes the neck and leans on the lip
         off[3] = 0.6 * height * np.sin(1.4 * lean)
-        up = [0.03, MOUTH - 0.028, MOUTH + 0.01, height - 0.004]
+        up = [0.04, MOUTH - 0.028, MOUTH + 0.01, height - 0.004]
         points = [x * out + np.array([0, y, 0]) for x, y in zip(off, up, strict=True)]
         stems.append(tube(points, STEM, 14, 8))
         tilt = turn("y", -towards_deg) @ turn("z", -1.6 * lean_deg - 8)
@@ -69,7 +69,8 @@ def _vase() -> Mesh:
     outside = [(0.036, 0.003), (0.04, 0.012), (0.058, 0.06), (0.06, 0.095), (0.042, 0.145), (0.028, 0.172),
                (0.031, 0.191), (0.04, MOUTH - 0.0012)]  # fmt: skip
     lip = [outside[-1], (0.0392, MOUTH), (0.0378, MOUTH - 0.0009)]
-    inside = [lip[-1], (0.0285, 0.19), (0.0255, 0.172), (0.039, 0.144), (0.0565, 0.095), (0.052, 0.055), (0.0, 0.012)]
+    inside = [lip[-1], (0.0285, 0.19), (0.0255, 0.172), (0.039, 0.144), (0.0565, 0.095), (0.052, 0.055), (0.037, 0.022),
+              (0.0, 0.012)]  # fmt: skip
     foot = [(0.033, 0.0), (0.0352, 0.0008), outside[0]]
     return lathe([[(0.0, 0.0), foot[0]], foot, outside, lip, inside], 96, 6)
 
@@ -95,18 +96,18 @@ def _petal(length: float, half_width: float, half_thick: float, bend_rad: float)
         angle = bend_rad * s
         wide = half_width * np.sin(np.pi * s**0.8) ** 0.75 * (0.75 + 0.35 * s)
         thick = half_thick * np.sin(np.pi * s) ** 0.5
-        across, off = wide * np.cos(phi), thick * np.sin(phi) + 0.9 * wide * np.cos(phi) ** 2 * 0.35
+        across, off = wide * np.cos(phi), thick * np.sin(phi) + 0.2 * wide * np.cos(phi) ** 2
         x, y = np.sin(angle) / bend_rad, (np.cos(angle) - 1) / bend_rad
         return np.stack([length * x + off * np.sin(angle), length * y + off * np.cos(angle), across], axis=-1)
 
-    s = (0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 19)))[:, None]
-    phi = np.linspace(0, 2 * np.pi, 17)[None, :]
+    s = (0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 13)))[:, None]
+    phi = np.linspace(0, 2 * np.pi, 25)[None, :]
     positions = points(*np.broadcast_arrays(s, phi))
     positions[:, -1] = positions[:, 0]
     inner = np.clip(s, 0.02, 0.98)  # the normals of the ends are those of their neighbourhood
     along = points(inner + STEP, phi + 0 * s) - points(inner - STEP, phi + 0 * s)
     around = points(inner + 0 * phi, phi + STEP) - points(inner + 0 * phi, phi - STEP)
-    normals = normalize(np.cross(around, along))
+    normals = normalize(np.cross(along, around))
     normals[:, -1] = normals[:, 0]
     uv = np.stack(np.broadcast_arrays(0.5 + 0 * phi, 0.03 + 0.94 * s), axis=-1)
     return grid(positions, normals, (1, 0, 0), uv)
