@@ -17,6 +17,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.factored.of_lobes import of_material
 from lambent.scenes import builtin, load_scene
 from lambent.scenes.builtin import cornell, loft, ring, vase
+from lambent.scenes.builtin.placing import block
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.scene import ConstantEnvironment, Scene, SceneObject
 from tests.scenes.test_geometry import boundary_edges
@@ -134,7 +135,7 @@ def test_cornell_boxes_have_the_measured_corners() -> None:
 
 
 def test_cornell_floor_gets_the_light_of_a_rectangle(mi: Any) -> None:
-    """Irradiance under the middle of a parallel rectangle (Howell, configuration factor B-3), without interreflections."""
+    """Irradiance under the middle of a parallel rectangle (Howell, factor B-3), without interreflections."""
     from lambent.bake.reference.path_traced import render_reference
 
     scene = load_scene("builtin:cornell")
@@ -176,7 +177,7 @@ def test_the_loft_is_lit_through_its_windows_alone(mi: Any) -> None:
         replace(
             scene.object("table"),
             name=f"shutter_{k}",
-            mesh=loft.block((x - 0.02, y0 - 0.05, z0 - 0.05), (x + 0.02, y1 + 0.05, z1 + 0.05)),
+            mesh=block((x - 0.02, y0 - 0.05, z0 - 0.05), (x + 0.02, y1 + 0.05, z1 + 0.05)),
         )
         for k, (z0, z1) in enumerate(loft.WINDOWS_Z)
     ]
@@ -198,7 +199,7 @@ def test_things_stand_where_they_should() -> None:
         table = mesh_of(objects, "table").bounds
         assert np.all(low[[0, 2]] > table[0][[0, 2]]) and np.all(high[[0, 2]] < table[1][[0, 2]]), name
     couch, stairs = mesh_of(objects, "couch").bounds, mesh_of(objects, "stairs").bounds
-    assert -loft.Z < couch[0][2] and couch[1][0] < stairs[0][0]
+    assert couch[0][2] > -loft.Z and couch[1][0] < stairs[0][0]
     band = mesh_of(ring.objects(), "ring").bounds
     assert band[0][1] == pytest.approx(0, abs=1e-9) and band[1][1] == pytest.approx(ring.HIGH)
     pot, petals = mesh_of(vase.objects(), "vase").bounds, mesh_of(vase.objects(), "flowers").bounds

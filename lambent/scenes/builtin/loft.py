@@ -41,10 +41,10 @@ def objects() -> tuple[SceneObject, ...]:
     return (
         thing("floor", "floor", block((-X - LAP, -THICK, -Z - LAP), (X + LAP, 0.0, Z + LAP))),
         *_walls(),
-        *(thing(f"sill_{k}", "sills", _sill(*z)) for k, z in enumerate(WINDOWS_Z, start=1)),
+        *(thing(f"sill_{k}", "sills", *_sill(*z)) for k, z in enumerate(WINDOWS_Z, start=1)),
         thing("stairs", "stairs", *_stairs()),
         *at([thing("couch", "couch", *couch), thing("couch_feet", "table", *feet)], couch_at, turned),
-        *at(_table(), (0.05, 0.0, -0.45), turn("y", -8)),
+        *at(_table(), (0.25, 0.0, 0.05), turn("y", -8)),
     )
 
 
@@ -90,10 +90,14 @@ def _with_windows(y: tuple[float, float], z: tuple[float, float]) -> list[Mesh]:
     return parts
 
 
-def _sill(z0: float, z1: float) -> Mesh:
-    """Board under a window, wider than it, held by the wall."""
-    y = WINDOW_Y[0]
-    return block((-X - 0.12, y - 0.03, z0 - 0.05), (-X + 0.16, y + 0.012, z1 + 0.05), 0.005, (0, 0, 1), 2)
+def _sill(z0: float, z1: float) -> list[Mesh]:
+    """Board under a window, wider than it and held by the wall, and the bars of the window."""
+    (y0, y1), middle, x = WINDOW_Y, (z0 + z1) / 2, -X - 0.15
+    return [
+        block((x, y0 - 0.03, z0 - 0.05), (-X + 0.22, y0 + 0.015, z1 + 0.05), 0.006, (0, 0, 1), 2),
+        block((x - 0.03, y0 - 0.03, middle - 0.03), (x + 0.03, y1 + 0.03, middle + 0.03), 0.004, (0, 1, 0)),
+        block((x - 0.02, 1.8, z0 - 0.03), (x + 0.02, 1.85, z1 + 0.03), 0.004, (0, 0, 1)),
+    ]
 
 
 def _stairs() -> list[Mesh]:
