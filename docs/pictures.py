@@ -1,14 +1,15 @@
-"""Makes the pictures of the README from what the demo wrote, those of the built-in table scenes by path tracing, and
-that of an edit from its transport.
+"""Makes the pictures of the README from what the demo wrote, those of the scenes to edit by path tracing, and that of an
+edit from its transport.
 
 python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
-.venv/bin/python docs/pictures.py scenes
+.venv/bin/python docs/pictures.py scenes [NAME...]
 .venv/bin/python docs/pictures.py edit
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,14 @@ from lambent.core.images import read_encoded, read_image, to_bytes
 PICTURES = Path(__file__).parent / "pictures"
 LIMIT_BYTES = 300_000
 EXPOSURE_EV = 4.7  # of the built-in room
+SCENES = {
+    "teatray": (512, 512),
+    "earrings": (512, 512),
+    "cornell": (450, 450),
+    "vase": (512, 512),
+    "loft": (640, 480),
+    "ring": (400, 400),
+}
 
 
 def main(demo: Path) -> None:
@@ -31,17 +40,18 @@ def main(demo: Path) -> None:
     save("fit.jpg", shown(demo / "materials" / "brushed_aluminium_polar.png"), width=1400)
 
 
-def scenes(samples: int = 1024) -> None:
-    """Path trace the scenes for editing by their cameras, 512x512."""
+def scenes(names: Sequence[str], samples: int = 1024) -> None:
+    """Path trace scenes for editing by their cameras, in the sizes of the published pictures; all without names."""
     from lambent.bake.engine import engine
     from lambent.bake.reference.path_traced import render_reference
     from lambent.scenes import load_scene
 
     engine()
-    for name in ("teatray", "earrings"):
+    for name in names or SCENES:
         scene = load_scene(f"builtin:{name}")
-        image, _ = render_reference(scene, scene.cameras[0], 512, 512, samples)
-        save(f"{name}.jpg", to_bytes(srgb_encode(filmic(image, scene.exposure_ev))), width=512)
+        width, height = SCENES[name]
+        image, _ = render_reference(scene, scene.cameras[0], width, height, samples)
+        save(f"{name}.jpg", to_bytes(srgb_encode(filmic(image, scene.exposure_ev))), width=width)
 
 
 def edit() -> None:
@@ -89,8 +99,8 @@ def save(name: str, picture: np.ndarray, width: int) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["scenes"]:
-        scenes()
+    if sys.argv[1:2] == ["scenes"]:
+        scenes(sys.argv[2:])
     elif sys.argv[1:] == ["edit"]:
         edit()
     else:
