@@ -1,12 +1,15 @@
-"""Makes the pictures of the README from what the demo wrote, and those of the built-in table scenes by path tracing.
+"""Makes the pictures of the README from what the demo wrote, those of the scenes to edit by path tracing, and that of
+an edit from its transport.
 
 python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
-.venv/bin/python docs/pictures.py scenes
+.venv/bin/python docs/pictures.py scenes [NAME...]
+.venv/bin/python docs/pictures.py edit
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,14 @@ from lambent.core.images import read_encoded, read_image, to_bytes
 PICTURES = Path(__file__).parent / "pictures"
 LIMIT_BYTES = 300_000
 EXPOSURE_EV = 4.7  # of the built-in room
+SCENES = {
+    "teatray": (512, 512),
+    "earrings": (512, 512),
+    "cornell": (450, 450),
+    "vase": (512, 512),
+    "loft": (640, 480),
+    "ring": (400, 400),
+}
 
 
 def main(demo: Path) -> None:
@@ -29,17 +40,45 @@ def main(demo: Path) -> None:
     save("fit.jpg", shown(demo / "materials" / "brushed_aluminium_polar.png"), width=1400)
 
 
-def scenes(samples: int = 1024) -> None:
-    """Path trace the scenes for editing by their cameras, 512x512."""
+def scenes(names: Sequence[str], samples: int = 1024) -> None:
+    """Path trace scenes for editing by their cameras, in the sizes of the published pictures; all without names."""
     from lambent.bake.engine import engine
     from lambent.bake.reference.path_traced import render_reference
     from lambent.scenes import load_scene
 
     engine()
-    for name in ("teatray", "earrings"):
+    for name in names or SCENES:
         scene = load_scene(f"builtin:{name}")
-        image, _ = render_reference(scene, scene.cameras[0], 512, 512, samples)
-        save(f"{name}.jpg", to_bytes(srgb_encode(filmic(image, scene.exposure_ev))), width=512)
+        width, height = SCENES[name]
+        image, _ = render_reference(scene, scene.cameras[0], width, height, samples)
+        save(f"{name}.jpg", to_bytes(srgb_encode(filmic(image, scene.exposure_ev))), width=width)
+
+
+def edit() -> None:
+    """The teapot of `builtin:teatray` before and after edits of its curves, 4000 lights."""
+    from tempfile import TemporaryDirectory
+
+    from lambent.bake.bake import bake
+    from lambent.bake.quality import quality_named
+    from lambent.bake.view import View
+    from lambent.editing.operators import Region
+    from lambent.editing.session import Session
+    from lambent.editing.stored import edited_picture
+    from lambent.scenes import load_scene
+
+    scene = load_scene("builtin:teatray")
+    session = Session.new("builtin:teatray", scene.cameras[0], {"glaze": scene.materials["glaze"]})
+    quality = quality_named("normal").changed("picture", visibility={"lights": (4000,)})
+    with TemporaryDirectory() as folder:
+        views = [View(scene.cameras[0], 512, 512)]
+        picture = edited_picture(bake(scene, Path(folder), quality=quality, only={"transport"}, views=views), session)
+        before = picture.image()
+        session.pull("glaze", "highlight", Region(a=0.03, b=0.15, c=0.2, d=0.4), y=2.5)
+        session.tint("glaze", "diffuse", (4.0, 0.6, 0.25))
+        picture.show("glaze", session.editable("glaze"))
+        picture.draw()
+        both = [to_bytes(srgb_encode(filmic(image, scene.exposure_ev))) for image in (before, picture.image())]
+    save("edit.jpg", np.concatenate(both, axis=1), width=1024)
 
 
 def shown(path: Path) -> np.ndarray:
@@ -60,7 +99,9 @@ def save(name: str, picture: np.ndarray, width: int) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["scenes"]:
-        scenes()
+    if sys.argv[1:2] == ["scenes"]:
+        scenes(sys.argv[2:])
+    elif sys.argv[1:] == ["edit"]:
+        edit()
     else:
         main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))

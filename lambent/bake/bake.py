@@ -28,7 +28,7 @@ from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.scenes.textures import prepared
 from lambent.store.contract import TIMINGS
 from lambent.store.source import changed_inputs, inputs_of, write_source
@@ -51,6 +51,7 @@ def bake(
     views: Sequence[View] = (),
     editables: Mapping[str, Editable] | None = None,
     bounces: Bounces | None = None,
+    environment: ImageEnvironment | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -58,7 +59,8 @@ def bake(
     ----------
     quality : {'preview', 'normal', 'final'} or Quality
     only : collection of str, optional
-        Kinds of artefacts to bake, modules of `artefacts/`; their needs are baked too. All by default.
+        Kinds of artefacts to bake, modules of `artefacts/`; their needs are baked too. By default all but those that
+        are made on request alone.
     resume : bool
         False bakes everything anew, even what is up to date.
     seed : int
@@ -74,6 +76,8 @@ def bake(
         Terms and curves of materials, by name, that are to be edited as something else than their documents say.
     bounces : Bounces, optional
         Of "interreflection": its series of bands, samples, and the materials that are not edited.
+    environment : ImageEnvironment, optional
+        What lights the views instead of the scene's own environment.
 
     Returns
     -------
@@ -88,10 +92,11 @@ def bake(
     kinds, quality = found(), quality_named(quality)
     for kind in quality.changes:
         known("kind of artefact", kind, kinds)
-    order = in_order(kinds, kinds if only is None else only)
+    usual = [name for name, kind in kinds.items() if not getattr(kind, "ON_REQUEST", False)]
+    order = in_order(kinds, usual if only is None else only)
     of_views = [kind for kind in only or () if getattr(kinds[kind], "OF_VIEWS", False)]
     if of_views and not views:
-        raise UserError("is baked for views alone", field=of_views[0], hint="give `views` to bake() in Python")
+        raise UserError("is baked for views alone", field=of_views[0], hint="name them with --view CAMERA")
     if not scene.objects:
         raise UserError("scene has no objects", field=scene.name)
     scene = replace(scene, textures=prepared(scene.textures))
@@ -111,7 +116,7 @@ def bake(
         if not resume:
             store.forget_all()
         context = BakeContext(
-            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
+            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {}, environment,
             bounces or Bounces(),
         )  # fmt: skip
         for kind in order:

@@ -8,13 +8,14 @@ A kind of artefact is a module of `artefacts/`, found by its file:
     def keys(context)            {array name: key} of every array it writes, samples kept for a later bake included
     def bake(context)            writes the stale arrays
     OF_VIEWS = True              optional: nothing is baked without views
+    ON_REQUEST = True            optional: baked only where it is asked for by name
     def describe(context)        optional: writes documents, which have no keys; called by every bake
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -26,7 +27,7 @@ from lambent.bake.view import View
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.store.contract import is_two_sided
 from lambent.store.store import Array, Store, Writer
 
@@ -53,7 +54,7 @@ class BakeContext:
 
     `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
     them whole, as views show them. `editables` are terms of materials that are not those of their documents;
-    `bounces` says what interreflections are baked for.
+    `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
     """
 
     scene: Scene
@@ -66,6 +67,7 @@ class BakeContext:
     undivided: Scene | None = None
     views: Sequence[View] = ()
     editables: Mapping[str, Editable] = field(default_factory=dict)
+    environment: ImageEnvironment | None = None
     bounces: Bounces = field(default_factory=Bounces)
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
@@ -132,8 +134,9 @@ class BakeContext:
 
     @cached_property
     def in_views(self) -> Scene:
-        """The scene with whole objects."""
-        return self.undivided or self.scene
+        """The scene with whole objects, in the light of the views."""
+        scene = self.undivided or self.scene
+        return scene if self.environment is None else replace(scene, environment=self.environment)
 
     @cached_property
     def view_tracer(self) -> ViewTracer:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from lambent.core.camera import Camera
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.store.contract import view_artefact_name, view_meta
+
+SIZE, MOST = (512, 512), 16384  # pixels
 
 
 @dataclass(frozen=True)
@@ -24,3 +30,15 @@ class View:
     @property
     def meta(self) -> dict[str, Any]:
         return view_meta(self.camera, self.width, self.height)
+
+
+def view_named(text: str, cameras: Iterable[Camera]) -> View:
+    """The view of "CAMERA" or "CAMERA:WIDTHxHEIGHT"; `UserError` where there is no such camera or size."""
+    found = {camera.name: camera for camera in cameras}
+    size = re.fullmatch(r"(.*):(\d+)x(\d+)", text, re.DOTALL | re.ASCII)
+    if text in found or size is None:
+        return View(found[known("camera", text, found, field="--view")], *SIZE)
+    name, *lengths = size.groups()
+    if not all(len(length) < 9 and 0 < int(length) <= MOST for length in lengths):
+        raise UserError("not a picture size", field="--view", got=text, expected=f"WIDTHxHEIGHT, each 1 to {MOST}")
+    return View(found[known("camera", name, found, field="--view")], *map(int, lengths))

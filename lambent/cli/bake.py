@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,9 +12,12 @@ from lambent.bake import artefacts
 from lambent.bake.methods import LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.cli.console import Json, progress_bar, show, table
-from lambent.core.discovery import names_in
+from lambent.core.discovery import known, names_in
+from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
+    from lambent.scenes.scene import Scene
+
     Kind = str
 else:
     Kind = StrEnum("Kind", {name: name for name in names_in(artefacts)})
@@ -35,23 +38,54 @@ def command(
         ProbeMethod | None,
         typer.Option(help="Probes from the light map, or path traced. [default: as in the store, else cached]"),
     ] = None,
+    view: Annotated[
+        list[str] | None,
+        typer.Option(help="CAMERA[:WIDTHxHEIGHT] whose materials are to be edited, 512x512 by default. Repeatable."),
+    ] = None,
+    edit: Annotated[
+        Path | None, typer.Option(help="Session of edits: its view, with its materials and its environment.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
 
     Example: lambent bake builtin:room -o room.store --quality preview
+    Example: lambent bake builtin:teatray -o tray.store --only transport --view front:512x512
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
 
     what = load_scene(scene)
+    edited = _edited(what, output, view or [], edit)
+    if edited["views"] and only is not None and "transport" not in only:
+        raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
     with progress_bar() as progress:
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
-            light_map=light_map, probes=probes,
+            light_map=light_map, probes=probes, **edited,
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     seconds = store.documents.get("timings", {})
     facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings}
     rows = [(name, f"{value:.1f} s") for name, value in seconds.items()]
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
+
+
+def _edited(scene: Scene, store: Path, names: list[str], session: Path | None) -> dict[str, Any]:
+    """What `bake` gets for the views of these names, cameras or saved views, and for that of a session."""
+    from lambent.bake.view import View, view_named
+    from lambent.editing.session import Session
+    from lambent.store.views import read_views
+
+    views = [view_named(name, (*read_views(store).cameras, *scene.cameras)) for name in names]
+    if session is None:
+        return {"views": views}
+    opened = Session.open(session)
+    document = opened.document
+    for name in document.materials:
+        known("material", name, scene.materials, file=session, field="materials")
+    return {
+        "views": [*views, View(document.camera, *document.size)],
+        "editables": {name: opened.original(name) for name in document.materials},
+        "environment": opened.environment,
+    }

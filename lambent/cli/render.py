@@ -14,8 +14,11 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
 
+SHOWN_BY = ("store", "output", "edit", "exposure", "view", "false_range", "linear", "force", "json")  # edited views
+
 
 def command(
+    context: typer.Context,
     store: Annotated[Path, typer.Argument(help="Folder of a baked store.")],
     output: Annotated[
         Path,
@@ -52,6 +55,9 @@ def command(
         ),
     ] = "auto",
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
+    edit: Annotated[
+        Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -59,6 +65,7 @@ def command(
     """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through a view transform.
 
     Example: lambent render room.store --camera entrance -o entrance.png
+    Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
     from lambent.core.film import FILM, SEQUENCES, check_pictures
@@ -70,6 +77,12 @@ def command(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar
     )
     settings.check()
+    if edit is not None:
+        _check_edit(context, edit)
+        check_output(output, WRITABLE, force=force)
+        done = render.edited_still(store, edit, output, settings)
+        show(asdict(done), f"{output}: {done.width}x{done.height}, edited, {done.seconds:.1f} s", json)
+        return
     moves = output.suffix.lower() == FILM or (path is not None and output.suffix.lower() in SEQUENCES)
     check_output(output, (*WRITABLE, FILM), force=force or moves)
     if moves and camera is not None:
@@ -100,3 +113,12 @@ def parse_range(text: str, *, log: bool) -> Range:
         return Range(float(low), float(high), log)
     except ValueError:
         raise UserError("not a range", field="--range", got=text, expected="LOW:HIGH, as in 10:500") from None
+
+
+def _check_edit(context: typer.Context, session: Path) -> None:
+    """Refuse options of which a session leaves no choice."""
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name not in SHOWN_BY and source is not None and source.name == "COMMANDLINE":
+            what = "an edited view has its own camera, size and light"
+            raise UserError(what, field=parameter.opts[0], hint=f"leave it out, or --edit {session}")

@@ -69,14 +69,19 @@ def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:
 def neutral(linear: Floats, exposure_ev: float = 0.0) -> Floats:
     """Scene radiance to display-linear [0, 1] that keeps colours below .76: Khronos PBR Neutral (2024)."""
     x = np.maximum(linear, 0) * np.asarray(2.0**exposure_ev, linear.dtype)
-    low = x.min(axis=-1, keepdims=True)
+    low = _across(np.minimum, x)
     x = x - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
-    peak = x.max(axis=-1, keepdims=True)
+    peak = _across(np.maximum, x)
     start, room = 0.76, 0.24
     new_peak = 1 - room * room / (np.maximum(peak, start) + room - start)
     grey = 1 - 1 / (0.15 * (np.maximum(peak, start) - new_peak) + 1)
     rolled = x * new_peak / np.maximum(peak, start) * (1 - grey) + new_peak * grey
     return np.asarray(np.clip(np.where(peak < start, x, rolled), 0, 1), linear.dtype)
+
+
+def _across(least_or_most: np.ufunc, rgb: Floats) -> Floats:
+    """(..., 1): of the three channels; several times as fast as a reduction of so short an axis."""
+    return np.asarray(least_or_most(least_or_most(rgb[..., :1], rgb[..., 1:2]), rgb[..., 2:]))
 
 
 def shown(radiance: Floats, view: str, exposure_ev: float = 0.0) -> Floats:

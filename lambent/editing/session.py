@@ -48,6 +48,7 @@ from lambent.materials.factored.opening import editable_of
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
 from lambent.materials.models.model import Model
+from lambent.scenes.scene import ImageEnvironment
 
 Factorise = Callable[[Path], Editable]
 Start = Material | Model | Path  # a material document, a model with its parameters, or a table to factorise
@@ -139,6 +140,14 @@ class Session:
     def path(self, place: str) -> Path:
         """The file that a place in the document names."""
         return self.folder / place
+
+    @property
+    def environment(self) -> ImageEnvironment | None:
+        """The image that lights the scene instead of its own environment."""
+        said = self.document.environment
+        if said is None:
+            return None
+        return ImageEnvironment(self.path(said.file).resolve(), **said.model_dump(exclude={"file"}))
 
     def original(self, material: str) -> Editable:
         """The terms and curves of a material before its edits."""

@@ -20,7 +20,12 @@ from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import scene_record, transport_lights, view_artefact_name
+from lambent.store.source import environment_note
 from lambent.store.store import Store
+
+
+class NotBaked(UserError):
+    """A store has no transport that serves a session."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,11 @@ def edited_picture(
 
     Raises
     ------
+    NotBaked
+        The store has no transport of the view, or one under another environment, or of other terms than the materials
+        have.
     UserError
-        The store has no transport of the view, or one of other terms than the materials have.
+        The session names materials that the scene does not have, or the store cannot be read.
     """
     view = session.document
     counts = transport_lights(store, view.camera, *view.size)
@@ -65,10 +73,11 @@ def edited_picture(
     if lights is None or lights not in counts:
         found = ", ".join(map(str, counts)) or "none"
         what = f"no transport of camera {view.camera.name}, {view.size[0]} x {view.size[1]}"
-        raise UserError(
+        raise NotBaked(
             what, file=store.folder, field="lights", got=lights or found, expected=found if counts else None,
             hint="bake the view for editing first",
         )  # fmt: skip
+    _check_environment(store, session, lights)
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
@@ -81,11 +90,19 @@ def edited_picture(
     return picture
 
 
+def _check_environment(store: Store, session: Session, lights: int) -> None:
+    view, wanted = session.document, environment_note(session.environment)
+    terms = view_artefact_name(view.camera, *view.size, "transport", f"{lights}/terms")
+    if store.artefact(terms).meta.get("environment") != wanted:
+        what = "transport is of another environment than the session's"
+        raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
+
+
 def _show(picture: EditedPicture, name: str, session: Session, store: Store) -> None:
     try:
         picture.show(name, session.editable(name))
     except TransportNeeded as error:
-        raise UserError(str(error), file=store.folder, hint="bake the view for editing again") from error
+        raise NotBaked(str(error), file=store.folder, hint="bake the view for editing again") from error
 
 
 def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], lights: int) -> dict[str, Part]:
@@ -105,7 +122,7 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
             continue
         baked = {one["term"]: one for one in said if one["material"] == material}
         if {k: one.get("fixed") for k, one in baked.items()} != {k: t.fixed for k, t in enumerate(start.terms)}:
-            raise UserError(
+            raise NotBaked(
                 "transport is of other terms than the material has", file=store.folder, field=material,
                 hint="bake the view for editing again",
             )  # fmt: skip

@@ -78,12 +78,16 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = _opened(store)
     view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
-    drawn = images(opened, settings, scene=scene, note=note)
+    write_still(images(opened, settings, scene=scene, note=note), file, view, progress)
+    return Rendered(file, settings.width, settings.height, settings.integrator, 1, time.perf_counter() - began)
+
+
+def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:
+    """Draw one image into a file: displayed light as .png, else radiance."""
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
         write_image(file, drawn.radiance(view, progress))
-    return Rendered(file, settings.width, settings.height, settings.integrator, 1, time.perf_counter() - began)
 
 
 def film(
@@ -143,10 +147,7 @@ def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
-    settings.check()
-    if settings.exposure_ev is None:
-        settings = replace(settings, exposure_ev=scene_record(store).exposure_ev)
-        settings.check()
+    settings = exposed(settings, store)
     if settings.integrator == PATH_TRACER:
         from lambent.render.path_traced import PathTraced
 
@@ -154,6 +155,15 @@ def images(
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)
+
+
+def exposed(settings: Settings, store: Store) -> Settings:
+    """Settings that can be, with the exposure of the store's scene where they have none."""
+    settings.check()
+    if settings.exposure_ev is None:
+        settings = replace(settings, exposure_ev=scene_record(store).exposure_ev)
+        settings.check()
+    return settings
 
 
 def _opened(store: Store | Path | str) -> tuple[Store, SceneRecord]:

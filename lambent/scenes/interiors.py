@@ -83,7 +83,17 @@ def nave(w: Floats) -> Floats:
     return _lamps(light, w, [(-0.78, 0.6, 0.1)], 2.2, (1500.0, 1320.0, 1050.0))
 
 
-INTERIORS: Mapping[str, Callable[[Floats], Floats]] = {"gallery": gallery, "nave": nave}
+def studio(w: Floats) -> Floats:
+    """Radiance (..., 3) from directions (..., 3): a dim room, one spotlight that casts hard shadows, a panel."""
+    p, wall = _walls(w, low=(-3.0, -1.0, -3.0), high=(3.0, 2.5, 3.0))
+    x, y, z = np.moveaxis(p, -1, 0)
+    light = _colour(np.where(wall == 2, 0.05, 0.07 + 0.05 * (y + 1.0)), (1.0, 0.95, 0.9))
+    panel = (wall == 0) & (np.abs(z - 0.4) < 1.2) & (np.abs(y - 0.9) < 0.7)
+    light = np.where(panel[..., None], _colour(6.0 + 0 * x, (0.85, 0.95, 1.1)), light)
+    return _lamps(light, w, [(0.72, 0.58, -0.38)], 2.4, (2200.0, 2000.0, 1750.0))
+
+
+INTERIORS: Mapping[str, Callable[[Floats], Floats]] = {"gallery": gallery, "nave": nave, "studio": studio}
 
 
 def _walls(w: Floats, low: ArrayLike, high: ArrayLike) -> tuple[Floats, NDArray[np.integer]]:

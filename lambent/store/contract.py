@@ -45,7 +45,9 @@ To edit the materials of a view, with the image's size in its key:
                                            absent, except where a step would be longer than 255
     view/KEY/transport/LIGHTS/terms        (T,) uint32, Q of each term; written last. meta["terms"] has for each
                                            "material", "term", "fixed": its quotient and angles (Term.fixed), "curves":
-                                           names and numbers of bands, and "scale"
+                                           names and numbers of bands, and "scale". meta["environment"] is None, or
+                                           has "sha256", "scale" and "rotation_deg" of the image that lights the view
+                                           instead of the scene's environment
 
 Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum over wavelets, or pairs, of the array
 times the curves' coefficients. Coefficients of pairs are means over equal bands from 0 to 90 degrees, those of rows the
@@ -79,8 +81,9 @@ Light that met other surfaces first, of the same points:
 Radiance of a term by interreflections: scale f_q f_o(theta_o) times the sum over entries of light, the coefficient of
 the band, and the factor of the tail.
 
-The scene record (cameras, materials, objects...) is the document "scene"; times are the document "timings". Every array
-is absent, partial or complete (`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
+The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
+objects. Times are the document "timings". Every array is absent, partial or complete (`Store.availability`); of a
+partial one, `Store.read_partial` gives what is there.
 """
 
 from __future__ import annotations

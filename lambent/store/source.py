@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import logging
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
-from lambent.scenes.scene import Scene
-from lambent.store.contract import ObjectRecord, SceneRecord, scene_record
+from lambent.scenes.scene import ImageEnvironment, Scene
+from lambent.store.contract import SCENE, ObjectRecord, SceneRecord, scene_record
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
+SURROUNDINGS = "surroundings"  # document: the image that lights views instead of the scene's environment, if any
 SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
 log = logging.getLogger(__name__)
 
@@ -25,6 +27,13 @@ log = logging.getLogger(__name__)
 def inputs_of(scene: Scene) -> dict[str, str]:
     """SHA-256 of the files a scene was read from, by file name."""
     return {path.name: sha256_of(path) for path in (*scene.sources, *scene.measured.values())}
+
+
+def environment_note(image: ImageEnvironment | None) -> dict[str, Any] | None:
+    """What arrays note of an image that lights them instead of their scene's environment; None without one."""
+    if image is None:
+        return None
+    return {**asdict(image), "file": sha256_of(image.file)}
 
 
 def changed_inputs(store: Store, scene: Scene) -> list[str]:
@@ -56,7 +65,11 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     if not isinstance(place, str):
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
     scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
+    if SCENE not in store.documents:  # baked for edited views alone
+        return scene
     record = scene_record(store)
+    if not record.objects:  # a store of edited views alone
+        return replace(scene, materials={**scene.materials, **record.materials})
     baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
     if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
         _fits(parts, o.mesh.bounds, len(o.mesh.faces)) for parts, o in zip(baked.values(), scene.objects, strict=True)

@@ -1,4 +1,4 @@
-"""`lambent edit`: opens the mode that edits a file."""
+"""`lambent edit`: opens the mode that edits what a path names."""
 
 from __future__ import annotations
 
@@ -6,27 +6,59 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from lambent.core.errors import UserError
 from lambent.viewer import app
 
 
-def run(file: Path, material: Path | None = None, environments: Sequence[Path] = (), **window: Any) -> None:
-    """Show the editor of a file; returns when its window is closed.
+def run(
+    path: Path,
+    material: Path | None = None,
+    environments: Sequence[Path] = (),
+    *,
+    camera: str | None = None,
+    picture: tuple[int, int] | None = None,
+    store: Path | None = None,
+    **window: Any,
+) -> None:
+    """Show the editor of a material, or of the materials of a scene; returns when its window is closed.
 
     Parameters
     ----------
-    file : Path
-        A measured table in any known format, or a material document.
+    path : Path
+        A measured table in any known format or a material document; or a scene, a store or a session, whose materials
+        are edited in place.
     material : Path, optional
-        A document: the material to start from, or, where `file` is one too, the material B to compare with.
+        A document: the material to start from, or, where `path` is one too, the material B to compare with.
     environments : sequence of Path
-        Lat-long pictures to light the preview with; the .hdr files beside `file` are offered too.
+        Lat-long pictures to light the preview with; the .hdr files beside `path` are offered too. In place, at most
+        one, which lights the scene instead of its own environment.
+    camera, picture, store : str, (width, height), Path, optional
+        In place: the name of the camera, the size of the picture in pixels, and the folder that keeps the transport.
     **window
         `size`, `frames`, `folder` as in `app.run`, which raises what this raises.
     """
-    app.run(file, editing_mode(file), material=material, environments=environments, **window)
+    mode = editing_mode(path)
+    if mode == "material":
+        _refuse(path, camera=camera, picture=picture, output=store)
+        app.run(path, mode, material=material, environments=environments, **window)
+        return
+    if material is not None:
+        raise UserError(
+            "a scene is edited by itself", file=path, got=material, hint="drop the document onto its window"
+        )
+    if len(environments) > 1:
+        raise UserError("a scene has one environment", field="--environment", got=f"{len(environments)} files")
+    light = environments[0] if environments else None
+    app.run(path, mode, camera=camera, picture=picture, store=store, environment=light, **window)
 
 
-def editing_mode(file: Path) -> str:
+def _refuse(path: Path, **options: object) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise UserError("is for scenes and stores", file=path, field=f"--{name}", hint="leave it out")
+
+
+def editing_mode(path: Path) -> str:
     """Name of the mode that edits this kind of file; the material editor by default, which names faults of the file."""
     found = app.starts().items()
-    return next((name for name, mode in found if hasattr(mode, "edits") and mode.edits(file)), "material")
+    return next((name for name, mode in found if hasattr(mode, "edits") and mode.edits(path)), "material")

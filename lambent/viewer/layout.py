@@ -75,11 +75,11 @@ def regions(mode: Mode, width: float, height: float) -> Regions:
     left, down = max(1, round(width) - wide), max(1, round(height))
     column = Rect(round(width) - wide, 0, wide, down)
     if mode.beside is None or not mode.screen.panels_shown:
-        return Regions(Rect(0, 0, left, down), column)
+        return Regions(mode.drawing.within(Rect(0, 0, left, down)), column)
     across, below = round(mode.across * left), round(mode.down * down)
     right, under = across + BORDER_PX, below + BORDER_PX
     plots = Rect(right, 0, max(1, left - right), max(1, below)), Rect(0, under, left, max(1, down - under))
-    return Regions(Rect(0, 0, max(1, across), max(1, below)), column, plots)
+    return Regions(mode.drawing.within(Rect(0, 0, max(1, across), max(1, below))), column, plots)
 
 
 def draw(mode: Mode, textures: Textures | None = None) -> bool:

@@ -75,6 +75,10 @@ class Drawing:
     def divider(self) -> Divider | None:
         return None
 
+    def within(self, place: Rect) -> Rect:
+        """Where in the picture's place the views lie: a picture of a shape of its own leaves borders."""
+        return place
+
     def wait_s(self) -> float | None:
         """Seconds until something is due although nothing changes; None: never."""
         return None

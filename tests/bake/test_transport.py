@@ -212,3 +212,23 @@ def test_retro_lobes_see_the_light_turned_about_the_normal() -> None:
     found = view(floor, lights).picture(about_light, 128, 32)
     assert np.allclose(found, view(floor, turned).picture(about_mirror, 128, 32), rtol=1e-3, atol=1e-5)
     assert not np.allclose(found, view(floor, lights).picture(about_mirror, 128, 32), rtol=0.1)
+
+
+def test_no_pixel_looks_through_a_surface() -> None:
+    """Where the pixels to the left and to the right show one place of the teapot, so does the one between them."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.transport.view_tracer import ViewTracer
+    from lambent.bake.view import View as BakedView
+    from lambent.scenes import load_scene
+
+    scene = load_scene("builtin:teatray")
+    points = ViewTracer(scene).points(BakedView(scene.cameras[0], 512, 512))
+    place = np.full((512 * 512, 3), np.nan)
+    teapot = np.array([o.material == "glaze" for o in scene.objects])[points.object]
+    place[points.pixel[teapot]] = points.p[teapot]
+    left, middle, right = (place.reshape(512, 512, 3)[:, k : 510 + k] for k in range(3))
+    near = np.linalg.norm(left - right, axis=-1) < 0.004
+    assert np.count_nonzero(near) > 10_000
+    assert np.linalg.norm(middle - (left + right) / 2, axis=-1)[near].max() < 0.02

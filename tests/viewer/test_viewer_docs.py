@@ -6,6 +6,8 @@ import pytest
 
 from lambent.viewer import cameras, pacing
 from lambent.viewer.editor import measurement
+from lambent.viewer.modes.edit import baking, painter
+from lambent.viewer.modes.edit import mode as edit
 from lambent.viewer.modes.material import mode as material
 from lambent.viewer.modes.walk import input as walk
 from lambent.viewer.modes.walk import walls
@@ -13,7 +15,7 @@ from lambent.viewer.modes.walk import walls
 TEXT = (Path(__file__).parents[2] / "docs" / "window.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("shortcut", (*walk.SHORTCUTS, *material.SHORTCUTS), ids=lambda s: s[0])
+@pytest.mark.parametrize("shortcut", (*walk.SHORTCUTS, *material.SHORTCUTS, *edit.SHORTCUTS), ids=lambda s: s[0])
 def test_every_shortcut_is_documented(shortcut):
     assert f"| {shortcut[0]} | {shortcut[1]} |" in TEXT
 
@@ -24,3 +26,5 @@ def test_the_numbers_are_those_of_the_code():
     assert f"{measurement.FEW:,} tuples".replace(",", " ") in TEXT
     assert f"{1 / pacing.BUDGET_S:.0f} frames a second" in TEXT
     assert f"{100 * walls.STEP_M:.0f} cm" in TEXT
+    assert "Edits\nbegin with {} lights; when {} are there".format(*baking.LIGHTS) in TEXT
+    assert painter.FADE_S == 0.5 and "in half a second" in TEXT

@@ -2,6 +2,7 @@
 
 python -m tests.viewer.watched_window STORE OUT WIDTHxHEIGHT [walk | view]
 python -m tests.viewer.watched_window MEASUREMENT OUT WIDTHxHEIGHT edit:MATERIAL
+python -m tests.viewer.watched_window SCENE OUT WIDTHxHEIGHT place:SIZE, the materials of a small view of a scene
 python -m tests.viewer.watched_window FILE OUT WIDTHxHEIGHT found:FOLDER, with the modes of a further folder
 """
 
@@ -13,6 +14,7 @@ from pathlib import Path
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.viewer import app, edit, modes, window
+from lambent.viewer.modes.edit.state import EditState
 from tests.viewer.panel_driver import recording
 
 MARK = "F12"  # a key that means nothing: what was sent before it has arrived when it does
@@ -52,6 +54,8 @@ class WatchedWindow(window.Window):
 
 def seen_of(state):
     """Of a mode that has a camera and materials."""
+    if isinstance(state, EditState):
+        return seen_in_place(state)
     materials = getattr(state, "materials", None)
     editor = materials.editor if materials else state.editor
     edits = materials.edits if materials else editor.subject.edits
@@ -62,6 +66,22 @@ def seen_of(state):
         "edited": {name: material.model_dump(mode="json") for name, material in edits.edited.items()},
         "file_names": materials.file_names if materials else {},
         "editor": editor_seen(editor),
+    }
+
+
+def seen_in_place(state):
+    frame = state.painter.frame
+    return {
+        "lights": state.loading.lights,
+        "baking": state.baking.line if state.baking is not None else None,
+        "trouble": state.trouble,
+        "selected": state.material,
+        "pointed": state.pointed,
+        "tints": {name: dict(one.tints) for name, one in state.session.document.materials.items()},
+        "busy": state.painter.busy,
+        "number": frame.number if frame is not None else 0,
+        "brightness": float(frame.radiance.mean()) if frame is not None else 0.0,
+        "compared": frame is not None and frame.compared is not None,
     }
 
 
@@ -85,6 +105,8 @@ if __name__ == "__main__":
         if how == "found":
             modes.__path__.append(path)
             edit.run(file, size=size, folder=out)
+        elif how == "place":
+            edit.run(file, picture=(int(path), int(path)), size=size, folder=out)
         elif how == "edit":
             edit.run(file, Path(path), size=size, folder=out)
         else:

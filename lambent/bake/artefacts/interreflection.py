@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 KIND = "interreflection"
 NEEDS = ("view_points",)
 OF_VIEWS = True
+ON_REQUEST = True
 REVISION = 1
 SMOOTH, SMOOTH_OF_TWO = 4, 8  # bands of curves over angles without narrow peaks
 SMOOTH_ANGLES = ("theta_i", "theta_o", "theta_d")

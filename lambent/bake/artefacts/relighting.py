@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 KIND = "relighting"
 NEEDS = ("view_points",)
 OF_VIEWS = True
+ON_REQUEST = True
 REVISION = 1
 POINTS = 1 << 11  # a block: all triangles of so many points are in memory at once
 LAMPS, LIGHT, ERRORS = "lamps", "light", "errors"

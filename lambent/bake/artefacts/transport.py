@@ -19,6 +19,7 @@ from lambent.bake.view import View
 from lambent.core.progress import Progress
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
+from lambent.store.source import environment_note
 from lambent.store.store import Store, Writer
 
 if TYPE_CHECKING:
@@ -84,7 +85,9 @@ def keys(context: BakeContext) -> dict[str, str]:
             parts = list(_parts(context, view, count))
             found |= {part.name(array): part.key for part in parts for array in part.arrays}
             curves = [(p.material, p.number, p.key, p.term.curves) for p in parts]
-            found[_terms_name(view, count)] = key_of(KIND, REVISION, curves)
+            found[_terms_name(view, count)] = key_of(
+                KIND, REVISION, curves, *filter(None, [environment_note(context.environment)])
+            )
     return found
 
 
@@ -114,7 +117,11 @@ def _bake_view(context: BakeContext, view: View, count: int) -> None:
                 what = f"{part.material}: {part.term.name}, {len(lights)} lights"
                 baking = _Baking(part, *own, what, context.progress)
                 (baking.pairs if len(part.bands) == 2 else baking.rows)(context.store)
-    said = {**view.meta, "terms": [part.said(scale) for part in parts]}
+    said = {
+        **view.meta,
+        "terms": [part.said(scale) for part in parts],
+        "environment": environment_note(context.environment),
+    }
     context.put(KIND, _terms_name(view, count), np.array(sizes, np.uint32), said)
 
 

@@ -8,11 +8,13 @@ from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inputs
 from lambent.bake.view import View
+from lambent.core.plain import triple
+from lambent.store.contract import SceneRecord, write_scene_record
 
 KIND = "view_points"
 NEEDS = ()
 OF_VIEWS = True
-REVISION = 1
+REVISION = 2
 PARTS = ("pixel", "object", "theta_o")
 BACKDROP = "backdrop"
 
@@ -32,6 +34,19 @@ def keys(context: BakeContext) -> dict[str, str]:
         found |= {view.name(KIND, part): key for part in PARTS}
         found[view.name(KIND, BACKDROP)] = key_of(KIND, REVISION, key, light_inputs(context.in_views))
     return found
+
+
+def describe(context: BakeContext) -> None:
+    """Write a scene record without objects where the store is of views alone: their materials, cameras and exposure."""
+    store, scene = context.store, context.in_views
+    if any(artefact.name.startswith("geometry/") for artefact in store.artefacts()):
+        return
+    low, high = scene.bounds
+    record = SceneRecord(
+        name=scene.name, objects=(), materials=dict(scene.materials), cameras=scene.cameras,
+        exposure_ev=scene.exposure_ev, bounds=(triple(low), triple(high)), warnings=scene.warnings,
+    )  # fmt: skip
+    write_scene_record(store, record)
 
 
 def bake(context: BakeContext) -> None:

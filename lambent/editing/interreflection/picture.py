@@ -76,7 +76,7 @@ class FrozenPicture:
         self.draw()
 
     def serves(self, material: Editable, active: str | None = None) -> bool:
-        """Whether the edited material can be shown so: it has the same terms, and in those with two curves one as it was."""
+        """Whether the edited material can be shown so: with the same terms, and one of two curves as it was."""
         return same_quotients(self.materials[self.edited], material) and all(
             term.serves(material, active) for term in self._terms
         )

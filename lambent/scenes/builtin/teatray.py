@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 
 from lambent.core.directions import Floats
-from lambent.core.plain import triple
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.builtin.painted import painted
 from lambent.scenes.builtin.placing import POLISHED_SCALE, at, thing
 from lambent.scenes.builtin.wood import wood
 from lambent.scenes.geometry import fan, grid, lathe, merge, placed, smooth_curve, sphere, teapot_parts, tube, turn
-from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject, Texture
+from lambent.scenes.scene import MaterialTextures, Mesh, SceneObject
 
 HALF_X, HALF_Z, CORNER = 0.187, 0.13, 0.047  # of the tray's outline, metres
 FLOOR = 0.012
@@ -39,12 +39,9 @@ def objects() -> tuple[SceneObject, ...]:
 @cache
 def textured() -> dict[str, tuple[Material, MaterialTextures]]:
     """The wood with its grain."""
-    grain = wood()
-    mean = grain.mean(axis=(0, 1))
     varnish = Lobe(mx=0.13, my=0.13, r0=(0.045,) * 3, k=(0.9,) * 3, alpha=0.5)
     place = ((1 / BOARDS_M[0], 0.0, 0.5), (0.0, 1 / BOARDS_M[1], 0.5))
-    texture = Texture((grain / mean).astype(np.float16), place)
-    return {"wood": (Material(name="wood", kd=triple(mean), lobes=(varnish,)), MaterialTextures(diffuse=texture))}
+    return {"wood": painted("wood", wood(), varnish, uv_transform=place)}
 
 
 def _teapot() -> list[SceneObject]:

@@ -1,0 +1,83 @@
+"""Stills of a view whose materials a session edits."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lambent.bake.artefacts.visibility import SETTINGS
+from lambent.core.arrays import Image
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.images import WRITABLE, check_writable
+from lambent.core.progress import Progress, silent
+from lambent.editing.picture import EditedPicture
+from lambent.editing.session import Session
+from lambent.editing.stored import NotBaked, edited_picture
+from lambent.render.images import Images, Settings
+from lambent.render.output import DEFAULT, Rendered, exposed, write_still
+from lambent.store.contract import transport_lights
+from lambent.store.source import SOURCE
+from lambent.store.store import Store
+
+EDITED = "edited"  # in the place of an integrator
+
+
+class Edited(Images):
+    """Images of an edited picture, by the camera of its session alone."""
+
+    def __init__(self, picture: EditedPicture, settings: Settings) -> None:
+        super().__init__(settings)
+        self._picture = picture
+
+    def radiance(self, camera: Camera, progress: Progress = silent) -> Image:
+        return np.maximum(self._picture.image(), 0)  # in the dark, half floats of wavelets leave a little less
+
+
+def edited_still(store: Store | Path | str, session: Path, file: Path | str, settings: Settings = DEFAULT) -> Rendered:
+    """Draw the view of a session as it has edited it, by the transport in a store.
+
+    Parameters
+    ----------
+    session : path
+        A session's file: it has the camera and the size, whatever `settings` say.
+    file, settings
+        As of `output.still`: exposure, view transform and false colours.
+
+    Raises
+    ------
+    UserError
+        Where the session or the store cannot be used, or the store lacks the transport: then with the command that
+        bakes it.
+    """
+    began, file = time.perf_counter(), Path(file)
+    check_writable(file, WRITABLE)
+    opened = store if isinstance(store, Store) else Store.open(Path(store))
+    wanted = Session.open(Path(session))
+    width, height = wanted.document.size
+    settings = exposed(replace(settings, width=width, height=height, integrator=EDITED), opened)
+    try:
+        picture = edited_picture(opened, wanted)
+    except NotBaked as error:
+        raise UserError(
+            error.message, file=error.file, field=error.field, got=error.got, expected=error.expected,
+            hint=f"run `{_bake_command(opened, wanted, Path(session))}`",
+        ) from error  # fmt: skip
+    write_still(Edited(picture, settings), file, wanted.document.camera)
+    return Rendered(file, width, height, EDITED, 1, time.perf_counter() - began)
+
+
+def _bake_command(store: Store, wanted: Session, session: Path) -> str:
+    """The command that bakes what a session needs: for as many lights as the store has of the view."""
+    place = store.documents.get(SOURCE)
+    scene = "SCENE" if not isinstance(place, str) else place if place.startswith("builtin:") else store.folder / place
+    view = wanted.document
+    most = max(transport_lights(store, view.camera, *view.size), default=0)
+    better = [name for name, how in SETTINGS.items() if how.lights[-1] == most]
+    quality = f" --quality {better[-1]}" if better else ""
+    options = f"-o {shlex.quote(str(store.folder))} --only transport --edit {shlex.quote(str(session))}"
+    return f"lambent bake {scene if scene == 'SCENE' else shlex.quote(str(scene))} {options}{quality}"

@@ -1,0 +1,31 @@
+"""The edit mode: materials of one view of a scene, edited in place; see `lambent edit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lambent.viewer.mode import Mode
+from lambent.viewer.screen import Screen
+
+STARTS = ("edit",)
+NO_DISPLAY = "editing in place needs one: use `lambent.editing` from Python, as docs/editing.md shows"
+
+
+def edits(path: Path) -> bool:
+    """Whether it is a scene, a store or a session."""
+    from lambent.viewer.modes.edit.subject import kind_of
+
+    return kind_of(path) is not None
+
+
+def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
+    """The mode on a scene, a store or a session; for the options see `subject.opened`."""
+    from lambent.realtime.device import open_device
+    from lambent.viewer.modes.edit.drawing import EditDrawing
+    from lambent.viewer.modes.edit.mode import EditMode
+    from lambent.viewer.modes.edit.state import EditState
+    from lambent.viewer.modes.edit.subject import opened
+
+    state = EditState(opened(path, screen.folder, **options), screen)
+    return EditMode(state, EditDrawing(open_device(), state))

@@ -1,0 +1,163 @@
+"""Transport that is baked beside the window: the process, how far it is, and when it will be done."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress
+from lambent.editing.document import SessionDocument
+from lambent.editing.session import Session
+from lambent.viewer.work import Work
+
+LIGHTS = (400, 4000)
+WORKER = "lambent.viewer.modes.edit.worker"
+ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole view shows it; visibility takes 1
+LEAST_DONE = 0.02  # before it, nobody can say how long it takes
+LAST_CHARACTERS = 300  # of what a worker wrote before it died
+_NUMBER = re.compile(r"(\d+) lights$")
+
+
+@dataclass
+class Stage:
+    """How far the transport for so many lights is: its steps, by name, and their weights; that of visibility is 1."""
+
+    weights: Mapping[str, float]
+    began_s: float
+    lights: int = 0
+    step: str = ""
+    before: float = 0.0  # weight of the steps before
+    share: float = 0.0  # of the step
+    reported_s: float = 0.0
+
+    def take(self, what: str, share: float, lights: int, now_s: float) -> None:
+        """A step of the bake goes on."""
+        if lights != self.lights:
+            self.lights, self.step, self.before, self.began_s = lights, what, 0.0, now_s
+        elif what != self.step:
+            self.before, self.step = self.before + self._weight(self.step), what
+        self.share, self.reported_s = share, now_s
+
+    def left_s(self, now_s: float) -> float | None:
+        """Seconds until these lights are there, if it goes on like this; None while that is anybody's guess."""
+        total = 1.0 + sum(self.weights.values())
+        done = (self.before + self.share * self._weight(self.step)) / total
+        if done < LEAST_DONE:
+            return None
+        left_s = (self.reported_s - self.began_s) * (1 - done) / done
+        return max(left_s - (now_s - self.reported_s), 1.0)
+
+    def _weight(self, step: str) -> float:
+        return self.weights.get(_NUMBER.sub("", step).rstrip(", "), 1.0)
+
+
+class Baking:
+    """One run of the worker.
+
+    Attributes
+    ----------
+    document : SessionDocument
+        The session that it bakes for.
+    error : str
+        Why it ended early, in a line; empty where it did not.
+    arrived : list of int
+        Numbers of lights that are in the store, in the order of their arrival; whoever reads them takes them out.
+    has_view : bool
+        Whether the points of the view are in the store.
+    """
+
+    def __init__(
+        self, session: Session, store: Path, lights: Sequence[int] = LIGHTS, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.document: SessionDocument = session.document
+        self.store, self.error, self.what = store, "", "starting"
+        self.arrived: list[int] = []
+        self.has_view = False
+        self._clock, self._lights = clock, lights
+        terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
+        self._curves = {(name, t.name): len(t.factors) for name, t in terms}
+        self._stage = Stage({}, clock())
+        self.weigh({name: 1 / len(self.document.materials) for name in self.document.materials})
+        copy = Session(session.document, session.folder)
+        self._process: subprocess.Popen[str] | None = None
+        self._work: Work | None = Work(lambda progress: self._run(copy, progress), lambda _: None, self._failed)
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on; takes its end."""
+        if self._work is not None and self._work.poll():
+            self._work = None
+        return self._work is not None
+
+    @property
+    def line(self) -> str:
+        """What it does now, and how much longer these lights take."""
+        left_s, stage = self._stage.left_s(self._clock()), self._stage
+        step = f"{self.what} {100 * stage.share:.0f} %"
+        return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
+
+    def weigh(self, shares: Mapping[str, float]) -> None:
+        """Tell which share of the view's points each material has."""
+        self._stage.weights = {
+            f"{name}: {term}": shares.get(name, 0.0) * (TWO_CURVES if curves == 2 else ONE_CURVE)
+            for (name, term), curves in self._curves.items()
+        }
+
+    def close(self) -> None:
+        """End the process; what it has finished stays in the store."""
+        if self._work is not None:
+            self._work.cancel()
+            if self._process is not None:
+                self._process.kill()
+            self._work.wait()
+            self._work = None
+
+    def _failed(self, error: UserError) -> None:
+        self.error = str(error)
+
+    def _run(self, session: Session, progress: Progress) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            job, words = Path(folder) / "job.edits.json", Path(folder) / "words.txt"
+            session.save(job)
+            command = [sys.executable, "-m", WORKER, str(job), str(self.store), *map(str, self._lights)]
+            with words.open("w") as log:
+                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
+                try:
+                    self._listen(self._process, progress)
+                finally:
+                    self._process.kill()
+                    self._process.wait()
+            if self._process.returncode != 0:
+                progress(1, 1, "")  # raises where it was cancelled
+                last = words.read_text(errors="replace").strip()[-LAST_CHARACTERS:].splitlines()
+                raise UserError(f"the bake ended with {self._process.returncode} ({last[-1] if last else 'no word'})")
+
+    def _listen(self, process: subprocess.Popen[str], progress: Progress) -> None:
+        assert process.stdout is not None
+        progress(0, 1, "")
+        for line in process.stdout:
+            progress(0, 1, "")
+            self.take(json.loads(line))
+        process.wait()
+
+    def take(self, said: dict[str, object]) -> None:
+        """Take a line of the worker."""
+        if "error" in said:
+            raise UserError(str(said["error"]))
+        if "lights" in said:
+            self.arrived.append(int(str(said["lights"])))
+            return
+        self.what = str(said["what"])
+        found = _NUMBER.search(self.what)
+        if found:
+            self.has_view = True
+            share = float(str(said["done"])) / max(float(str(said["total"])), 1e-9)
+            self._stage.take(self.what, share, int(found[1]), self._clock())

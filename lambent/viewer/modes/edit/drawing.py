@@ -1,0 +1,122 @@
+"""The edited picture as textures: A and B, in their own pixels, where they fit into the window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from lambent.core.errors import UserError
+from lambent.core.false_colour import with_scale
+from lambent.core.images import write_image, write_shown
+from lambent.core.photometry import LUMINANCE
+from lambent.core.plain import plain_name
+from lambent.realtime.device import adapter_info
+from lambent.viewer.edits import unused
+from lambent.viewer.mode import Divider, Drawing, Image
+from lambent.viewer.modes.edit.painter import Frame
+from lambent.viewer.modes.edit.state import EditState
+from lambent.viewer.modes.edit.tone import Bytes
+from lambent.viewer.screen import Rect, Statistics
+
+FORMAT = "rgba8unorm"  # bytes come encoded
+
+
+class EditDrawing(Drawing):
+    """Uploads the painter's frames."""
+
+    def __init__(self, device: Any, state: EditState) -> None:
+        super().__init__(device)
+        self._state, self._ratio = state, 1.0
+        width, height = state.session.document.size
+        self._textures = [self._texture(width, height) for _ in "AB"]
+        self._pair = [texture.create_view() for texture in self._textures]
+        # Another view of B: Dear ImGui's backend forgets a view a frame after it had another name.
+        self._alone = [self._textures[1].create_view()]
+        self._uploaded: list[Bytes | None] = [None, None]
+        self._outline: tuple[object, Image] | None = None
+        self._frame: Frame | None = None
+        self._adapter = adapter_info(device).name if device is not None else ""
+
+    @property
+    def views(self) -> list[Any]:
+        """A and B where two are compared, else the picture alone."""
+        return self._pair if self.divider is not None else self._alone
+
+    @property
+    def divider(self) -> Divider | None:
+        frame = self._frame
+        return self._state.compared.divider if frame is not None and frame.compared is not None else None
+
+    @property
+    def images(self) -> Mapping[str, Image]:
+        """The outline of the object under the mouse, and for a moment of what was selected."""
+        view, wanted = self._state.loading.view, self._state.outlined
+        if view is None or not wanted:
+            return {}
+        if self._outline is None or self._outline[0] != wanted:
+            self._outline = wanted, view.outline(set(wanted))
+        return {"outline": self._outline[1]}
+
+    def within(self, place: Rect) -> Rect:
+        """The largest place of the picture's shape, or one of its own pixels; in the middle."""
+        width, height = self._state.session.document.size
+        scale = min(place.width / width, place.height / height)
+        if self._state.pixel_exact:
+            scale = 1 / self._ratio
+        wide, high = max(1, round(scale * width)), max(1, round(scale * height))
+        return Rect(place.x + (place.width - wide) // 2, place.y + (place.height - high) // 2, wide, high)
+
+    def update(self, place: Rect, pixel_ratio: float) -> None:
+        """Upload what is new of the last frame."""
+        self._ratio = pixel_ratio
+        frame = self._state.painter.frame
+        if frame is None or frame is self._frame:
+            return
+        self._frame = frame
+        for k, shown in enumerate((frame.compared, frame.shown)):
+            if shown is not None and shown is not self._uploaded[k]:
+                self._upload(self._textures[k], shown)
+                self._uploaded[k] = shown
+        height, width = frame.shown.shape[:2]
+        self._state.screen.statistics = Statistics(
+            self._adapter, frame_ms=1e3 * frame.seconds, resolution=(width, height)
+        )
+
+    def save(self) -> None:
+        """Write the picture, PNG as shown and EXR as radiance; the picture A beside it where two are compared."""
+        frame, screen = self._frame, self._state.screen
+        if frame is None:
+            screen.say("picture not saved: there is none yet")
+            return
+        stem = unused(screen.folder, plain_name(self._state.subject.name, "scene"), ".png", ".exr", "-A.png", "-A.exr")
+        pictures = [("", frame.shown, frame.radiance)]
+        if frame.compared is not None and frame.compared_radiance is not None:
+            pictures.append(("-A", frame.compared, frame.compared_radiance))
+        try:
+            for ending, shown, radiance in pictures:
+                write_image(screen.folder / f"{stem}{ending}.exr", radiance)
+                write_shown(screen.folder / f"{stem}{ending}.png", self._with_scale(shown[..., :3]))
+        except (UserError, OSError) as error:
+            screen.say(f"picture not saved: {error}")
+        else:
+            screen.say(f"saved {stem}.png and {stem}.exr")
+
+    def close(self) -> None:
+        """End the work in the background."""
+        self._state.close()
+
+    def _with_scale(self, shown: Bytes) -> Bytes:
+        look = self._state.look
+        return with_scale(shown, look.scale, LUMINANCE.unit) if look.is_false_coloured else shown
+
+    def _texture(self, width: int, height: int) -> Any:
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        return self.device.create_texture(size=(width, height, 1), format=FORMAT, usage=usage)
+
+    def _upload(self, texture: Any, shown: Bytes) -> None:
+        height, width = shown.shape[:2]
+        rows = {"bytes_per_row": 4 * width, "rows_per_image": height}
+        self.device.queue.write_texture({"texture": texture}, np.ascontiguousarray(shown), rows, (width, height, 1))

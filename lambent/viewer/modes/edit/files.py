@@ -1,0 +1,166 @@
+"""Files of the edit mode: sessions, material documents that are handed over, and what is dropped onto the window."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.core.plain import plain_name
+from lambent.editing.document import Surroundings
+from lambent.editing.handover import Handover, hand_over
+from lambent.editing.session import Session, Start
+from lambent.materials.document import load_material
+from lambent.materials.factored.opening import editable_of
+from lambent.materials.factored.terms import Editable
+from lambent.viewer.editor.files import kind_of, typed_path
+from lambent.viewer.edits import unused
+from lambent.viewer.modes.edit.subject import SESSION_ENDING
+from lambent.viewer.screen import Screen
+from lambent.viewer.work import Work
+
+
+class Tables:
+    """Curves of tables, each made once: that takes seconds."""
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[Path, int], Editable] = {}
+
+    def __call__(self, file: Path) -> Editable:
+        key = file.resolve(), file.stat().st_mtime_ns
+        if key not in self._made:
+            self._made[key] = editable_of(file).editable
+        return self._made[key]
+
+
+class Files:
+    """Saves and opens, and says so, or why not, on the screen; a failure changes nothing.
+
+    Attributes
+    ----------
+    home : Path or None
+        Where the session is saved; None until it has a file.
+    handed : Handover or None
+        What was handed over last.
+    """
+
+    def __init__(self, session: Session, screen: Screen, name: str, home: Path | None, tables: Tables) -> None:
+        self._session, self._screen, self._tables = session, screen, tables
+        self._stem = plain_name(name, "scene")
+        self.home = home
+        self.handed: Handover | None = None
+        self.handed_to: Path | None = None
+        self.typed: dict[str, str] = {}
+        self._work: Work | None = None
+        self._saved = session.document
+
+    @property
+    def busy(self) -> bool:
+        return self._work is not None
+
+    @property
+    def doing(self) -> str:
+        """What is under way, for people; empty where nothing is."""
+        return self._work.what if self._work is not None else ""
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether the session has changed since it was opened or saved."""
+        now, before = self._session.document, self._saved
+        return now.materials != before.materials or now.environment != before.environment
+
+    def poll(self) -> None:
+        """Take the end of what was under way."""
+        if self._work is not None and self._work.poll():
+            self._work = None
+
+    def close(self) -> None:
+        """Cancel what is under way."""
+        if self._work is not None:
+            self._work.cancel()
+            self._work = None
+
+    def save(self) -> None:
+        """Write the session to its file; to a new one of the next free number where it has none."""
+        target, document = self.home or self._unused(self._stem), self._session.document
+        try:
+            self._session.save(target)
+        except (UserError, OSError) as error:
+            self._screen.say(f"not saved: {error}")
+        else:
+            self.home, self._saved = target, document
+            self._screen.say(f"saved {target}")
+
+    def rescue(self) -> Iterator[Path]:
+        """Write an unsaved session to a file of a new name, because the window is about to be lost."""
+        if self.unsaved:
+            file = self._unused(f"{self._stem}-rescued")
+            self._session.save(file)
+            yield file
+
+    def name_unsaved(self) -> None:
+        """Say on stderr which materials were changed and not saved."""
+        if self.unsaved:
+            now, before = self._session.document.materials, self._saved.materials
+            names = ", ".join(name for name, one in now.items() if one != before.get(name)) or "the environment"
+            sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
+
+    def hand_over(self, material: str) -> None:
+        """Write a material document of a material as it is edited now; lobes are fitted beside the window."""
+        session = Session(self._session.document, self._session.folder, self._tables)
+
+        def done(found: Handover) -> None:
+            folder = self._screen.folder
+            file = folder / f"{unused(folder, plain_name(material), '.json')}.json"
+            try:
+                found.material.save(file)
+            except (UserError, OSError) as error:
+                self._screen.say(f"not handed over: {error}")
+                return
+            self.handed, self.handed_to = found, file
+            self._screen.say(f"saved {file}: {found.verdict}")
+
+        self._begin(lambda: hand_over(session, material), f"fitting {material}", done, "not handed over")
+
+    def open(self, text: str, material: str) -> None:
+        """Take a file: a document or a table for a material, an image as the environment."""
+        try:
+            path = typed_path(text)
+            kind = kind_of(path)
+            if kind == "environment":
+                self.light_with(path)
+            elif kind == "material":
+                self._become(material, load_material(path), path)
+            else:
+                become = partial(self._become, material, path, path)
+                self._begin(lambda: self._tables(path), f"curves of {path.name}", lambda _: become(), "not loaded")
+        except UserError as error:
+            self._screen.say(f"not loaded: {error}")
+
+    def light_with(self, path: Path) -> None:
+        """Light the scene with an image, as a step of undo."""
+        if not path.is_file():
+            raise UserError("no such file", file=path)
+        light = Surroundings(file=str(path.resolve()))
+        self._session.history.change(self._session.document.model_copy(update={"environment": light}))
+        self._screen.say(f"light of {path.name}: the picture follows when its transport is baked")
+
+    def _become(self, name: str, start: Start, path: Path) -> None:
+        try:
+            self._session.become(name, start)
+        except UserError as error:
+            self._screen.say(f"not loaded: {error}")
+        else:
+            self._screen.say(f"{name} is {path.name} now; undo brings back the one before")
+
+    def _unused(self, stem: str) -> Path:
+        folder = self._screen.folder
+        return folder / f"{unused(folder, stem, SESSION_ENDING)}{SESSION_ENDING}"
+
+    def _begin(self, run: Callable[[], object], what: str, done: Callable[..., None], refused: str) -> None:
+        if self._work is not None:
+            raise UserError(f"still {self.doing}", hint="wait until that is done")
+        self._work = Work(lambda _: run(), done, lambda error: self._screen.say(f"{refused}: {error}"))
+        self._work.what = what

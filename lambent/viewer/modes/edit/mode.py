@@ -1,0 +1,142 @@
+"""The edit mode put together: its panels, its input, what is drawn over the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from imgui_bundle import imgui
+
+from lambent.viewer.edits import MaterialEdits
+from lambent.viewer.input import Input
+from lambent.viewer.lost import rescued
+from lambent.viewer.mode import Drawing, Mode, Panel, Textures
+from lambent.viewer.modes.edit import panels
+from lambent.viewer.modes.edit.state import OUTLINED_S, EditState
+from lambent.viewer.navigation import Navigation
+from lambent.viewer.panels import overlay
+from lambent.viewer.panels.widgets import rows, shadowed
+from lambent.viewer.screen import least
+from lambent.viewer.work import POLL_S
+
+SHORTCUTS = (
+    ("click", "edit the material under the mouse"),
+    ("Tab", "the next material"),
+    ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
+    ("Ctrl+S", "save the session"),
+    ("P", "save the picture (PNG and EXR)"),
+    ("H", "hide or show everything but the picture"),
+)
+LOOK_S = 0.02  # between two looks for a frame while the picture changes
+
+
+class EditInput(Input):
+    """The view stays as it is: the mouse points at materials."""
+
+    def __init__(self, state: EditState) -> None:
+        bounds: Any = tuple(map(tuple, state.subject.scene.bounds))
+        camera = state.session.document.camera
+        super().__init__(state.screen, Navigation(camera, bounds, "walk"), MaterialEdits({}))
+        self._state = state
+
+    def dragged(self, dx: float, dy: float) -> None:
+        """Nothing moves."""
+
+    def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
+        """Undo and redo are the session's."""
+        pressed = event["event_type"] == "key_down" and not ui_has_keys
+        held = "Control" in event["modifiers"] or "Meta" in event["modifiers"]
+        if pressed and held and key in ("z", "y"):
+            back = key == "z" and "Shift" not in event["modifiers"]
+            (self._state.session.undo if back else self._state.session.redo)()
+        else:
+            super().keys(key, event, ui_has_keys)
+
+    def pointed(self, at: tuple[float, float] | None) -> None:
+        view = self._state.loading.view
+        self._state.pointed = view.at(*at) if at is not None and view is not None else None
+
+    def clicked(self, x: float, y: float) -> None:
+        place, view = self.screen.picture, self._state.loading.view
+        found = view.at(x / place.width, y / place.height) if view is not None else None
+        if found is not None:
+            self._state.select(found[1])
+
+    def pressed_key(self, key: str) -> None:
+        if key == "Tab" and self._state.materials:
+            self._state.select_next()
+
+    def saved(self) -> None:
+        self._state.files.save()
+
+
+class EditMode(Mode):
+    """See the module."""
+
+    def __init__(self, state: EditState, drawing: Drawing) -> None:
+        super().__init__(state.subject.name, state.screen, EditInput(state), drawing, columns(state))
+        self.state = state
+
+    @property
+    def moving(self) -> bool:
+        return self.state.painter.busy
+
+    def advance(self, dt_s: float) -> None:
+        self.state.tick()
+
+    def wait_s(self) -> float | None:
+        state = self.state
+        return least(
+            POLL_S if state.busy else None,
+            LOOK_S if state.painter.busy else None,
+            OUTLINED_S / 2 if state.selection_is_new else None,
+        )
+
+    def draw_over(self, textures: Textures) -> None:
+        state, place = self.state, self.screen.picture
+        outline = textures.get("outline")
+        if outline is not None and state.outlined:
+            imgui.get_background_draw_list().add_image(outline, place.point(0, 0), place.point(1, 1))
+        if state.pointed is not None:
+            x, y = imgui.get_mouse_pos()
+            shadowed(imgui.get_background_draw_list(), (x + 14, y + 4), state.pointed[1], (1, 1, 1, 1))
+        overlay.false_colour_bar(place, state.look)
+        overlay.draw(self.screen, self._lines(), refining=False)
+
+    def _lines(self) -> list[str]:
+        """Work in the background, and its errors."""
+        state = self.state
+        lines = [state.trouble] if state.trouble else []
+        if state.baking is not None:
+            lines.append(state.baking.line)
+        elif state.loading.busy:
+            lines.append("reading transport")
+        if state.files.busy:
+            lines.append(state.files.doing)
+        frame = state.painter.frame
+        if frame is not None and frame.needed:
+            lines.append(f"shown as before, until its transport is there: {', '.join(sorted(frame.needed))}")
+        return lines
+
+    def drop(self, path: str) -> None:
+        self.state.files.open(path, self.state.material)
+
+    def rescue(self) -> None:
+        rescued("the unsaved session", self.state.files.rescue)
+        self.state.stop_baking()
+
+    def close(self) -> None:
+        self.state.files.name_unsaved()
+
+
+def columns(state: EditState) -> tuple[Panel, ...]:
+    """The column, each panel on the state."""
+    return (
+        Panel("Scene", partial(panels.draw_scene, state), opened=True),
+        Panel("Compare", partial(panels.draw_compare, state), opened=True),
+        Panel("Save", partial(panels.draw_files, state), opened=True),
+        Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),
+        Panel("View", partial(panels.draw_look, state), opened=True),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+    )

@@ -1,0 +1,223 @@
+"""The edited picture in a thread of its own: what is wanted goes in, frames come out.
+
+Whatever arrives, transport of more lights or of another environment, the picture goes over to it in `FADE_S`: the
+difference between before and after is added and fades, while edits show in every frame.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lambent.core.arrays import Image
+from lambent.core.false_colour import Range
+from lambent.editing.picture import EditedPicture, Part, TransportNeeded
+from lambent.materials.factored.of_models import same_quotients
+from lambent.materials.factored.terms import Editable
+from lambent.viewer.modes.edit.tone import Bytes, displayed
+
+FADE_S = 0.5
+FRAME_S = 1 / 60
+Materials = Mapping[str, Editable]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any."""
+
+    now: Materials = field(default_factory=dict)
+    compared: Materials | None = None
+    view: str = "filmic"
+    exposure_ev: float = 0.0
+    scale: Range = field(default_factory=Range)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame: bytes (H, W, 4) of B and A, radiance (H, W, 3) of both, and the wish that it shows.
+
+    `needed` are materials whose transport does not serve the wish; they are shown as they were.
+    """
+
+    number: int
+    wish: Wish
+    shown: Bytes
+    radiance: Image
+    compared: Bytes | None = None
+    compared_radiance: Image | None = None
+    needed: frozenset[str] = frozenset()
+    settled: bool = False
+    seconds: float = 0.0
+
+
+class Painter:
+    """Draws frames of the size (height, width) until it is closed. `frame` is the last one; errors are in `error`.
+
+    Only this thread touches the picture. `run` has it do something between two frames.
+    """
+
+    def __init__(self, size: tuple[int, int], clock: Callable[[], float] = time.monotonic) -> None:
+        self.frame: Frame | None = None
+        self.error: Exception | None = None
+        self._clock = clock
+        self._picture = EditedPicture(np.zeros((*size, 3), np.float32), {})
+        self._parts: dict[str, list[Part]] = {}  # the one in the picture first, then those that served before
+        self._given: dict[str, Editable] = {}  # what the picture was told last
+        self._fade: Image | None = None
+        self._fade_from_s = 0.0
+        self._compared: tuple[Materials, Image] | None = None
+        self._wish, self._tasks, self._closed = Wish(), deque[Callable[[], None]](), False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    def want(self, wish: Wish) -> None:
+        """Show this from the next frame on."""
+        with self._changed:
+            self._wish = wish
+            self._changed.notify()
+
+    def run(self, task: Callable[[], None]) -> None:
+        """Do something in the thread of the picture, before the next frame."""
+        with self._changed:
+            self._tasks.append(task)
+            self._changed.notify()
+
+    @property
+    def busy(self) -> bool:
+        """Whether another frame is coming."""
+        frame = self.frame
+        return bool(self._tasks) or frame is None or frame.wish is not self._wish or not frame.settled
+
+    def close(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    # What `run` may be given, with arguments.
+
+    def begin(self, backdrop: Image) -> None:
+        """Begin anew with what is seen without reflection: under another light, parts from before are of no use."""
+        before = self._image()
+        self._picture, self._parts, self._given = EditedPicture(backdrop, {}), {}, {}
+        self._compared = None
+        if before.any():
+            self._fade_over(before)
+
+    def put(self, material: str, part: Part) -> None:
+        """Add the transport of a material, or replace it."""
+        before = self._image()
+        kept = [one for one in self._parts.get(material, []) if not same_quotients(one.start, part.start)]
+        self._parts[material] = [part, *kept]
+        self._place(material, part, self._wish.now.get(material))
+        self._compared = None
+        self._fade_over(before)
+
+    def activate(self, material: str, curve: str) -> None:
+        """Fold the curves that are not dragged into the transport, before the first movement of a drag."""
+        if material in self._given:
+            self._picture.activate(material, curve)
+
+    def _work(self) -> None:
+        try:
+            while self._turn():
+                pass
+        except Exception as error:  # noqa: BLE001 raised in the thread of the window
+            self.error = error
+
+    def _turn(self) -> bool:
+        """One frame, if one is due; False when the painter is closed."""
+        with self._changed:
+            while not (self._closed or self._tasks or self.busy):
+                self._changed.wait()
+            if self._closed:
+                return False
+            wish, task = self._wish, self._tasks.popleft() if self._tasks else None
+        began_s = self._clock()
+        if task is not None:
+            task()
+        self._draw(wish, began_s)
+        with self._changed:
+            rest_s = FRAME_S - (self._clock() - began_s)
+            if rest_s > 0 and wish is self._wish and not self._tasks and not self._closed:
+                self._changed.wait(rest_s)
+        return True
+
+    def _draw(self, wish: Wish, began_s: float) -> None:
+        needed = frozenset(name for name, made in wish.now.items() if not self._show(name, made))
+        self._picture.step()
+        radiance = self._image()
+        compared = self._image_of(wish.compared, wish.now) if wish.compared is not None else None
+        settled = self._picture.is_settled and self._fade is None and not self._tasks
+        how = wish.view, wish.exposure_ev, wish.scale
+        self.frame = Frame(
+            self.frame.number + 1 if self.frame else 1, wish, displayed(radiance, *how), radiance,
+            displayed(compared, *how) if compared is not None else None, compared, needed, settled,
+            self._clock() - began_s,
+        )  # fmt: skip
+
+    def _show(self, name: str, made: Editable) -> bool:
+        """Let the picture go to a material; False where it has no transport for that."""
+        if name not in self._parts or self._given.get(name) is made:
+            return True
+        with suppress(TransportNeeded):
+            self._picture.show(name, made)
+            self._given[name] = made
+            return True
+        part = next((one for one in self._parts[name][1:] if same_quotients(one.start, made)), None)
+        if part is None:
+            return False
+        self._parts[name].remove(part)
+        self._parts[name].insert(0, part)
+        self._place(name, part, made)
+        return True
+
+    def _place(self, name: str, part: Part, made: Editable | None) -> None:
+        self._picture.put(name, part)
+        self._given.pop(name, None)
+        if made is not None and self._show(name, made):
+            self._picture.draw()
+
+    def _image_of(self, materials: Materials, now: Materials) -> Image:
+        """The picture of A, drawn once; materials whose transport is gone are as they are in B."""
+        if self._compared is None or self._compared[0] is not materials:
+            for name, made in materials.items():
+                self._show(name, made)
+            self._picture.draw()
+            image = self._picture.image()
+            for name, made in now.items():
+                self._show(name, made)
+            self._picture.draw()
+            self._compared = materials, image
+        return self._compared[1]
+
+    def _image(self) -> Image:
+        """The picture now, with the rest of what fades."""
+        image = self._picture.image()
+        if self._fade is None:
+            return image
+        left = 1 - (self._clock() - self._fade_from_s) / FADE_S
+        if left <= 0:
+            self._fade = None
+            return image
+        smooth = np.float32(left * left * (3 - 2 * left))
+        return np.maximum(image + smooth * self._fade, 0)
+
+    def _fade_over(self, before: Image) -> None:
+        """Go over from an image to what the picture shows now."""
+        self._fade, self._fade_from_s = before - self._picture.image(), self._clock()
+
+
+def checked(painter: Painter) -> None:
+    """Raise what went wrong in the thread."""
+    if painter.error is not None:
+        error, painter.error = painter.error, None
+        raise error

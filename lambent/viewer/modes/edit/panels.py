@@ -1,0 +1,129 @@
+"""The column of the edit mode: what is edited, curves, comparison, the look, files."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from imgui_bundle import imgui
+
+from lambent.viewer.look import VIEW_TRANSFORMS
+from lambent.viewer.modes.edit.curves.editor import CurveEditor
+from lambent.viewer.modes.edit.state import EditState
+from lambent.viewer.panels import look as looks
+from lambent.viewer.panels.widgets import (
+    AMBER,
+    DIM,
+    buttons,
+    check,
+    choice,
+    coloured,
+    explain,
+    rows,
+    typed_field,
+    wrapped,
+)
+
+
+def draw_scene(state: EditState) -> None:
+    """The view, its light, and how far its transport is."""
+    document = state.session.document
+    width, height = document.size
+    light = document.environment.file.rpartition("/")[2] if document.environment else "the scene's"
+    rows(
+        [("camera", document.camera.name), ("picture", f"{width} x {height}"), ("light", light),
+         ("transport", f"{state.loading.lights} lights" if state.loading.lights else "not yet")], "scene"
+    )  # fmt: skip
+    if state.baking is not None:
+        imgui.push_text_wrap_pos()
+        coloured(state.baking.line, DIM)
+        imgui.pop_text_wrap_pos()
+    wrapped([line for line in (state.trouble, *state.subject.scene.warnings[:3]) if line], AMBER)
+    text = typed_field("environment", state.files.typed, "light", "another .hdr or .exr, lat-long...")
+    if text is not None:
+        state.files.open(text, state.material)
+
+
+def draw_material(state: EditState, curves: Curves) -> None:
+    """The selected material, what it is made of, and its curves."""
+    names = state.materials
+    if not names:
+        return
+    if state.material not in names:
+        state.material = names[0]
+    chosen = choice("material", state.material, names)
+    if chosen != state.material:
+        state.select(chosen)
+    fixed = state.session.original(chosen).fixed
+    if fixed:
+        coloured(f"stays as it is: {', '.join(fixed)}", DIM)
+    history, session = state.session.history, state.session
+    buttons([
+        ("undo", history.can_undo, session.undo, "Ctrl+Z"),
+        ("redo", history.can_redo, session.redo, "Ctrl+Shift+Z"),
+    ])  # fmt: skip
+    curves.draw(chosen)
+    text = typed_field("become", state.files.typed, "open", "a material document or a table...")
+    explain("let the material begin as something else; a file can be dropped onto the window, too")
+    if text is not None:
+        state.files.open(text, state.material)
+
+
+def draw_compare(state: EditState) -> None:
+    """What the picture A shows."""
+    compared = state.compared
+    compared.chosen = choice("A", compared.chosen, compared.choices)
+    compared.divider.a_label, compared.divider.b_label = compared.chosen, "now"
+    buttons([("snapshot", bool(state.now), lambda: compared.keep(state.now), "keep this state, to compare with")])
+
+
+def draw_look(state: EditState) -> None:
+    """Exposure, view transform, size."""
+    look = state.look
+    looks.draw_exposure(look)
+    look.view_transform = choice("transform", look.view_transform, VIEW_TRANSFORMS)
+    if look.is_false_coloured:
+        looks.draw_range(look, state.screen)
+    state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact)
+
+
+def draw_files(state: EditState) -> None:
+    """The session, and the material as a document."""
+    files = state.files
+    buttons([
+        ("save session", True, files.save, "Ctrl+S; never onto a file that it did not come from"),
+        ("hand over", not files.busy and bool(state.material), lambda: files.hand_over(state.material),
+         "save the material as a document that every other command opens; lobes are fitted where needed"),
+    ])  # fmt: skip
+    if files.home is not None:
+        coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
+    if files.busy:
+        coloured(files.doing, DIM)
+    if files.handed is not None and files.handed_to is not None:
+        found = files.handed
+        shares = [(f"error, {name}", f"{share:.2%}") for name, share in found.shares.items()]
+        fitted = ", ".join(found.fitted) or "nothing: it is exact"
+        rows([("file", files.handed_to.name), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "handed")
+        wrapped(found.warnings, AMBER)
+
+
+class Curves:
+    """The curve editor, and what the picture has to know of it."""
+
+    def __init__(self, state: EditState) -> None:
+        self._state = state
+        self._active: str | None = None
+        self._needed: frozenset[str] = frozenset()
+        self._editor = CurveEditor()
+
+    def draw(self, material: str) -> None:
+        """Draw the curves of a material; the one that is grabbed becomes active in the picture."""
+        state, editor = self._state, self._editor
+        editor.draw(state.session, material)
+        if editor.active_curve != self._active:
+            self._active = editor.active_curve
+            if self._active is not None:
+                state.painter.run(partial(state.painter.activate, material, self._active))
+        needed = state.painter.frame.needed if state.painter.frame is not None else frozenset()
+        for name in self._needed - needed:
+            editor.transported(state.session, name)
+        self._needed = needed

@@ -1,0 +1,222 @@
+"""The edit mode without its window: session, picture, transport that comes, what is selected and compared."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from lambent.core.errors import UserError
+from lambent.editing.document import SessionDocument
+from lambent.materials.factored.terms import Editable
+from lambent.store.source import changed_inputs
+from lambent.store.store import MANIFEST, Store
+from lambent.viewer.look import Look
+from lambent.viewer.mode import Divider
+from lambent.viewer.modes.edit.baking import LIGHTS, Baking
+from lambent.viewer.modes.edit.files import Files, Tables
+from lambent.viewer.modes.edit.loading import Loading
+from lambent.viewer.modes.edit.painter import Materials, Painter, Wish, checked
+from lambent.viewer.modes.edit.subject import Subject
+from lambent.viewer.screen import Screen
+
+OUTLINED_S = 1.0  # after a selection
+OFF, UNEDITED = "off", "as opened"
+Fixed = tuple[object, ...]  # all that transport depends on
+
+
+@dataclass
+class Compared:
+    """What the picture A shows: nothing, the materials as they were opened, or a snapshot, by its name."""
+
+    chosen: str = OFF
+    kept: dict[str, Materials] = field(default_factory=dict)
+    divider: Divider = field(default_factory=Divider)
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        return (OFF, *self.kept)
+
+    @property
+    def materials(self) -> Materials | None:
+        return self.kept.get(self.chosen)
+
+    def keep(self, materials: Materials) -> None:
+        """Take a snapshot and compare with it."""
+        self.chosen = f"snapshot {len(self.kept)}"
+        self.kept[self.chosen] = materials
+
+
+class EditState:
+    """See the module. `trouble` is a line about what failed; empty where nothing did."""
+
+    def __init__(
+        self,
+        subject: Subject,
+        screen: Screen,
+        lights: Sequence[int] = LIGHTS,
+        bake: Callable[..., Baking] = Baking,
+        tables: Tables | None = None,
+    ) -> None:
+        self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
+        self.look = Look(exposure_ev=subject.scene.exposure_ev, shows=("full",))
+        self.pixel_exact = False
+        self.material = next(iter(self.session.document.materials), "")
+        self.pointed: tuple[str, str] | None = None  # object and material under the mouse
+        self.selected_s = -1e9  # when the selection was made
+        self.trouble = ""
+        self.painter = Painter(self.session.document.size[::-1])
+        self.loading = Loading(self.painter, subject.store)
+        self.baking: Baking | None = None
+        self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())
+        self._bake = bake
+        self._sources: Sequence[object] = ()  # for which transport was seen to last
+        self._fixed: Fixed | None = None
+        self._weighed: Baking | None = None  # the one that knows what the view shows
+        self._document: SessionDocument | None = None
+        self._now: dict[str, Editable] = {}
+        self._wish = Wish()
+        self.compared = Compared(kept={UNEDITED: self._originals()})
+        if (subject.store / MANIFEST).exists():
+            self._load(None)
+
+    @property
+    def busy(self) -> bool:
+        """Whether work goes on in the background whose progress is to be seen."""
+        return self.baking is not None or self.loading.busy or self.files.busy
+
+    @property
+    def now(self) -> Materials:
+        """The materials as they are edited now."""
+        return self._wish.now
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Those that can be selected: what the view shows, or, before that is known, all."""
+        view = self.loading.view
+        return view.materials if view is not None and view.materials else tuple(self.session.document.materials)
+
+    @property
+    def outlined(self) -> tuple[str, ...]:
+        """Objects whose outline is shown: the one under the mouse, and for a moment those of a new selection."""
+        view = self.loading.view
+        if view is not None and self.selection_is_new:
+            return tuple(name for name, material in view.objects if material == self.material)
+        return (self.pointed[0],) if self.pointed is not None else ()
+
+    @property
+    def selection_is_new(self) -> bool:
+        return self.screen.clock() - self.selected_s < OUTLINED_S
+
+    def select(self, material: str) -> None:
+        """Edit this material."""
+        self.material, self.selected_s = material, self.screen.clock()
+
+    def select_next(self) -> None:
+        """The next one that the view shows."""
+        names = self.materials
+        at = names.index(self.material) + 1 if self.material in names else 0
+        self.select(names[at % len(names)])
+
+    def tick(self) -> None:
+        """Take what the background has, and let the picture follow the session."""
+        checked(self.painter)
+        self.files.poll()
+        self.loading.poll()
+        self._take_edits()
+        self._take_baked()
+        if not self.loading.busy:
+            self._have_transport()
+
+    def close(self) -> None:
+        """End all work in the background; what was baked stays in the store."""
+        self.stop_baking()
+        self.files.close()
+        self.loading.close()
+        self.painter.close()
+
+    def _take_edits(self) -> None:
+        document, look = self.session.document, self.look
+        if document is not self._document:
+            before = self._document.materials if self._document is not None else {}
+            self._now = {
+                name: self._now[name] if before.get(name) is one else self.session.editable(name)
+                for name, one in document.materials.items()
+            }
+            self._document = document
+        wish = Wish(self._now, self.compared.materials, look.view_transform, look.exposure_ev, look.scale)
+        if not same(wish, self._wish):
+            self._wish = wish
+            self.painter.want(wish)
+
+    def _take_baked(self) -> None:
+        if self.baking is None:
+            return
+        if self.loading.view is not None and self._weighed is not self.baking:
+            self._weighed = self.baking
+            self.baking.weigh(self.loading.view.shares)
+        if not self.loading.busy and self.baking.arrived:
+            self._load(self.baking.arrived.pop(0))
+        elif not self.loading.busy and self.baking.has_view and self.loading.view is None:
+            self._load(0)
+        elif not self.baking.running and not self.baking.arrived:
+            self.trouble = f"not baked: {self.baking.error}" if self.baking.error else ""
+            self.baking = None
+
+    def _have_transport(self) -> None:
+        """Where the session begins as something else than before: bake what its transport lacks."""
+        document = self.session.document
+        sources = (document.environment, *(one.source for one in document.materials.values()))
+        if len(sources) == len(self._sources) and all(map(operator.is_, sources, self._sources)):
+            return
+        folder = self.subject.store_for(document.environment)
+        if folder != self.loading.folder:
+            self.stop_baking()
+            self.loading = Loading(self.painter, folder, begins=False)
+            if (folder / MANIFEST).exists():
+                self._load(None)
+                return
+        self._sources, before, self._fixed = sources, self._fixed, self._needs()
+        if self._fixed == before:
+            return
+        self.stop_baking()
+        if self._is_complete():
+            return
+        if before is not None:
+            self.screen.say("this edit needs new transport: it is baked in the background")
+        self.baking = self._bake(self.session, folder, self.lights)
+
+    def _is_complete(self) -> bool:
+        materials = self.materials if self.loading.view is not None else ()
+        made = {name: self.session.original(name) for name in materials}
+        if not made or not all(self.loading.has(name, one, self.lights[-1]) for name, one in made.items()):
+            return False
+        return not changed_inputs(Store.open(self.loading.folder), self.subject.scene)
+
+    def stop_baking(self) -> None:
+        """End the bake; what it has finished stays in the store."""
+        if self.baking is not None:
+            self.baking.close()
+            self.baking = None
+
+    def _load(self, lights: int | None) -> None:
+        self.loading.start(self.session, lights, self._not_loaded)
+
+    def _not_loaded(self, error: UserError) -> None:
+        if self.baking is not None:  # else it is baked now
+            self.trouble = f"not loaded: {error}"
+
+    def _originals(self) -> dict[str, Editable]:
+        return {name: self.session.original(name) for name in self.session.document.materials}
+
+    def _needs(self) -> Fixed:
+        document = self.session.document
+        terms = tuple((name, term.fixed) for name, one in self._originals().items() for term in one.terms)
+        return (document.environment, *terms)
+
+
+def same(one: Wish, other: Wish) -> bool:
+    """Whether two wishes are of the same objects."""
+    parts: list[Any] = [(w.view, w.exposure_ev, w.scale) for w in (one, other)]
+    return one.now is other.now and one.compared is other.compared and parts[0] == parts[1]

@@ -1,0 +1,216 @@
+"""What `lambent edit` opens in place: a scene's file, a store, or a saved session, as a session of one view."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from lambent.core.camera import Camera, overview
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
+from lambent.core.inputs import read_head, sha256_of
+from lambent.core.plain import plain_name, triple
+from lambent.editing.document import Surroundings
+from lambent.editing.session import Factorise, Session
+from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
+from lambent.scenes.scene import Scene
+from lambent.store.source import SURROUNDINGS, scene_of
+from lambent.store.store import MANIFEST, Store
+from lambent.store.views import read_views
+from lambent.viewer.picture import LARGEST_PX
+
+Kind = Literal["scene", "store", "session"]
+SIZE = (512, 512)
+SESSION_ENDING = ".edits.json"
+STORE_ENDING = ".edit.store"
+HEAD_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is edited.
+
+    Attributes
+    ----------
+    session : Session
+        Of all materials that objects of the scene have.
+    scene : Scene
+        With the environment that it has itself.
+    folder : Path
+        Where files are saved and stores of other environments are made.
+    store : Path
+        Folder of the store that has, or will have, the transport of the view under the environment `lit_by`.
+    lit_by : Surroundings or None
+        The environment at the start; None where it is the scene's.
+    home : Path or None
+        The file that the session came from.
+    """
+
+    session: Session
+    scene: Scene
+    folder: Path
+    store: Path
+    lit_by: Surroundings | None
+    home: Path | None = None
+
+    @property
+    def name(self) -> str:
+        return self.scene.name
+
+    def store_for(self, environment: Surroundings | None) -> Path:
+        """The folder for transport under an environment: one store holds one environment."""
+        if environment == self.lit_by:
+            return self.store
+        return default_store(self.folder, self.scene.name, environment, self.session.folder)
+
+
+def kind_of(path: Path) -> Kind | None:
+    """Which of these a path is; None where `lambent edit` has to open it as a material."""
+    if str(path).startswith(BUILTIN_PREFIX):
+        return "scene"
+    if path.is_dir():
+        return "store"
+    head = read_head(path, HEAD_BYTES) if path.is_file() else b""
+    if path.name.endswith(SESSION_ENDING) or b'"lambent-edit-session"' in head:
+        return "session"
+    return "scene" if is_scene(path, head) else None
+
+
+def opened(
+    path: Path,
+    folder: Path,
+    *,
+    camera: str | None = None,
+    environment: Path | None = None,
+    picture: tuple[int, int] | None = None,
+    store: Path | None = None,
+    factorise: Factorise | None = None,
+) -> Subject:
+    """What is at a path.
+
+    Parameters
+    ----------
+    camera, picture
+        Name of a camera or saved view, and width and height in pixels; by default those of the session, else the first
+        camera, or an overview, and 512 x 512.
+    environment
+        An image that lights the scene instead of its own environment.
+    store
+        Where transport is kept. By default a store keeps its own; a scene's is made in `folder`.
+
+    Raises
+    ------
+    UserError
+        The path cannot be read, the camera is unknown, or the store is another scene's.
+    """
+    if picture is not None and max(picture) > LARGEST_PX:
+        got = f"{picture[0]}x{picture[1]}"
+        raise UserError("picture is too large", field="--picture", got=got, expected=f"at most {LARGEST_PX} a side")
+    kind = kind_of(path)
+    if kind == "session":
+        session = Session.open(path, factorise)
+        place = str(session.path(session.document.scene))
+        place = place if Path(place).exists() else session.document.scene
+    else:
+        session, place = None, str(path)
+    base = Path(place) if Path(place).is_dir() else None
+    scene = _scene_at(place)
+    kept = _kept_environment(base)
+    lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
+    if environment is not None and not environment.is_file():
+        raise UserError("no such file", file=environment, field="--environment")
+    if session is None:
+        where = camera_named(scene, base, camera)
+        materials = {o.material: scene.materials[o.material] for o in scene.objects}
+        session = Session.new(
+            _lasting(place), where, materials, size=picture or SIZE, environment=lit_by, factorise=factorise
+        )
+    else:
+        changes = _changes(session, scene, base, camera, picture)
+        if environment is not None:
+            changes["environment"] = lit_by
+        session = Session(session.document.model_copy(update=changes), session.folder, factorise)
+        lit_by = session.document.environment
+    own = base if base is not None and lit_by == kept else None
+    chosen = store or own or default_store(folder, scene.name, lit_by, session.folder)
+    check_store(chosen, place)
+    return Subject(session, scene, folder, chosen, lit_by, path if kind == "session" else None)
+
+
+def _changes(
+    session: Session, scene: Scene, base: Path | None, camera: str | None, picture: tuple[int, int] | None
+) -> dict[str, object]:
+    """What another view changes in a saved session, and the materials of the scene that it does not edit."""
+    changes: dict[str, object] = {}
+    if camera is not None:
+        changes["camera"] = camera_named(scene, base, camera)
+    if picture is not None:
+        changes["size"] = picture
+    worn = {o.material: scene.materials[o.material] for o in scene.objects}
+    for name in session.document.materials:
+        known("material", name, worn, field="materials")
+    rest = {name: material for name, material in worn.items() if name not in session.document.materials}
+    found = Session.new(session.document.scene, session.document.camera, rest)
+    return {**changes, "materials": {**session.document.materials, **found.document.materials}}
+
+
+def camera_named(scene: Scene, base: Path | None, name: str | None) -> Camera:
+    """A camera of the scene or a saved view of its store; without a name the first."""
+    saved = read_views(base).cameras if base is not None else ()
+    cameras = {one.name: one for one in (*scene.cameras, *saved)}
+    if name is not None:
+        return cameras[known("camera", name, cameras, field="--camera")]
+    if cameras:
+        return next(iter(cameras.values()))
+    low, high = scene.bounds
+    return overview(triple(low), triple(high))
+
+
+def default_store(folder: Path, name: str, environment: Surroundings | None, base: Path = Path()) -> Path:
+    """NAME.edit.store, or NAME-ENVIRONMENT-HASH.edit.store: the hash tells images of one name apart."""
+    stem = plain_name(name, "scene")
+    if environment is not None:
+        file = base / environment.file
+        said = sha256_of(file) + environment.model_dump_json(exclude={"file"})
+        stem += f"-{plain_name(file.stem)}-{hashlib.sha256(said.encode()).hexdigest()[:6]}"
+    return folder / f"{stem}{STORE_ENDING}"
+
+
+def check_store(folder: Path, place: str) -> None:
+    """`UserError` where a folder is no store, or one that was made from another scene than that at `place`."""
+    if not (folder / MANIFEST).exists() or folder == Path(place):
+        return
+    source = Store.open(folder).documents.get("source")
+    if not isinstance(source, str) or Path(place).is_dir():
+        return
+    same = source == place or (
+        not source.startswith(BUILTIN_PREFIX) and (folder / source).resolve() == Path(place).resolve()
+    )
+    if not same:
+        raise UserError("store of another scene", file=folder, got=source, expected=place, hint="name another with -o")
+
+
+def scene_for(session: Session) -> Scene:
+    """The scene of a session."""
+    place = session.path(session.document.scene)
+    return _scene_at(str(place) if place.exists() else session.document.scene)
+
+
+def _scene_at(place: str) -> Scene:
+    return scene_of(Store.open(Path(place))) if Path(place).is_dir() else load_scene(place)
+
+
+def _kept_environment(base: Path | None) -> Surroundings | None:
+    """The image that a store was lit by instead of its scene's environment."""
+    said: Mapping[str, object] | None = Store.open(base).documents.get(SURROUNDINGS) if base is not None else None
+    if base is None or not said:
+        return None
+    found = Surroundings.model_validate(said)
+    return found.model_copy(update={"file": str((base / found.file).resolve())})
+
+
+def _lasting(place: str) -> str:
+    return place if place.startswith(BUILTIN_PREFIX) else str(Path(place).resolve())

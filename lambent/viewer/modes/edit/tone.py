@@ -1,0 +1,60 @@
+"""Radiance as bytes of a display, fast enough for every frame of a drag."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Image
+from lambent.core.colour import HALF_MAX, luminance, neutral, shown
+from lambent.core.false_colour import Range, false_colour
+from lambent.core.images import to_bytes
+from lambent.core.photometry import LUMINANCE
+from lambent.realtime.frame_state import FALSE_COLOUR
+
+Bytes = NDArray[np.uint8]
+ROWS = 64  # at once: the steps of a transform stay in the cache
+BY_CHANNEL = ("filmic", "linear")  # each channel by itself: a table of all half floats holds the transform
+
+
+def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> Bytes:
+    """(H, W, 4) bytes that a display shows, of radiance (H, W, 3) in W/(sr m^2).
+
+    False colours, on `scale`, are of the luminance without exposure.
+    """
+    out = np.empty((*radiance.shape[:2], 4), np.uint8)
+    out[..., 3] = 255
+    if view == FALSE_COLOUR:
+        number = _half_bits(luminance(radiance))
+        out[..., :3] = _false_colours(scale)[number]
+    elif view in BY_CHANNEL:
+        out[..., :3] = _table(view, exposure_ev)[_half_bits(radiance)]
+    else:
+        assert view == "neutral", view
+        for top in range(0, len(out), ROWS):
+            rows = slice(top, top + ROWS)
+            out[rows, :, :3] = _table("linear", 0.0)[_half_bits(neutral(radiance[rows], exposure_ev))]
+    return out
+
+
+def _half_bits(values: Image) -> NDArray[np.uint16]:
+    """Numbers of half floats: a step of one is 0.05 %, an eighth of a byte's step of a display."""
+    return np.clip(values, 0, HALF_MAX).astype(np.float16).view(np.uint16) & np.uint16(0x7FFF)  # -0 is 0
+
+
+def _halves() -> Image:
+    """The values of all half floats without a sign; what is no number is black, as in `to_bytes`."""
+    values = np.arange(0x8000, dtype=np.uint16).view(np.float16).astype(np.float32)
+    return np.where(np.isfinite(values), values, np.float32(0))
+
+
+@lru_cache(maxsize=8)
+def _table(view: str, exposure_ev: float) -> Bytes:
+    return to_bytes(shown(_halves(), view, exposure_ev))
+
+
+@lru_cache(maxsize=8)
+def _false_colours(scale: Range) -> Bytes:
+    return to_bytes(false_colour(_halves() * np.float32(LUMINANCE.per_y), scale))

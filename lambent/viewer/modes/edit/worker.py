@@ -1,0 +1,76 @@
+"""A process of its own that bakes the transport of a session's view, and says on stdout how far it is.
+
+python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
+
+Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number for which all transport is there
+now; or "error", a line for the user.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lambent.core.errors import UserError
+from lambent.editing.session import Session
+from lambent.store.source import SURROUNDINGS
+from lambent.store.store import Store
+from lambent.viewer.modes.edit.subject import scene_for
+
+NICENESS = 10  # the window comes first
+
+
+def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
+    """Bake for the first number of lights, then for the first two, and so on."""
+    from lambent.bake.bake import bake
+    from lambent.bake.quality import quality_named
+    from lambent.bake.view import View
+
+    opened = Session.open(session)
+    document, scene = opened.document, scene_for(opened)
+    view = View(document.camera, *document.size)
+    editables = {name: opened.original(name) for name in document.materials}
+    for end in range(len(lights)):
+        quality = quality_named("normal").changed(visibility={"lights": tuple(lights[: end + 1])})
+        with bake(
+            scene,
+            folder,
+            quality=quality,
+            only={"transport"},
+            views=[view],
+            editables=editables,
+            progress=_progress,
+            environment=opened.environment,
+        ) as store:
+            _note_environment(store, opened)
+        _say(lights=lights[end])
+
+
+def _note_environment(store: Store, session: Session) -> None:
+    """Keep in the store which image lights it, so that the store can be opened by itself."""
+    said = session.document.environment
+    if said is not None:
+        file = Path(os.path.relpath(session.path(said.file).resolve(), store.folder.resolve())).as_posix()
+        said = said.model_copy(update={"file": file})
+    store.set_document(SURROUNDINGS, said.model_dump(mode="json") if said else None)
+
+
+def _progress(done: float, total: float, what: str) -> None:
+    _say(what=what, done=done, total=total)
+
+
+def _say(**words: object) -> None:
+    sys.stdout.write(json.dumps(words) + "\n")
+    sys.stdout.flush()  # to a window that is gone: BrokenPipeError ends this process, too
+
+
+if __name__ == "__main__":
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+    try:
+        main(Path(sys.argv[1]), Path(sys.argv[2]), [int(word) for word in sys.argv[3:]])
+    except UserError as error:
+        _say(error=str(error))

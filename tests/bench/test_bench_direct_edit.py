@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from lambent.bench import direct_edit
+from lambent.bench.direct_edit import CASES, Effort, held_bytes, run
+
+SMALL = Effort(48, (60,), frames=4, edits=10, reference_spp=64, rival_s=0.5, checked=4)
+
+
+def test_rows_of_a_scene_and_of_the_full_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(direct_edit, "CASES", {"builtin:teatray": CASES["builtin:teatray"]})
+    report = run(SMALL)
+    row, full = report["rows"]
+    assert (row["scene"], row["lights"], row["terms"]) == ("builtin:teatray", 60, 5)
+    assert 0.2 * 48**2 < row["points"] < 0.35 * 48**2 and full["points"] == 48**2
+    assert row["bake_seconds"] >= row["transport_seconds"] > 0
+    assert row["stored_mib"] > 0.1 and row["memory_mib"] > 0.1
+    assert 0 < row["sum_error"] < 0.04 and 0 < row["curve_error"] < 0.06
+    assert row["drift"] < 1e-5
+    for one in (row, full):
+        assert 0 < one["frame_ms"] <= one["frame_worst_ms"] and one["dense_ms"] > 0
+    assert 0 < row["switch_ms"] <= row["switch_worst_ms"]
+    assert 1 <= row["frames_to_exact"] < 20 and 0 <= row["inexact_share"] <= 1
+    assert 0 < row["flip"] < 0.3 and 0 < row["reference_flip"] < 0.3
+    close, slow = row["rival_flip"] <= row["flip"], isinstance(row["rival_seconds"], str)
+    assert close != slow, "either it came as close, or it says how long it tried"
+    json.dumps(report)
+
+
+def test_the_rival_comes_closer_with_more_samples() -> None:
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.reference.denoised import DirectLight
+    from lambent.scenes import load_scene
+
+    scene = load_scene("builtin:teatray")
+    tracer = DirectLight(scene, scene.cameras[0], 48, 48)
+    reference = np.log(1e-2 + tracer.image(1024, seed=1))
+    errors = {spp: np.abs(np.log(1e-2 + tracer.denoised(spp, seed=2)) - reference).mean() for spp in (2, 64)}
+    noisy = np.abs(np.log(1e-2 + tracer.image(2, seed=2)) - reference).mean()
+    assert errors[64] < errors[2] < noisy
+
+
+def test_arrays_are_counted_once() -> None:
+    @dataclass
+    class Held:
+        one: np.ndarray
+        again: dict[str, list[np.ndarray]]
+
+    Held.__module__ = "lambent.held"
+    array = np.zeros(1000, np.float32)
+    assert held_bytes(Held(array, {"part": [array[:10], array]})) == 4000

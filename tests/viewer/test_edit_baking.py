@@ -1,0 +1,86 @@
+"""The bake beside the window: its progress, its time left, its errors, its end."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from lambent.editing.session import Session
+from lambent.viewer.modes.edit import baking
+from lambent.viewer.modes.edit.baking import Baking, Stage
+from tests.viewer.edited_view import CAMERA, SIZE, TRAY
+
+TALKS = """
+import json, sys, time
+def say(**words): print(json.dumps(words), flush=True)
+say(what="views", done=1, total=1)
+say(what="visibility of 20 lights", done=0, total=1)
+say(lights=20)
+{end}
+"""
+
+
+@pytest.fixture
+def begun(tmp_path, monkeypatch):
+    """A bake by a worker that ends with a statement."""
+
+    def begin(end):
+        (tmp_path / "talking_worker.py").write_text(TALKS.format(end=end))
+        monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+        monkeypatch.setattr(baking, "WORKER", "talking_worker")
+        return Baking(Session.new("builtin:box", CAMERA, {"tray": TRAY}, size=SIZE), tmp_path / "store", (20,))
+
+    return begin
+
+
+def ended(bake):
+    end = time.monotonic() + 20
+    while bake.running:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_what_arrives_is_told_and_a_good_end_has_no_error(begun):
+    bake = begun("")
+    ended(bake)
+    assert (bake.arrived, bake.has_view, bake.error) == ([20], True, "")
+
+
+@pytest.mark.parametrize(
+    ("end", "line"),
+    [
+        ("say(error='scene.toml: no such file')", "scene.toml: no such file"),
+        ("raise RuntimeError('no memory')", "the bake ended with 1 (RuntimeError: no memory)"),
+        ("sys.exit(3)", "the bake ended with 3 (no word)"),
+    ],
+)
+def test_errors_are_one_line(begun, end, line):
+    bake = begun(end)
+    ended(bake)
+    assert bake.error == line
+
+
+def test_closing_ends_the_process(begun):
+    bake = begun("time.sleep(600)")
+    while not bake.arrived:
+        time.sleep(0.01)
+    process = bake._process
+    began = time.monotonic()
+    bake.close()
+    assert process.poll() is not None and time.monotonic() - began < 5
+    assert not bake.running and bake.error == ""
+    bake.close()
+
+
+def test_the_time_left_counts_down_by_the_weights_of_steps():
+    stage = Stage({"tray: diffuse": 1.0, "tray: specular": 8.0}, 0.0)
+    stage.take("visibility of 398 lights", 0.0, 398, 10.0)
+    assert stage.left_s(10.0) is None
+    stage.take("tray: diffuse, 398 lights", 0.0, 398, 11.0)
+    stage.take("tray: specular, 398 lights", 0.0, 398, 12.0)
+    assert stage.left_s(12.0) == pytest.approx(8.0) and stage.left_s(15.0) == pytest.approx(5.0)
+    stage.take("tray: specular, 398 lights", 0.5, 398, 14.0)
+    assert stage.left_s(14.0) == pytest.approx(4 * 4 / 6)
+    stage.take("visibility of 3998 lights", 0.0, 3998, 20.0)
+    assert stage.lights == 3998 and stage.left_s(20.0) is None

@@ -1,0 +1,105 @@
+"""Panels, mouse and keys of editing in place, in real Dear ImGui frames without a window."""
+
+from __future__ import annotations
+
+import pytest
+
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.edit import painter
+from lambent.viewer.modes.edit.mode import EditMode
+from lambent.viewer.screen import Rect
+from tests.viewer.edited_view import LIGHTS, new_state, settled, until
+from tests.viewer.panel_driver import PanelDriver
+
+
+@pytest.fixture
+def driver(monkeypatch, screen, tmp_path):
+    monkeypatch.setattr(painter, "FADE_S", 0.01)
+    monkeypatch.setattr(painter, "FRAME_S", 0.001)
+    state, bakes = new_state(screen, tmp_path)
+    until(state, lambda: bakes.begun)
+    for lights in LIGHTS:
+        bakes.begun[0].arrive(lights)
+        until(state, lambda lights=lights: state.loading.lights == lights)
+    settled(state)
+    driver = PanelDriver(monkeypatch, EditMode(state, Drawing(None)))
+    yield driver
+    driver.close()
+    state.close()
+
+
+def key(driver, name, *modifiers):
+    event = {"event_type": "key_down", "key": name, "modifiers": modifiers}
+    driver.mode.input.handle(event, ui_has_mouse=False, ui_has_keys=False)
+
+
+def mouse(driver, kind, x, y):
+    place = driver.state.screen.picture
+    event = {"event_type": kind, "x": place.x + x * place.width, "y": place.y + y * place.height, "button": 1}
+    driver.mode.input.handle(event, ui_has_mouse=False, ui_has_keys=False)
+
+
+def test_clicks_select_and_the_name_follows_the_mouse(driver):
+    state = driver.state
+    mouse(driver, "pointer_move", 0.05, 0.55)
+    assert state.pointed == ("back", "wall")
+    mouse(driver, "pointer_down", 0.05, 0.55)
+    mouse(driver, "pointer_up", 0.05, 0.55)
+    assert state.material == "wall" and state.selection_is_new
+    mouse(driver, "pointer_down", 0.05, 0.05)
+    mouse(driver, "pointer_up", 0.05, 0.05)
+    assert state.material == "wall", "nothing is there"
+    key(driver, "Tab")
+    assert state.material == "tray"
+    driver.mode.input.handle({"event_type": "pointer_leave"}, ui_has_mouse=False, ui_has_keys=False)
+    assert state.pointed is None
+    driver.mode.input.handle(
+        {"event_type": "wheel", "x": 50, "y": 50, "dy": 100}, ui_has_mouse=False, ui_has_keys=False
+    )
+    driver.frame()
+
+
+def test_keys_undo_redo_and_save(driver):
+    state = driver.state
+    state.session.tint("tray", "diffuse", 2.0)
+    key(driver, "z", "Control")
+    assert not state.session.document.materials["tray"].tints
+    key(driver, "z", "Control", "Shift")
+    assert state.session.document.materials["tray"].tints
+    key(driver, "s", "Control")
+    assert state.files.home is not None and state.files.home.exists()
+    key(driver, "p")
+    assert state.screen.save_wanted
+
+
+def test_the_buttons_of_the_column(driver):
+    state = driver.state
+    state.session.tint("tray", "diffuse", 2.0)
+    driver.frame()
+    driver.click("undo")
+    assert not state.session.document.materials["tray"].tints
+    driver.click("redo")
+    assert state.session.document.materials["tray"].tints
+    driver.click("reset material")
+    assert not state.session.document.materials["tray"].tints
+    state.tick()
+    driver.click("snapshot")
+    assert state.compared.chosen == "snapshot 1"
+    driver.click("one pixel of the picture is one of the screen")
+    assert state.pixel_exact
+    driver.click("save session")
+    assert state.files.home is not None
+    driver.click("hand over")
+    until(state, lambda: state.files.handed is not None)
+    driver.frame(2)
+
+
+def test_the_picture_keeps_its_shape(driver):
+    from lambent.viewer.modes.edit.drawing import EditDrawing
+
+    drawing = EditDrawing.__new__(EditDrawing)  # without a device
+    drawing._state, drawing._ratio = driver.state, 2.0
+    assert drawing.within(Rect(0, 0, 80, 80)) == Rect(0, 10, 80, 60)
+    assert drawing.within(Rect(10, 0, 160, 60)) == Rect(50, 0, 80, 60)
+    driver.state.pixel_exact = True
+    assert drawing.within(Rect(0, 0, 80, 80)) == Rect(38, 38, 4, 3), "two pixels of the screen are one of the window"

@@ -1,0 +1,311 @@
+"""Editing in place without a window: transport arrives, edits show, A is compared with B, files are written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+
+import numpy as np
+import pytest
+
+from lambent.core.colour import shown
+from lambent.core.errors import UserError
+from lambent.core.false_colour import Range, false_colour
+from lambent.core.images import to_bytes
+from lambent.core.photometry import photometric
+from lambent.editing.operators import Region
+from lambent.editing.picture import EditedPicture
+from lambent.editing.session import Session
+from lambent.editing.stored import parts_of
+from lambent.materials.document import load_material
+from lambent.store.store import Store
+from lambent.viewer.modes.edit import painter
+from lambent.viewer.modes.edit.painter import FADE_S
+from lambent.viewer.modes.edit.state import OFF, UNEDITED
+from lambent.viewer.modes.edit.tone import displayed
+from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, new_state, settled, until
+
+LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Frames that do not wait for each other."""
+    monkeypatch.setattr(painter, "FADE_S", 0.01)
+    monkeypatch.setattr(painter, "FRAME_S", 0.001)
+
+
+@pytest.fixture
+def opened(screen, tmp_path):
+    state, bakes = new_state(screen, tmp_path)
+    yield state, bakes
+    state.close()
+
+
+@pytest.fixture
+def ready(quick, opened):
+    """With all transport."""
+    state, bakes = opened
+    until(state, lambda: bakes.begun)
+    for lights in LIGHTS:
+        bakes.begun[0].arrive(lights)
+        until(state, lambda lights=lights: state.loading.lights == lights)
+    until(state, lambda: state.baking is None)
+    state.screen.clock.now_s += 10
+    settled(state)
+    return state, bakes
+
+
+def exact(state, session=None, lights=LIGHTS[-1]):
+    """The picture (48, 3) of a session, drawn at once from what the store has."""
+    session = session or state.session
+    originals = {name: session.original(name) for name in session.document.materials}
+    picture = EditedPicture(
+        np.full((6, 8, 3), 0.125, np.float32), parts_of(Store.open(state.loading.folder), session, originals, lights)
+    )
+    for name in originals:
+        picture.show(name, session.editable(name))
+    picture.draw()
+    return picture.image().reshape(-1, 3)
+
+
+def test_the_first_lights_can_be_edited_and_more_come_without_a_jump(opened):
+    state, bakes = opened
+    until(state, lambda: bakes.begun)
+    bake = bakes.begun[0]
+    assert state.loading.lights == 0 and bake.store == state.subject.store
+    bake.arrive(LIGHTS[0])
+    until(state, lambda: state.loading.lights == LIGHTS[0])
+    settled(state)
+    state.session.pull("tray", "highlight", LOW, y=1.0)
+    state.painter._clock = clock = type(state.screen.clock)()
+    clock.now_s = time.monotonic() + 100
+    before = settled(state).radiance
+    assert np.allclose(before.reshape(-1, 3), exact(state, lights=LIGHTS[0]), atol=1e-4)
+    bake.arrive(LIGHTS[1])
+    until(state, lambda: state.loading.lights == LIGHTS[1] and not state.painter._tasks)
+    number = state.painter.frame.number
+    until(state, lambda: state.painter.frame.number > number + 3)
+    assert np.allclose(state.painter.frame.radiance, before, atol=1e-4), "time stands still: no jump"
+    wanted = exact(state)
+    assert np.abs(wanted - before.reshape(-1, 3)).max() > 0.05
+    clock.now_s += FADE_S / 2
+    number = state.painter.frame.number
+    until(state, lambda: state.painter.frame.number > number + 3)
+    assert np.allclose(state.painter.frame.radiance.reshape(-1, 3), (wanted + before.reshape(-1, 3)) / 2, atol=1e-3)
+    state.session.tint("wall", "diffuse", 3.0)
+    clock.now_s += FADE_S
+    assert np.allclose(settled(state).radiance.reshape(-1, 3), exact(state), atol=1e-4)
+
+
+def test_undo_redo_and_every_edit_show(ready):
+    state, bakes = ready
+    start = settled(state).radiance
+    state.session.pull("tray", "fresnel", LOW, y=0.5)
+    edited = settled(state)
+    assert np.allclose(edited.radiance.reshape(-1, 3), exact(state), atol=1e-4) and not edited.needed
+    assert not np.allclose(edited.radiance, start)
+    state.session.undo()
+    assert np.allclose(settled(state).radiance, start, rtol=2e-3), "another curve is folded in, in half floats"
+    state.session.redo()
+    assert np.allclose(settled(state).radiance, edited.radiance, rtol=2e-3)
+    assert len(bakes.begun) == 1
+
+
+def test_another_quotient_is_baked_and_undo_needs_no_bake(ready):
+    state, bakes = ready
+    before = settled(state).radiance
+    assert not state.session.become("tray", OTHER_TRAY)
+    until(state, lambda: len(bakes.begun) == 2)
+    assert any("new transport" in message.text for message in state.screen.messages)
+    assert settled(state).needed == {"tray"}
+    assert np.allclose(state.painter.frame.radiance, before, atol=1e-4), "shown as before meanwhile"
+    state.session.pull("wall", "diffuse", LOW, y=0.1)
+    meanwhile = settled(state).radiance.reshape(-1, 3)
+    assert not np.allclose(meanwhile[SHOWN["wall"]], before.reshape(-1, 3)[SHOWN["wall"]])
+    state.session.undo()
+    for lights in LIGHTS:
+        bakes.begun[1].arrive(lights, seed=5)
+        until(state, lambda: not bakes.begun[1].arrived and not state.loading.busy)
+    after = settled(state)
+    assert not after.needed and not np.allclose(after.radiance, before)
+    assert np.allclose(after.radiance.reshape(-1, 3)[SHOWN["tray"]], exact(state)[SHOWN["tray"]], atol=1e-4)
+    state.session.undo()
+    assert np.allclose(settled(state).radiance, before, atol=1e-4)
+    assert len(bakes.begun) == 2, "the transport from before is still there"
+
+
+def test_a_bake_that_nobody_needs_any_more_ends(ready):
+    state, bakes = ready
+    state.session.become("tray", OTHER_TRAY)
+    until(state, lambda: len(bakes.begun) == 2)
+    state.session.undo()
+    until(state, lambda: bakes.begun[1].closed)
+    assert state.baking is None and not settled(state).needed
+
+
+def test_an_error_of_the_bake_is_one_line(opened):
+    state, bakes = opened
+    until(state, lambda: bakes.begun)
+    bakes.begun[0].error, bakes.begun[0].running = "scene has no objects", False
+    until(state, lambda: state.baking is None)
+    assert state.trouble == "not baked: scene has no objects"
+    for _ in range(5):
+        state.tick()
+    assert len(bakes.begun) == 1
+
+
+def test_a_complete_store_is_not_baked_again(ready, screen, tmp_path):
+    state, bakes = new_state(screen, tmp_path)
+    try:
+        until(state, lambda: state.loading.lights == LIGHTS[-1] and not state.loading.busy)
+        settled(state)
+        assert not bakes.begun
+        assert np.allclose(state.painter.frame.radiance.reshape(-1, 3), exact(state), atol=1e-4)
+    finally:
+        state.close()
+
+
+def test_a_is_what_was_opened_or_a_snapshot(ready):
+    state, _ = ready
+    start = settled(state).radiance
+    assert state.painter.frame.compared is None
+    state.session.pull("tray", "highlight", LOW, y=1.0)
+    state.compared.chosen = UNEDITED
+    frame = settled(state)
+    assert np.allclose(frame.compared_radiance, start, atol=1e-4)
+    assert np.allclose(frame.radiance.reshape(-1, 3), exact(state), atol=1e-4)
+    state.compared.keep(state.now)
+    state.session.tint("tray", "diffuse", (3.0, 1.0, 1.0))
+    again = settled(state)
+    assert state.compared.choices == (OFF, UNEDITED, "snapshot 1")
+    assert np.allclose(again.compared_radiance, frame.radiance, atol=1e-4)
+    assert not np.allclose(again.radiance, frame.radiance)
+    state.session.become("tray", OTHER_TRAY)
+    state.compared.chosen = OFF
+    assert settled(state).compared is None
+
+
+def test_pointing_selecting_and_outlines(ready):
+    state, _ = ready
+    view = state.loading.view
+    assert view.at(3.5 / 8, 0.5 / 6) == ("plate", "tray") and view.at(0.5 / 8, 0.5 / 6) is None
+    assert view.at(0.5 / 8, 3.5 / 6) == ("back", "wall") and view.at(1.5, 2.0) is None
+    assert state.materials == ("tray", "wall") and view.shares == pytest.approx({"tray": 17 / 38, "wall": 21 / 38})
+    assert state.outlined == ()
+    state.select_next()
+    assert state.material == "wall" and state.outlined == ("back",)
+    state.screen.clock.now_s += 2
+    assert state.outlined == ()
+    state.pointed = ("plate", "tray")
+    assert state.outlined == ("plate",)
+    edge = view.outline({"plate"})
+    assert edge[0, 3, 3] > 0 and not edge[..., 3].reshape(-1)[SHOWN["wall"]].any()
+    state.select_next()
+    assert state.material == "tray"
+
+
+def test_sessions_are_saved_under_names_of_their_own(ready):
+    state, _ = ready
+    folder = state.screen.folder
+    (folder / "small room-001.edits.json").write_text("mine")
+    assert not state.files.unsaved
+    state.session.pull("tray", "highlight", LOW, y=1.0)
+    assert state.files.unsaved
+    state.files.save()
+    assert (folder / "small room-001.edits.json").read_text() == "mine"
+    saved = folder / "small room-002.edits.json"
+    assert Session.open(saved).document.materials == state.session.document.materials and not state.files.unsaved
+    state.session.tint("wall", "diffuse", 2.0)
+    rescued = list(state.files.rescue())
+    assert [file.name for file in rescued] == ["small room-rescued-001.edits.json"]
+    assert "tints" in json.loads(rescued[0].read_text())["materials"]["wall"]
+    state.files.save()
+    assert Session.open(saved).document.materials == state.session.document.materials
+    assert not list(state.files.rescue())
+
+
+def test_unsaved_materials_are_named_at_the_end(ready, capsys):
+    state, _ = ready
+    state.files.name_unsaved()
+    assert capsys.readouterr().err == ""
+    state.session.tint("wall", "diffuse", 2.0)
+    state.files.name_unsaved()
+    assert capsys.readouterr().err == "lambent: note: wall changed and not saved\n"
+
+
+def test_a_material_is_handed_over_as_a_document(ready):
+    state, _ = ready
+    state.session.tint("tray", "diffuse", 2.0)
+    state.files.hand_over("tray")
+    with pytest.raises(UserError, match="still fitting tray"):
+        state.files.hand_over("tray")
+    until(state, lambda: state.files.handed is not None)
+    written = load_material(state.screen.folder / "tray-001.json")
+    assert np.allclose(written.kd, np.multiply(TRAY.kd, 2.0)) and written.lobes == TRAY.lobes
+    assert state.files.handed.fitted == ()
+
+
+def test_documents_and_tables_are_dropped(ready, tmp_path):
+    state, bakes = ready
+    OTHER_TRAY.save(tmp_path / "other.json")
+    state.material = "wall"
+    state.files.open(str(tmp_path / "other.json"), "wall")
+    assert [term.name for term in state.session.original("wall").terms] == ["diffuse", "specular"]
+    until(state, lambda: len(bakes.begun) == 2)
+    state.files.open(str(tmp_path / "missing.json"), "wall")
+    (tmp_path / "broken.json").write_text('{"format": 3}')
+    state.files.open(str(tmp_path / "broken.json"), "wall")
+    assert sum("not loaded" in message.text for message in state.screen.messages) == 2
+    assert len(bakes.begun) == 2
+
+
+def test_an_environment_has_a_store_of_its_own_and_undo_goes_back(ready, tmp_path):
+    state, bakes = ready
+    before = settled(state).radiance
+    (tmp_path / "sky.hdr").write_bytes(b"an image for the bake alone")
+    state.files.open(str(tmp_path / "sky.hdr"), "tray")
+    until(state, lambda: len(bakes.begun) == 2)
+    folder = bakes.begun[1].store
+    assert folder != state.subject.store and folder.name.startswith("small room-sky-")
+    assert np.allclose(settled(state).radiance, before, atol=1e-4), "until its light is there"
+    for lights in LIGHTS:
+        bakes.begun[1].arrive(lights, seed=9)
+        until(state, lambda: not bakes.begun[1].arrived and not state.loading.busy)
+    assert np.allclose(settled(state).radiance.reshape(-1, 3), exact(state), atol=1e-4)
+    assert not np.allclose(state.painter.frame.radiance, before)
+    state.session.undo()
+    until(state, lambda: state.loading.folder == state.subject.store and state.loading.lights == LIGHTS[-1])
+    assert np.allclose(settled(state).radiance, before, atol=1e-4) and len(bakes.begun) == 2
+
+
+@pytest.mark.parametrize("view", ("filmic", "neutral", "linear"))
+def test_bytes_are_those_of_the_view_transform(view):
+    rng = np.random.default_rng(1)
+    light = (10 ** rng.uniform(-5, 5, (40, 50, 3))).astype(np.float32)
+    light[0, 0], light[0, 1] = (-0.0, 0.0, 1e9), (np.nan, np.inf, -1.0)
+    made = displayed(light, view, -1.2, Range())
+    assert made.shape == (40, 50, 4) and (made[..., 3] == 255).all()
+    wanted = to_bytes(shown(light[1:], view, -1.2)).astype(int)
+    assert np.abs(made[1:, :, :3] - wanted).max() <= 1
+
+
+def test_false_colours_are_of_luminance():
+    light = np.geomspace(1e-3, 1e2, 300, dtype=np.float32).reshape(10, 10, 3)
+    scale = Range(0.1, 1000.0)
+    wanted = to_bytes(false_colour(photometric(light), scale)).astype(int)
+    made = displayed(light, "false-colour", 3.0, scale)[..., :3]
+    assert np.abs(made - wanted).max() <= 2
+
+
+def test_an_error_in_the_thread_reaches_the_window(ready):
+    state, _ = ready
+
+    def fail():
+        raise ZeroDivisionError("in the thread")
+
+    state.painter.run(fail)
+    with pytest.raises(ZeroDivisionError, match="in the thread"):
+        until(state, lambda: False)
+    assert dataclasses.is_dataclass(state.painter.frame)

@@ -1,0 +1,91 @@
+"""Editing in place on a virtual screen: a scene is baked beside the window, edited, saved, closed and opened again."""
+
+import numpy as np
+import pytest
+
+from lambent.core.images import read_image
+from lambent.editing.session import Session
+from lambent.store.contract import baked_views, transport_lights
+from lambent.store.store import Store
+from tests.viewer.window_session import VirtualScreen, WindowSession, missing_tools
+
+pytestmark = pytest.mark.slow
+SIZE, PIXELS = (900, 900), 32
+
+
+@pytest.fixture(scope="module")
+def screen():
+    if missing_tools():
+        pytest.skip(f"not installed: {', '.join(missing_tools())}")
+    screen = VirtualScreen()
+    yield screen
+    screen.close()
+
+
+@pytest.fixture
+def opened(adapter, screen):
+    sessions = []
+
+    def start(what, folder):
+        (folder / "state.json").unlink(missing_ok=True)  # of a window before
+        sessions.append(WindowSession(screen, what, folder, SIZE, f"place:{PIXELS}"))
+        return sessions[-1]
+
+    yield start
+    for session in sessions:
+        session.kill()
+
+
+def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
+    session = opened("builtin:teatray", tmp_path)
+    assert session.state()["lights"] == 0 and session.state()["baking"], "the window is there at once"
+    session.wait_for(lambda state: state["lights"] >= 400)
+    session.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None and not state["busy"])
+    before = session.state()
+    assert before["picture"] == [530, 530] and before["brightness"] > 0.01 and not before["trouble"]
+    x, y = 0.5 * 530, 185 + 0.55 * 530
+    session.click(x, y)
+    session.wait_for(lambda state: state["selected"] == "glaze" and state["pointed"][1] == "glaze")
+    session.tool("key", "Tab")
+    session.wait_for(lambda state: state["selected"] != "glaze")
+    session.click(x, y)
+    session.wait_for(lambda state: state["selected"] == "glaze")
+    session.click(*session.point("snapshot"))
+    session.wait_for(lambda state: state["compared"])
+    session.drag(session.point("diffuse", 0.25), session.point("diffuse", 0.9))
+    edited = session.wait_for(lambda state: state["tints"]["glaze"] and not state["busy"])
+    assert edited["brightness"] > 1.02 * before["brightness"]
+    session.tool("key", "ctrl+z")
+    session.wait_for(lambda state: not state["tints"]["glaze"] and not state["busy"])
+    assert session.state()["brightness"] == pytest.approx(before["brightness"], rel=1e-3)
+    session.tool("key", "ctrl+shift+z")
+    session.wait_for(lambda state: state["tints"]["glaze"] and not state["busy"])
+    session.tool("key", "p")
+    session.wait_for(lambda state: any("teatray-001.png" in text for text in state["messages"]))
+    assert read_image(tmp_path / "teatray-001.exr").mean() == pytest.approx(edited["brightness"], rel=1e-2)
+    session.tool("key", "ctrl+s")
+    session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
+    assert session.close() == 0, session.log()
+    saved = Session.open(tmp_path / "teatray-001.edits.json")
+    assert np.mean(saved.document.materials["glaze"].tints["diffuse"]) > 1.5
+
+    again = opened(tmp_path / "teatray-001.edits.json", tmp_path)
+    there = again.wait_for(lambda state: state["lights"] == 4000 and not state["busy"])
+    assert there["baking"] is None and there["tints"]["glaze"]
+    assert there["brightness"] == pytest.approx(edited["brightness"], rel=1e-2)
+    again.drag(again.point("diffuse", 0.25), again.point("diffuse", 0.1))
+    assert again.close() == 0 and "changed and not saved" in again.log()
+
+
+def test_a_window_that_closes_early_ends_the_bake_which_goes_on_the_next_time(opened, tmp_path):
+    first = opened("builtin:teatray", tmp_path)
+    first.wait_for(lambda state: state["lights"] == 400)
+    assert first.close() == 0, first.log()
+    with Store.open(tmp_path / "teatray.edit.store") as store:
+        store.set_document("written by", "the test")  # nobody else writes
+        camera = next(iter(baked_views(store).values())).camera
+    second = opened("builtin:teatray", tmp_path)
+    second.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None)
+    store.refresh()
+    assert transport_lights(store, camera, PIXELS, PIXELS) == [400, 4000]
+    assert second.close() == 0, second.log()
