@@ -116,8 +116,8 @@ def bake(
         if not resume:
             store.forget_all()
         context = BakeContext(
-            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {}, environment,
-            bounces or Bounces(),
+            scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
+            environment, bounces or Bounces(),
         )  # fmt: skip
         for kind in order:
             if context.stale(kind):
