@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lambent.bake import artefacts
+from lambent.bake.bounces import Bounces
 from lambent.bake.methods import LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.cli.console import Json, progress_bar, show, table
-from lambent.core.discovery import known, names_in
+from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -45,24 +46,37 @@ def command(
     edit: Annotated[
         Path | None, typer.Option(help="Session of edits: its view, with its materials and its environment.")
     ] = None,
+    series: Annotated[
+        str, typer.Option(help="Of interreflections: bands of sharp curves at the first surface, the second, ...")
+    ] = "64,1,1,1",
+    samples: Annotated[
+        int, typer.Option(min=1, help="Of interreflections: paths per pixel, added to those there.")
+    ] = 1024,
+    fixed: Annotated[
+        list[str] | None, typer.Option(help="Of interreflections: a material that is not edited. Repeatable.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
 
     Example: lambent bake builtin:room -o room.store --quality preview
     Example: lambent bake builtin:teatray -o tray.store --only transport --view front:512x512
+    Example: lambent bake builtin:cornell -o box.store --only transport --only interreflection --view front:450x450
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
 
     what = load_scene(scene)
     edited = _edited(what, output, view or [], edit)
-    if edited["views"] and only is not None and "transport" not in only:
+    if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
+    for name in fixed or ():
+        known("material", name, what.materials, field="--fixed")
+    bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()))
     with progress_bar() as progress:
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
-            light_map=light_map, probes=probes, **edited,
+            light_map=light_map, probes=probes, bounces=bounces, **edited,
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     seconds = store.documents.get("timings", {})

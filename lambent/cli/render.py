@@ -14,7 +14,18 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
 
-SHOWN_BY = ("store", "output", "edit", "exposure", "view", "false_range", "linear", "force", "json")  # edited views
+SHOWN_BY = (
+    "store",
+    "output",
+    "edit",
+    "surfaces",
+    "exposure",
+    "view",
+    "false_range",
+    "linear",
+    "force",
+    "json",
+)  # edited views
 
 
 def command(
@@ -58,6 +69,12 @@ def command(
     edit: Annotated[
         Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
     ] = None,
+    surfaces: Annotated[
+        str | None,
+        typer.Option(
+            help="MOST or LEAST:MOST surfaces on the paths that --edit shows; 1 is direct light. [default: all]"
+        ),
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -80,9 +97,11 @@ def command(
     if edit is not None:
         _check_edit(context, edit)
         check_output(output, WRITABLE, force=force)
-        done = render.edited_still(store, edit, output, settings)
+        done = render.edited_still(store, edit, output, settings, parse_surfaces(surfaces or "1:99"))
         show(asdict(done), f"{output}: {done.width}x{done.height}, edited, {done.seconds:.1f} s", json)
         return
+    if surfaces is not None:
+        raise UserError("says what an edited view shows", field="--surfaces", hint="name a session with --edit")
     moves = output.suffix.lower() == FILM or (path is not None and output.suffix.lower() in SEQUENCES)
     check_output(output, (*WRITABLE, FILM), force=force or moves)
     if moves and camera is not None:
@@ -113,6 +132,18 @@ def parse_range(text: str, *, log: bool) -> Range:
         return Range(float(low), float(high), log)
     except ValueError:
         raise UserError("not a range", field="--range", got=text, expected="LOW:HIGH, as in 10:500") from None
+
+
+def parse_surfaces(text: str) -> tuple[int, int]:
+    """The range of "3" or "2:3"."""
+    least, _, most = text.rpartition(":")
+    try:
+        found = int(least or 1), int(most)
+    except ValueError:
+        found = (0, 0)
+    if not 1 <= found[0] <= found[1]:
+        raise UserError("not a range of surfaces", field="--surfaces", got=text, expected="MOST or LEAST:MOST, from 1")
+    return found
 
 
 def _check_edit(context: typer.Context, session: Path) -> None:

@@ -15,9 +15,9 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.images import WRITABLE, check_writable
 from lambent.core.progress import Progress, silent
-from lambent.editing.picture import EditedPicture
+from lambent.editing.interreflection.whole import ALL_HITS, WholePicture, whole_picture
 from lambent.editing.session import Session
-from lambent.editing.stored import NotBaked, edited_picture
+from lambent.editing.stored import NotBaked
 from lambent.render.images import Images, Settings
 from lambent.render.output import DEFAULT, Rendered, exposed, write_still
 from lambent.store.contract import transport_lights
@@ -30,7 +30,7 @@ EDITED = "edited"  # in the place of an integrator
 class Edited(Images):
     """Images of an edited picture, by the camera of its session alone."""
 
-    def __init__(self, picture: EditedPicture, settings: Settings) -> None:
+    def __init__(self, picture: WholePicture, settings: Settings) -> None:
         super().__init__(settings)
         self._picture = picture
 
@@ -38,8 +38,14 @@ class Edited(Images):
         return np.maximum(self._picture.image(), 0)  # in the dark, half floats of wavelets leave a little less
 
 
-def edited_still(store: Store | Path | str, session: Path, file: Path | str, settings: Settings = DEFAULT) -> Rendered:
-    """Draw the view of a session as it has edited it, by the transport in a store.
+def edited_still(
+    store: Store | Path | str,
+    session: Path,
+    file: Path | str,
+    settings: Settings = DEFAULT,
+    surfaces: tuple[int, int] = ALL_HITS,
+) -> Rendered:
+    """Draw the view of a session as it has edited it, by the transport and the interreflections in a store.
 
     Parameters
     ----------
@@ -47,6 +53,8 @@ def edited_still(store: Store | Path | str, session: Path, file: Path | str, set
         A session's file: it has the camera and the size, whatever `settings` say.
     file, settings
         As of `output.still`: exposure, view transform and false colours.
+    surfaces
+        Least and most surfaces on the paths that are shown.
 
     Raises
     ------
@@ -61,7 +69,7 @@ def edited_still(store: Store | Path | str, session: Path, file: Path | str, set
     width, height = wanted.document.size
     settings = exposed(replace(settings, width=width, height=height, integrator=EDITED), opened)
     try:
-        picture = edited_picture(opened, wanted)
+        picture = whole_picture(opened, wanted, hits=surfaces)
     except NotBaked as error:
         raise UserError(
             error.message, file=error.file, field=error.field, got=error.got, expected=error.expected,

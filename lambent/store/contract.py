@@ -69,7 +69,8 @@ into four again and again, in the order of scenes.triangle_wavelets:
 Light that met other surfaces first, of the same points:
 
     view/KEY/interreflection/tails         (Z,) uint32, surfaces on the path of each tail; meta["tails"] is the document
-                                           of `store.tails`, which numbers them, meta["series"] that of the bands
+                                           of `store.tails`, which numbers them, meta["series"] that of the bands,
+                                           meta["environment"] what lit it instead of the scene's own, if anything
     view/KEY/interreflection/MATERIAL/TERM/TILE    uint32, the TILE-th 4096 points of a material, P: number of entries
                                            of each point (P,), then of all entries tail * bands + band (N,), rising, and
                                            their light (N,), RGB9E5 times meta["unit"] W/(sr m^2). meta["points"] is P,

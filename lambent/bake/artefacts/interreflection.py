@@ -20,6 +20,7 @@ from lambent.bake.tiles import seed_of, slices
 from lambent.bake.view import View
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
 from lambent.materials.factored.terms import Editable, Factor, Term
+from lambent.store.source import environment_note
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 if TYPE_CHECKING:
@@ -240,7 +241,8 @@ def _tile_count(context: BakeContext, part: Part) -> int:
 def _put_tails(context: BakeContext, view: View) -> None:
     """The document of the tails: an array without numbers, whose notes say what they are."""
     tails = tails_of(context)
-    meta = {**view.meta, "tails": tails.said(), "series": list(context.bounces.series)}
+    environment = environment_note(context.environment)
+    meta = {**view.meta, "tails": tails.said(), "series": list(context.bounces.series), "environment": environment}
     context.put(KIND, view.name(KIND, "tails"), tails.hits.astype(np.uint32), meta)
 
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Indices
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.editing.session import Session
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import view_artefact_name
+from lambent.store.source import environment_note
 from lambent.store.store import Store
 from lambent.store.tails import Tails
 
@@ -65,6 +67,16 @@ class Interreflections:
     tails: Tails
     parts: Mapping[str, PartLight]
     samples: int
+
+
+def samples_of(store: Store, session: Session) -> int:
+    """Paths per pixel that the store has of a session's view, under its light; 0 where there are none."""
+    view = session.document
+    names = [view_artefact_name(view.camera, *view.size, "interreflection", part) for part in ("tails", "")]
+    if names[0] not in store or store.artefact(names[0]).meta["environment"] != environment_note(session.environment):
+        return 0
+    tiles = [a.meta.get("samples", 0) for a in store.artefacts("interreflection") if a.name.startswith(names[1])]
+    return max(tiles, default=0)
 
 
 def interreflections(

@@ -1,24 +1,51 @@
 """The picture of an edited view with its interreflections: direct light, and one material's polynomial on top.
 
-whole = WholePicture(edited_picture(store, session))
-whole.give(interreflections(store, camera, size, materials), materials)
+whole = whole_picture(store, session)
 whole.show("floor", edited); whole.step(); whole.image()
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from lambent.core.arrays import Image
+from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.incremental import TERMS
 from lambent.editing.interreflection.picture import FrozenPicture, Shown
-from lambent.editing.interreflection.stored import Interreflections
+from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of
 from lambent.editing.picture import EditedPicture
+from lambent.editing.session import Session
+from lambent.editing.stored import edited_picture
+from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
+from lambent.store.contract import scene_record
+from lambent.store.store import Store
 
 ALL_HITS = (1, 99)
+
+
+def whole_picture(
+    store: Store,
+    session: Session,
+    lights: int | None = None,
+    canvas: Callable[[Image], Canvas] = HostCanvas,
+    hits: tuple[int, int] = ALL_HITS,
+) -> WholePicture:
+    """The picture of a session's view with the interreflections that the store has, drawn exactly.
+
+    Parameters and errors are those of `editing.stored.edited_picture`; `hits` as in `WholePicture`.
+    """
+    whole, view = WholePicture(edited_picture(store, session, lights, canvas)), session.document
+    whole.see(hits)
+    if samples_of(store, session):
+        scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
+        baked = {**scene, **{name: session.original(name) for name in view.materials}}
+        now = {**scene, **{name: session.editable(name) for name in view.materials}}
+        whole.give(interreflections(store, view.camera, view.size, baked), now)
+        whole.draw()
+    return whole
 
 
 class WholePicture:
