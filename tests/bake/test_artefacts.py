@@ -101,7 +101,7 @@ def test_the_command_offers_every_kind_there_is(toy: str) -> None:
         artefacts.__path__.pop()
         own = {str(kind) for kind in importlib.reload(command).Kind}
         artefacts.__path__.append(toy)
-    of_views = {"view_points", "visibility", "transport", "relighting"}
+    of_views = {"view_points", "visibility", "transport", "relighting", "interreflection"}
     assert own == {"geometry", "environment", "light_map", "probe", *of_views} and offered == {*own, toy}
 
 

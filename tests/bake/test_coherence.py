@@ -171,9 +171,9 @@ def test_slivers_of_light_between_shadows_are_found_whole() -> None:
 
     engine()
     from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.bands import visibility
     from lambent.bake.transport.coherence import predicted
     from lambent.bake.transport.view_points import view_points
+    from lambent.bake.transport.visibility import visibility
     from lambent.bench.visibility import unpacked
     from lambent.bench.visibility_scenes import CASES
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import found
+from lambent.bake.bounces import Bounces
 from lambent.bake.context import BakeContext
 from lambent.bake.methods import chosen
 from lambent.bake.quality import Quality
@@ -50,7 +51,8 @@ CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
 REFLECTED = tuple(SEEN.name("relighting", part) for part in ("spans", "points", "values", "errors", "lamps"))
 LIT = (*BAKED, *REFLECTED)  # whatever light falls on
-VISIBLE = (SEEN.name("visibility", ""), SEEN.name("transport", ""))
+BOUNCED = SEEN.name("interreflection", "samples")  # the tiles of a material that changes are traced again
+VISIBLE = (SEEN.name("visibility", ""), SEEN.name("transport", ""), SEEN.name("interreflection", ""))
 POINTS = (SEEN.name("view_points", ""), *VISIBLE)
 SHINING = (SEEN.name("view_points", "backdrop"), *VISIBLE)
 LIGHTS = (*BAKED, *SHINING, SEEN.name("relighting", "lamps"))
@@ -85,22 +87,22 @@ MATERIAL: Answers = {
     "name": ("renamed", NOTHING),
     "provenance": (Provenance(source="other.brdf"), NOTHING),
     "kd": ((0.1, 0.2, 0.31), LIT),
-    "kd_coupled": (True, (*LIT, *of_terms("sheet/0/"))),
+    "kd_coupled": (True, (*LIT, *of_terms("sheet/0/"), BOUNCED)),
     "kt_d": ((0.1, 0.1, 0.2), LIT),
-    "lobes": (lambda lobes: lobes * 2, (*LIT, *of_terms("sheet/3/"))),
+    "lobes": (lambda lobes: lobes * 2, (*LIT, *of_terms("sheet/3/"), BOUNCED)),
 }
 LOBE: Answers = {
-    "side": ("transmission", (*LIT, *of_terms("sheet/2/"))),
+    "side": ("transmission", (*LIT, *of_terms("sheet/2/"), BOUNCED)),
     "distribution": ("ggx", LIT),
     "k": ((0.9, 1.0, 1.0), LIT),
-    "mx": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"))),
-    "my": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"))),
+    "mx": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
+    "my": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
     "r0": ((0.04, 0.04, 0.05), LIT),
-    "alpha": (0.5, (*LIT, *of_terms("sheet/2/"))),
-    "retro": (True, (*LIT, *of_terms("sheet/2/"))),
+    "alpha": (0.5, (*LIT, *of_terms("sheet/2/"), BOUNCED)),
+    "retro": (True, (*LIT, *of_terms("sheet/2/"), BOUNCED)),
 }
 IN_VIEWS = {part: POINTS if part in ("normal", "direction", "opacity") else () for part in CHANNELS}
-IN_VIEWS["diffuse"] = IN_VIEWS["specular"] = (SEEN.name("transport", "400/worn/"), *of_terms())
+IN_VIEWS["diffuse"] = IN_VIEWS["specular"] = (SEEN.name("transport", "400/worn/"), *of_terms(), BOUNCED)
 TEXTURES: Answers = {
     **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), (*LIT, *IN_VIEWS[part])) for part in CHANNELS},
     "cutoff": (0.25, LOOK),
@@ -211,6 +213,7 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "tolerance": (0.5, REFLECTED[:4]),
         "paths": (3, REFLECTED[4:]),
     },
+    "interreflection": {},
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
 }
 
@@ -265,10 +268,16 @@ def keys(tmp_path: Path) -> Callable[..., dict[str, str]]:
     store = Store.create(tmp_path / "store", {})
 
     def found_keys(
-        scene: Scene, quality: Quality = TINY, seed: int = 0, editables: Any = None, **methods: str | None
+        scene: Scene,
+        quality: Quality = TINY,
+        seed: int = 0,
+        editables: Any = None,
+        bounces: Bounces | None = None,
+        **methods: str | None,
     ) -> dict[str, str]:
         how = chosen({}, **{"light_map": None, "probes": None, **methods})
         context = BakeContext(scene, store, found(), quality, how, seed, views=(SEEN,), editables=editables or {})
+        context.bounces = bounces or Bounces()
         return {name: key for kind in found() for name, key in context.keys(kind).items()}
 
     return found_keys
@@ -346,7 +355,13 @@ def test_a_setting(scene: Scene, keys: Callable[..., dict[str, str]], kind: str,
 def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
     before = keys(scene)
     assert not stale(before, keys(scene, TINY.changed("another name")))
-    assert stale(before, keys(scene, seed=1)) == starting(before, LIT)
+    everywhere = SEEN.name("interreflection", "")
+    assert stale(before, keys(scene, seed=1)) == starting(before, (*LIT, everywhere))
+    more = stale(before, keys(scene, bounces=Bounces(samples=4096)))
+    assert more == {BOUNCED}, "samples are added to those that are there"
+    for bounces in (Bounces((32, 1, 1, 1)), Bounces((64, 1, 1)), Bounces(fixed=frozenset({"sheet"}))):
+        after = keys(scene, bounces=bounces)
+        assert stale(before, after) == starting(before | after, (everywhere,))
     assert stale(before, keys(scene, probes="traced")) == starting(before, PROBES)
     photons = keys(scene, light_map="photons")
     assert stale(before, photons) == starting(before | photons, BAKED)

@@ -96,8 +96,8 @@ def test_holes_show_and_light_what_lies_behind() -> None:
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.transport.bands import visibility
     from lambent.bake.transport.view_tracer import ViewTracer
+    from lambent.bake.transport.visibility import visibility
     from lambent.bake.view import View
 
     sheet = SceneObject("sheet", patch((-1, 1, 1), (2, 0, 0), (0, 0, -2)), "leaf")

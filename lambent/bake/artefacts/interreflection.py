@@ -19,6 +19,7 @@ from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inp
 from lambent.bake.tiles import seed_of, slices
 from lambent.bake.view import View
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
+from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.store.source import environment_note
 from lambent.store.tails import FIXED, SecondBands, Tails
@@ -89,15 +90,12 @@ def tails_of(context: BakeContext) -> Tails:
 
 
 def keys(context: BakeContext) -> dict[str, str]:
+    """Of the tails and the samples; tiles have keys of their own (`Part.key`), and are not counted before the bake."""
     found: dict[str, str] = {}
     for view in context.views:
-        for part in parts(context, view):
-            for term in range(len(part.bands)):
-                for tile in range(_tile_count(context, part)):
-                    found[part.name(term, tile)] = part.key
-        key = _series_key(context, view)
-        found[view.name(KIND, "tails")] = key
-        found[view.name(KIND, "samples")] = key_of(KIND, REVISION, key, context.bounces.samples)
+        found[view.name(KIND, "tails")] = key_of(KIND, REVISION, _series_key(context, view), context.bounces.series)
+        of_parts = [part.key for part in parts(context, view)]
+        found[view.name(KIND, "samples")] = key_of(KIND, REVISION, of_parts, context.bounces.samples)
     return found
 
 
@@ -214,13 +212,15 @@ def unpacked(array: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray, np
 def parts(context: BakeContext, view: View) -> Iterator[Part]:
     """The materials of a scene's objects."""
     bounces, key = context.bounces, _series_key(context, view)
-    textures: Any = texture_inputs(context.in_views, "diffuse", "specular", "roughness")
+    textures: Any = texture_inputs(context.in_views, "diffuse", "specular")
+    rough: Any = texture_inputs(context.in_views, "roughness")
     for material in _worn(context):
         editable, terms = context.editable(material), []
         if material not in bounces.fixed:
             terms = [(term, _factors(term, bounces.series[0])) for term in editable.terms]
         angles = [(term.fixed, [n for _, n in factors]) for term, factors in terms] or repr(editable)
-        yield Part(view, material, editable, tuple(terms), key_of(KIND, REVISION, key, angles, textures.get(material)))
+        inputs = [textures.get(material), rough.get(material) if any(map(varies, editable.terms)) else None]
+        yield Part(view, material, editable, tuple(terms), key_of(KIND, REVISION, key, angles, inputs))
 
 
 def said(part: Part, term: int) -> dict[str, Any]:
@@ -230,12 +230,6 @@ def said(part: Part, term: int) -> dict[str, Any]:
     one, factors = part.terms[term]
     curves = [[factor.curve, n] for factor, n in factors]
     return {"material": part.material, "term": term, "fixed": one.fixed, "curves": curves}
-
-
-def _tile_count(context: BakeContext, part: Part) -> int:
-    worn = np.array([o.material for o in context.in_views.objects])
-    shown = np.count_nonzero(worn[context.view_tracer.points(part.view).object] == part.material)
-    return len(slices(int(shown), POINTS))
 
 
 def _put_tails(context: BakeContext, view: View) -> None:

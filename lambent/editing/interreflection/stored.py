@@ -115,7 +115,10 @@ def interreflections(
         is_edited = material in edited
         terms = []
         for k in range(len(start.terms) if is_edited else 1):
-            found, least = _term(store, name("interreflection", f"{material}/{k}"), int(np.count_nonzero(mine)))
+            factors = len(start.terms[k].factors) if is_edited else 0
+            found, least = _term(
+                store, name("interreflection", f"{material}/{k}"), int(np.count_nonzero(mine)), factors
+            )
             terms.append(found)
             samples.append(least)
             if is_edited:
@@ -124,11 +127,11 @@ def interreflections(
     return Interreflections(size, tails, parts, min(samples, default=0))
 
 
-def _term(store: Store, name: str, points: int) -> tuple[TermLight, int]:
-    """The tiles of a term one after another, and the samples of the one that has the fewest."""
+def _term(store: Store, name: str, points: int, factors: int) -> tuple[TermLight, int]:
+    """The tiles of a term of so many curves one after another, and the samples of the one that has the fewest."""
     counts, codes, values = np.zeros(points, np.int64), [], []
     units, done = np.ones(points, np.float32), 0
-    curves: tuple[int, ...] = ()
+    curves = (1,) * factors  # as long as no tile is there
     samples: list[int] = []
     while done < points:
         tile = f"{name}/{len(samples)}"

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from itertools import combinations_with_replacement
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lambent.core.camera import Camera
 from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.editing.canvas import HostCanvas
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
-from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
+from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight, interreflections
 from lambent.editing.interreflection.whole import WholePicture
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import DensePairs, Rows
@@ -21,6 +23,8 @@ from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable, Term
+from lambent.store.contract import view_artefact_name
+from lambent.store.store import Store
 from lambent.store.tails import FIXED, SecondBands, Tails
 
 SIZE = (7, 5)
@@ -205,3 +209,31 @@ def test_other_terms_show_direct_light_alone() -> None:
     until_exact(whole)
     assert not whole.image().any()
     whole.close()
+
+
+def test_tiles_that_are_not_there_yet_are_black(tmp_path: Path) -> None:
+    """A store that a first pass has just begun: tails, and tiles of one term of one material."""
+    camera, size = Camera("front", (0, 0, 1), (0, 0, 0)), (4, 2)
+
+    def name(kind: str, part: str) -> str:
+        return view_artefact_name(camera, *size, kind, part)
+
+    with Store.create(tmp_path, {}) as store:
+        objects = {"objects": [["a", "glossy"], ["b", "paper"]]}
+        store.put(name("view_points", "pixel"), "p", np.arange(8, dtype=np.uint32), key="0")
+        store.put(name("view_points", "object"), "p", np.repeat([0, 1], 4).astype(np.uint32), key="0", meta=objects)
+        store.put(name("view_points", "theta_o"), "p", np.zeros(8, np.float32), key="0")
+        said = {"tails": DIFFUSE.said(), "environment": None}
+        store.put(name("interreflection", "tails"), "interreflection", np.zeros(1, np.uint32), key="0", meta=said)
+        tile = np.concatenate([[1, 0, 0, 0], [0], packed_rgb(np.array([[1.0, 2.0, 4.0]], np.float32))]).astype(
+            np.uint32
+        )
+        meta = {"points": 4, "samples": 16, "unit": 0.5, "curves": [["diffuse", 4]], "fixed": GLOSSY.terms[0].fixed}
+        store.put(name("interreflection", "glossy/0/0"), "interreflection", tile, key="0", meta=meta)
+        found = interreflections(store, camera, size, {"glossy": GLOSSY, "paper": PAPER})
+    assert found.samples == 0 and [term.counts for term in found.parts["glossy"].terms] == [(4,), (1, 1)]
+    for edited in ("glossy", "paper"):
+        canvas = HostCanvas(np.zeros((2, 4, 3), np.float32))
+        canvas.compose(FrozenPicture(found, START, edited, canvas).shown)
+        image = canvas.image().reshape(-1, 3)
+        assert image[0].all() and not image[1:].any()
