@@ -60,8 +60,8 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-"))
             threads = max(1, engine().threads // count)
             local = distributed.LocalCluster(
-                n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", memory_limit=0,
-                local_directory=folder,
+                n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                memory_limit=0, local_directory=folder,
             )  # fmt: skip
             address = stack.enter_context(local).scheduler_address
         try:
