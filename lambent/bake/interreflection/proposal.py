@@ -124,8 +124,8 @@ class Proposal:
         series = ",".join(map(str, self.bounces.series))
         lines += [
             *self.reasons,
-            f"{series} with {self.bounces.samples} samples: {self.seconds:.0f} s "
-            f"at {self.samples_per_s:.2g} samples/s, {_bytes(self.disk_bytes)} on disk, {_bytes(self.bake_bytes)} of memory to bake, "
+            f"{series} with {self.bounces.samples} samples: {self.seconds:.0f} s at {self.samples_per_s:.2g} samples/s",
+            f"{_bytes(self.disk_bytes)} on disk, {_bytes(self.bake_bytes)} of memory to bake, "
             f"{_bytes(self.edit_bytes)} to edit",
         ]
         return [line.rstrip() for line in lines]
