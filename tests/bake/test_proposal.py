@@ -9,7 +9,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.bake.bounces import Bounces
-from lambent.bake.interreflection.proposal import propose, same_materials
+from lambent.bake.interreflection.proposal import Proposal, propose, same_materials
 from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
@@ -33,19 +33,22 @@ def with_small_things() -> Scene:
 
 
 def test_what_is_small_in_the_view_and_in_its_light_is_fixed() -> None:
-    found = propose(with_small_things(), VIEW, BOUNCES)
-    assert found.bounces.fixed == {"bead", "black"}  # the lamp reflects nothing
+    found = propose(with_small_things(), VIEW, replace(BOUNCES, fixed=frozenset({"ball"})))
+    assert found.bounces.fixed == {"ball", "bead", "black"}  # the lamp reflects nothing
     rows = {row.material: row for row in found.rows}
     assert rows["screen"].points == 0 and rows["screen"].passed_on > 0.01 and rows["screen"].role == "edited"
     assert sum(row.in_view for row in found.rows) == pytest.approx(1)
     assert sum(row.passed_on for row in found.rows) == pytest.approx(1)
     assert rows["bead"].cells < rows["floor"].cells
-    assert "ball" in propose(with_small_things(), VIEW, replace(BOUNCES, fixed=frozenset({"ball"}))).bounces.fixed
 
 
-def test_what_the_bake_takes_was_said_before(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def found() -> Proposal:
+    return propose(corner(KINDS), VIEW, BOUNCES)
+
+
+def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path) -> None:
     scene = corner(KINDS)
-    found = propose(scene, VIEW, BOUNCES)
     store = bake(scene, tmp_path / "s", only={"interreflection"}, views=[VIEW], bounces=found.bounces)
     tiles = [a for a in store.artefacts("interreflection") if "unit" in a.meta]
     for row in found.rows:
@@ -67,15 +70,14 @@ def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit()
     assert same_materials(twins) == {"side": "back"} and not same_materials(twins, keep={"side"})
     roomy = propose(twins, VIEW, BOUNCES)
     assert (roomy.same, roomy.alike, roomy.reasons) == ({}, {"side": "back"}, ())
-    tight = propose(twins, VIEW, BOUNCES, most_bytes=roomy.edit_bytes * 2 // 3)
-    assert tight.same == {"side": "back"} and tight.edit_bytes <= roomy.edit_bytes * 3 // 4
+    most = roomy.edit_bytes * 2 // 3
+    tight = propose(twins, VIEW, BOUNCES, most_bytes=most)
+    assert tight.same == {"side": "back"} and tight.reasons
+    assert tight.edit_bytes <= most or [row.role for row in tight.rows].count("edited") == 1
     assert {o.material for o in tight.merged(twins).objects} == {"floor", "back", "ball", "black"}
-    least = propose(twins, VIEW, BOUNCES, most_bytes=1)
-    assert [row.role for row in least.rows].count("edited") == 1 and "1" in least.reasons[0]
 
 
-def test_the_table_names_every_material_and_the_sums() -> None:
-    found = propose(corner(KINDS), VIEW, BOUNCES)
+def test_the_table_names_every_material_and_the_sums(found: Proposal) -> None:
     lines = found.lines()
     assert [line.split()[0] for line in lines[1:6]] == [row.material for row in found.rows]
     assert lines[-2].startswith("16,1,1 with 256 samples: ") and " on disk, " in lines[-1]

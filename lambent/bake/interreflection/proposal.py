@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
@@ -23,6 +23,9 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from lambent.bake.interreflection.trial import Cost
 
 SMALL = 0.01  # share of the view, and of the light that is passed on, below which a material is fixed
 MOST_BYTES = 2 << 30  # of a store, before compression
@@ -189,16 +192,13 @@ def _proposal(
     while len(edited) > 1 and max(cells().values()) > MOST_CELLS:
         reasons.append(f"{edited.pop()} is fixed: rows of more than {MOST_CELLS} numbers a point")
     progress(1, 3, "time and memory")
-    costs, before, measured = trial.costs(fixing()), cells(), len(edited)
-
-    def needed() -> float:
-        now = cells()  # entries in proportion, until they are measured again
-        return sum(cost.raw_bytes * trial.shown[n] * now[n] / before[n] for n, cost in costs.items())
-
-    while len(edited) > 1 and needed() > most_bytes:
-        reasons.append(f"{edited.pop()} is fixed: the store would have more than {_bytes(most_bytes)}")
-    if len(edited) < measured:
-        progress(2, 3, "time and memory, with fewer materials")
+    costs = trial.costs(fixing())
+    while len(edited) > 1 and _raw(costs, trial.shown) > most_bytes:
+        before, left = cells(), 1.0
+        while len(edited) > 1 and _raw(costs, trial.shown) * left > most_bytes:
+            reasons.append(f"{edited.pop()} is fixed: the store would have more than {_bytes(most_bytes)}")
+            left = sum(cells().values()) / sum(before.values())  # a guess: entries in proportion
+        progress(2, 3, f"time and memory, {len(edited)} materials edited")
         costs = trial.costs(fixing())
     progress(3, 3, "time and memory")
     size = cells()
@@ -210,8 +210,13 @@ def _proposal(
         )
         for row in rows
     ]  # fmt: skip
-    raw = sum(costs[row.material].raw_bytes * row.points for row in rows)
-    return Proposal(fixing(), tuple(rows), {}, {}, trial.bake_bytes(fixing(), costs), round(raw), tuple(reasons))
+    memory = trial.bake_bytes(fixing(), costs), round(_raw(costs, trial.shown))
+    return Proposal(fixing(), tuple(rows), {}, {}, *memory, tuple(reasons))
+
+
+def _raw(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
+    """Bytes of a store before compression."""
+    return sum(cost.raw_bytes * points[name] for name, cost in costs.items())
 
 
 def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
