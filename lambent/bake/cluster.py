@@ -166,4 +166,4 @@ def _limit(threads: int) -> None:
 
     if dr.thread_count() != threads:
         dr.set_thread_count(threads)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]

@@ -65,7 +65,11 @@ def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path) ->
     assert 0 < found.seconds < 300
 
 
-def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit() -> None:
+def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.bake.interreflection import trial
+
+    monkeypatch.setattr(trial, "TIMED", 64)
+    monkeypatch.setattr(trial, "MANY", 64)
     twins = corner({**KINDS, "side": KINDS["back"]})
     assert same_materials(twins) == {"side": "back"} and not same_materials(twins, keep={"side"})
     roomy = propose(twins, VIEW, BOUNCES)
