@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import pickle
+import signal
 import tempfile
 import threading
 import warnings
@@ -59,10 +60,11 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
         if count is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-"))
             threads = max(1, engine().threads // count)
-            local = distributed.LocalCluster(
-                n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
-                memory_limit=0, local_directory=folder,
-            )  # fmt: skip
+            with _deaf():
+                local = distributed.LocalCluster(
+                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                    memory_limit=0, local_directory=folder,
+                )  # fmt: skip
             address = stack.enter_context(local).scheduler_address
         try:
             asyncio.run(_connect(address))
@@ -72,6 +74,19 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
             hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
             raise UserError("no workers answer", field="cluster", got=address, hint=hint) from error
         yield DaskWorkers(client, threads)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that are started here do not hear Ctrl-C, which is for the one that started them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 async def _connect(address: str | None) -> None:
@@ -103,7 +118,7 @@ class DaskWorkers:
         from distributed import wait
 
         left, waiting = iter(jobs), dict[Any, J]()
-        shared = self.client.submit(_same, pickle.dumps(work))
+        shared = self.client.submit(_same, pickle.dumps(work), pure=False)
         makers = made_with()
         try:
             while True:
