@@ -56,9 +56,9 @@ class IncrementalPicture:
         """One frame: the `terms` largest changes (7.3-7.5), and one block of pixels anew."""
         change = self.wanted - self.effective
         size = np.sum(change * change, axis=1)
-        rows = np.flatnonzero(size)
+        rows = np.flatnonzero(change.any(axis=1))  # `size` may be 0 where a change is not
         if len(rows) > terms:
-            rows = np.sort(np.argpartition(-size, terms - 1)[:terms])
+            rows = np.sort(rows[np.argpartition(-size[rows], terms - 1)[:terms]])
         self._products.add_rows(rows, change[rows])
         self.effective[rows] = self.wanted[rows]  # effective + change, without its rounding
         self._renew(self._next_block, RENEWED_IN)

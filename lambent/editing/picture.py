@@ -138,6 +138,8 @@ class EditedPicture:
         size = np.concatenate([*sizes, np.zeros(0)])
         largest = np.argpartition(-size, terms - 1)[:terms] if len(size) > terms else np.arange(len(size))
         shares = np.bincount(whose[largest[size[largest] > 0]], minlength=len(active))
+        if not shares.any():  # squares of tiny changes are 0
+            shares[:] = terms
         for term, share in zip(active, shares, strict=True):
             term.step(int(share))
 

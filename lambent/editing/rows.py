@@ -17,6 +17,7 @@ from lambent.core.wavelets import transformed
 from lambent.editing.products import Halves, Pixels
 from lambent.materials.factored.curve import Curve
 
+NOTHING = 1e-12  # of the largest wavelet; squares of what the tail of a narrow curve has would be 0, and never be drawn
 LARGEST = 2.0**14  # of stored rows: a quarter of the largest half float
 
 
@@ -81,5 +82,6 @@ class DensePairs:
 def coefficients_of(curve: Curve, count: int) -> Floats:
     """(count, 3) wavelets of a curve: what rows are multiplied by."""
     wavelets = transformed(curve.band_means(count))
+    wavelets[np.abs(wavelets) < NOTHING * np.abs(wavelets).max()] = 0.0
     wavelets.flags.writeable = False
     return wavelets

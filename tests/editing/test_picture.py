@@ -294,3 +294,22 @@ def test_a_frame_is_a_fraction_of_a_dense_picture(tray: Editable) -> None:
     frame(0)
     frames, whole = min(frame(k) for k in range(1, 30)), min(dense() for _ in range(10))
     assert frames < 0.5 * whole
+
+
+def test_changes_too_small_for_squares_end_as_well(tray: Editable) -> None:
+    """The tail of a narrow highlight is 1e-200, and so are its changes: a picture that waits for them never rests."""
+    pixels = np.arange(64)
+    transport = tuple(Rows(np.full((n, 3, len(pixels)), 0.5, np.float16)) for n in (4, 256))
+    part = Part(tray, pixels, np.zeros(len(pixels)), transport)
+    picture = EditedPicture(np.zeros((8, 8, 3), np.float32), {"tray": part})
+    for narrow in (1e3, 2e3, 1e5):
+        edited = tray.with_curve("highlight", Curve.of(lambda x, n=narrow: 1e-5 * np.exp(-n * x * x)))
+        picture.show("tray", edited)
+        for _ in range(200):
+            picture.step()
+        assert picture.is_settled, narrow
+    whole = tray.with_curve("highlight", Curve.of(lambda x: 1e-180 * np.cos(x)))
+    picture.show("tray", whole)
+    for _ in range(200):
+        picture.step()
+    assert picture.is_settled

@@ -1,6 +1,5 @@
 """Editing in place on a virtual screen: a scene is baked beside the window, edited, saved, closed and opened again."""
 
-import numpy as np
 import pytest
 
 from lambent.core.images import read_image
@@ -52,29 +51,46 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     session.wait_for(lambda state: state["selected"] == "glaze")
     session.click(*session.point("snapshot"))
     session.wait_for(lambda state: state["compared"])
-    session.drag(session.point("diffuse", 0.25), session.point("diffuse", 0.9))
-    edited = session.wait_for(lambda state: state["tints"]["glaze"] and not state["busy"])
+    session.click(*session.point("diffuse##curve", 0.1))
+    session.click(*session.point("all##preset"))
+    pull(session, 0.7, 0.3)
+    edited = session.wait_for(lambda state: state["edited"]["glaze"] == ["diffuse"] and not state["busy"])
     assert edited["brightness"] > 1.02 * before["brightness"]
     session.tool("key", "ctrl+z")
-    session.wait_for(lambda state: not state["tints"]["glaze"] and not state["busy"])
+    session.wait_for(lambda state: not state["edited"]["glaze"] and not state["busy"])
     assert session.state()["brightness"] == pytest.approx(before["brightness"], rel=1e-3)
     session.tool("key", "ctrl+shift+z")
-    session.wait_for(lambda state: state["tints"]["glaze"] and not state["busy"])
+    session.wait_for(lambda state: state["edited"]["glaze"] and not state["busy"])
     session.tool("key", "p")
     session.wait_for(lambda state: any("teatray-001.png" in text for text in state["messages"]))
     assert read_image(tmp_path / "teatray-001.exr").mean() == pytest.approx(edited["brightness"], rel=1e-2)
     session.tool("key", "ctrl+s")
     session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
+    session.click(*session.point("Interreflections"))
+    session.click(*session.point("bake them in the background"))
+    bounced = session.wait_for(lambda state: state["samples"] >= 64 and not state["busy"])
+    assert 1.02 * edited["brightness"] < bounced["brightness"] < 3 * edited["brightness"]
     assert session.close() == 0, session.log()
     saved = Session.open(tmp_path / "teatray-001.edits.json")
-    assert np.mean(saved.document.materials["glaze"].tints["diffuse"]) > 1.5
+    assert list(saved.document.materials["glaze"].curves) == ["diffuse"]
 
     again = opened(tmp_path / "teatray-001.edits.json", tmp_path)
-    there = again.wait_for(lambda state: state["lights"] == 4000 and not state["busy"])
-    assert there["baking"] is None and there["tints"]["glaze"]
-    assert there["brightness"] == pytest.approx(edited["brightness"], rel=1e-2)
-    again.drag(again.point("diffuse", 0.25), again.point("diffuse", 0.1))
+    there = again.wait_for(lambda state: state["lights"] == 4000 and state["samples"] >= 64 and not state["busy"])
+    assert there["baking"] is None and there["edited"]["glaze"]
+    assert there["brightness"] == pytest.approx(bounced["brightness"], rel=0.05), "with the noise of fewer samples"
+    again.click(*again.point("all##preset"))
+    pull(again, 0.4, 0.6)
+    again.wait_for(lambda state: not state["busy"])
     assert again.close() == 0 and "changed and not saved" in again.log()
+
+
+def pull(session, begin, end):
+    """Drag in the plot of the curve, between shares of its height."""
+    rects = session.state()["rects"]
+    left, right = rects["log"][0] + 40, rects["all##preset"][2]
+    top, bottom = rects["log"][3] + 20, rects["all##preset"][1] - 120
+    x = (left + right) / 2
+    session.drag((x, top + begin * (bottom - top)), (x, top + end * (bottom - top)))
 
 
 def test_a_window_that_closes_early_ends_the_bake_which_goes_on_the_next_time(opened, tmp_path):

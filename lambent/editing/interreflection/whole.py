@@ -112,10 +112,11 @@ class WholePicture:
         if frozen is None or frozen.edited != material or not frozen.serves(self._now[material], curve):
             self._wanted = material, curve
 
-    def step(self, terms: int = TERMS) -> None:
-        """One frame."""
+    def step(self, terms: int = TERMS) -> bool:
+        """One frame; whether interreflections were replaced in it."""
         self.direct.step(terms)
-        if self._work is not None and self._work.done():
+        taken = self._work is not None and self._work.done()
+        if self._work is not None and taken:
             self._take(self._work.result())
             self._work = None
         if self._work is None and self._wanted is not None:
@@ -123,6 +124,7 @@ class WholePicture:
             self._work = self._pool.submit(work) if work is not None else None
         if self._frozen is not None:
             self._frozen.step(terms)
+        return taken
 
     def draw(self) -> None:
         """The exact picture at once."""

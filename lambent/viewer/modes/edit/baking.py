@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -19,7 +19,7 @@ from lambent.editing.session import Session
 from lambent.viewer.work import Work
 
 LIGHTS = (400, 4000)
-WORKER = "lambent.viewer.modes.edit.worker"
+WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"
 ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole view shows it; visibility takes 1
 LEAST_DONE = 0.02  # before it, nobody can say how long it takes
 LAST_CHARACTERS = 300  # of what a worker wrote before it died
@@ -59,8 +59,17 @@ class Stage:
         return self.weights.get(_NUMBER.sub("", step).rstrip(", "), 1.0)
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """Interreflections that a worker bakes: series, samples, and materials that are not edited."""
+
+    series: str
+    samples: int
+    fixed: tuple[str, ...] = ()
+
+
 class Baking:
-    """One run of the worker.
+    """One run of the worker: transport of so many lights, or interreflections.
 
     Attributes
     ----------
@@ -72,16 +81,26 @@ class Baking:
         Numbers of lights that are in the store, in the order of their arrival; whoever reads them takes them out.
     has_view : bool
         Whether the points of the view are in the store.
+    samples : int
+        Of interreflections, that all points have now.
     """
 
     def __init__(
-        self, session: Session, store: Path, lights: Sequence[int] = LIGHTS, clock: Callable[[], float] = time.monotonic
+        self,
+        session: Session,
+        store: Path,
+        lights: Sequence[int] = LIGHTS,
+        clock: Callable[[], float] = time.monotonic,
+        bounces: Wanted | None = None,
     ) -> None:
         self.document: SessionDocument = session.document
         self.store, self.error, self.what = store, "", "starting"
         self.arrived: list[int] = []
         self.has_view = False
-        self._clock, self._lights = clock, lights
+        self._share = 0.0
+        self.samples = 0
+        self._clock, self._bounces = clock, bounces
+        self._lights = () if bounces is not None else lights
         terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
         self._stage = Stage({}, clock())
@@ -101,6 +120,8 @@ class Baking:
     def line(self) -> str:
         """What it does now, and how much longer these lights take."""
         left_s, stage = self._stage.left_s(self._clock()), self._stage
+        if self._bounces is not None:
+            return f"{self.what} {100 * self._share:.0f} %"
         step = f"{self.what} {100 * stage.share:.0f} %"
         return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
 
@@ -128,6 +149,8 @@ class Baking:
             job, words = Path(folder) / "job.edits.json", Path(folder) / "words.txt"
             session.save(job)
             command = [sys.executable, "-m", WORKER, str(job), str(self.store), *map(str, self._lights)]
+            if self._bounces is not None:
+                command += [BOUNCES, json.dumps(asdict(self._bounces))]
             with words.open("w") as log:
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
                 try:
@@ -152,12 +175,15 @@ class Baking:
         """Take a line of the worker."""
         if "error" in said:
             raise UserError(str(said["error"]))
+        if "samples" in said:
+            self.samples = int(str(said["samples"]))
+            return
         if "lights" in said:
             self.arrived.append(int(str(said["lights"])))
             return
         self.what = str(said["what"])
+        self._share = float(str(said["done"])) / max(float(str(said["total"])), 1e-9)
         found = _NUMBER.search(self.what)
         if found:
             self.has_view = True
-            share = float(str(said["done"])) / max(float(str(said["total"])), 1e-9)
-            self._stage.take(self.what, share, int(found[1]), self._clock())
+            self._stage.take(self.what, self._share, int(found[1]), self._clock())

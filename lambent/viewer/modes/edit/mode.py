@@ -134,6 +134,7 @@ def columns(state: EditState) -> tuple[Panel, ...]:
     """The column, each panel on the state."""
     return (
         Panel("Scene", partial(panels.draw_scene, state), opened=True),
+        Panel("Interreflections", partial(panels.draw_interreflections, state)),
         Panel("Compare", partial(panels.draw_compare, state), opened=True),
         Panel("Save", partial(panels.draw_files, state), opened=True),
         Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),

@@ -17,6 +17,8 @@ import numpy as np
 
 from lambent.core.arrays import Image
 from lambent.core.false_colour import Range
+from lambent.editing.interreflection.stored import Interreflections
+from lambent.editing.interreflection.whole import ALL_HITS, WholePicture
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
@@ -36,6 +38,7 @@ class Wish:
     view: str = "filmic"
     exposure_ev: float = 0.0
     scale: Range = field(default_factory=Range)
+    surfaces: tuple[int, int] = ALL_HITS  # least and most on the paths that are shown
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Painter:
         self.frame: Frame | None = None
         self.error: Exception | None = None
         self._clock = clock
-        self._picture = EditedPicture(np.zeros((*size, 3), np.float32), {})
+        self._picture = WholePicture(EditedPicture(np.zeros((*size, 3), np.float32), {}))
         self._parts: dict[str, list[Part]] = {}  # the one in the picture first, then those that served before
         self._given: dict[str, Editable] = {}  # what the picture was told last
         self._fade: Image | None = None
@@ -101,13 +104,15 @@ class Painter:
             self._closed = True
             self._changed.notify()
         self._thread.join()
+        self._picture.close()
 
     # What `run` may be given, with arguments.
 
     def begin(self, backdrop: Image) -> None:
         """Begin anew with what is seen without reflection: under another light, parts from before are of no use."""
         before = self._image()
-        self._picture, self._parts, self._given = EditedPicture(backdrop, {}), {}, {}
+        self._picture.close()
+        self._picture, self._parts, self._given = WholePicture(EditedPicture(backdrop, {})), {}, {}
         self._compared = None
         if before.any():
             self._fade_over(before)
@@ -120,6 +125,11 @@ class Painter:
         self._place(material, part, self._wish.now.get(material))
         self._compared = None
         self._fade_over(before)
+
+    def give(self, light: Interreflections) -> None:
+        """Add interreflections, or replace them by less noisy ones."""
+        self._picture.give(light, {name: self._given.get(name, part.start) for name, part in light.parts.items()})
+        self._compared = None
 
     def activate(self, material: str, curve: str) -> None:
         """Fold the curves that are not dragged into the transport, before the first movement of a drag."""
@@ -153,7 +163,9 @@ class Painter:
 
     def _draw(self, wish: Wish, began_s: float) -> None:
         needed = frozenset(name for name, made in wish.now.items() if not self._show(name, made))
-        self._picture.step()
+        self._picture.see(wish.surfaces)
+        if self._picture.step() and self.frame is not None:
+            self._fade_over(self.frame.radiance)
         radiance = self._image()
         compared = self._image_of(wish.compared, wish.now) if wish.compared is not None else None
         settled = self._picture.is_settled and self._fade is None and not self._tasks
@@ -181,7 +193,7 @@ class Painter:
         return True
 
     def _place(self, name: str, part: Part, made: Editable | None) -> None:
-        self._picture.put(name, part)
+        self._picture.direct.put(name, part)
         self._given.pop(name, None)
         if made is not None and self._show(name, made):
             self._picture.draw()

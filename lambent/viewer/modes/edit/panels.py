@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from lambent.viewer.look import VIEW_TRANSFORMS
 from lambent.viewer.modes.edit.curves.editor import CurveEditor
+from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.widgets import (
@@ -66,6 +67,24 @@ def draw_material(state: EditState, curves: Curves) -> None:
     explain("let the material begin as something else; a file can be dropped onto the window, too")
     if text is not None:
         state.files.open(text, state.material)
+
+
+def draw_interreflections(state: EditState) -> None:
+    """Whether there are any, of which series, with how many samples, and which of them are shown."""
+    bounced = state.bounced
+    before = bounced.on
+    bounced.on = check("bake them in the background", bounced.on)
+    explain("light that met other surfaces first; noise falls while samples are added")
+    if before and not bounced.on:
+        bounced.stop()
+    bounced.change(choice("series", bounced.series, SERIES))
+    explain("bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo")
+    bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES]))
+    bounced.shown = choice("shown", bounced.shown, list(SHOWN))
+    coloured(f"{bounced.samples} samples a pixel" if bounced.samples else "none yet", DIM)
+    if bounced.line:
+        coloured(bounced.line, DIM)
+    wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
 
 
 def draw_compare(state: EditState) -> None:

@@ -16,6 +16,7 @@ from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files, Tables
+from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading
 from lambent.viewer.modes.edit.painter import Materials, Painter, Wish, checked
 from lambent.viewer.modes.edit.subject import Subject
@@ -71,6 +72,7 @@ class EditState:
         self.baking: Baking | None = None
         self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())
         self._bake = bake
+        self.bounced = Bounced(self.painter, bake)
         self._sources: Sequence[object] = ()  # for which transport was seen to last
         self._fixed: Fixed | None = None
         self._weighed: Baking | None = None  # the one that knows what the view shows
@@ -84,7 +86,7 @@ class EditState:
     @property
     def busy(self) -> bool:
         """Whether work goes on in the background whose progress is to be seen."""
-        return self.baking is not None or self.loading.busy or self.files.busy
+        return self.baking is not None or self.loading.busy or self.files.busy or self.bounced.busy
 
     @property
     def now(self) -> Materials:
@@ -128,10 +130,14 @@ class EditState:
         self._take_baked()
         if not self.loading.busy:
             self._have_transport()
+        direct = bool(self.loading.lights) and self.baking is None and not self.loading.busy
+        shares = self.loading.view.shares if self.loading.view is not None else {}
+        self.bounced.tick(self.session, self.loading.folder, direct, shares)
 
     def close(self) -> None:
         """End all work in the background; what was baked stays in the store."""
         self.stop_baking()
+        self.bounced.close()
         self.files.close()
         self.loading.close()
         self.painter.close()
@@ -145,7 +151,8 @@ class EditState:
                 for name, one in document.materials.items()
             }
             self._document = document
-        wish = Wish(self._now, self.compared.materials, look.view_transform, look.exposure_ev, look.scale)
+        surfaces = SHOWN[self.bounced.shown]
+        wish = Wish(self._now, self.compared.materials, look.view_transform, look.exposure_ev, look.scale, surfaces)
         if not same(wish, self._wish):
             self._wish = wish
             self.painter.want(wish)
@@ -185,6 +192,7 @@ class EditState:
             return
         if before is not None:
             self.screen.say("this edit needs new transport: it is baked in the background")
+        self.bounced.begin_anew()
         self.baking = self._bake(self.session, folder, self.lights)
 
     def _is_complete(self) -> bool:
@@ -218,5 +226,5 @@ class EditState:
 
 def same(one: Wish, other: Wish) -> bool:
     """Whether two wishes are of the same objects."""
-    parts: list[Any] = [(w.view, w.exposure_ev, w.scale) for w in (one, other)]
+    parts: list[Any] = [(w.view, w.exposure_ev, w.scale, w.surfaces) for w in (one, other)]
     return one.now is other.now and one.compared is other.compared and parts[0] == parts[1]

@@ -1,26 +1,31 @@
 """A process of its own that bakes the transport of a session's view, and says on stdout how far it is.
 
 python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
+python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON
 
 Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number for which all transport is there
-now; or "error", a line for the user.
+now; "samples", those that all interreflections have now; or "error", a line for the user.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.editing.session import Session
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
+from lambent.viewer.modes.edit.baking import BOUNCES
 from lambent.viewer.modes.edit.subject import scene_for
 
 NICENESS = 10  # the window comes first
+_PASS = re.compile(r"interreflections, (\d+) samples")
 
 
 def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
@@ -49,6 +54,22 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
         _say(lights=lights[end])
 
 
+def bounce(session: Path, folder: Path, wanted: Mapping[str, Any]) -> None:
+    """Bake interreflections."""
+    from lambent.bake.bake import bake
+    from lambent.bake.bounces import Bounces
+    from lambent.bake.view import View
+
+    opened = Session.open(session)
+    document = opened.document
+    editables = {name: opened.original(name) for name in document.materials}
+    bounces = Bounces(Bounces.of_text(wanted["series"]), wanted["samples"], frozenset(wanted["fixed"]))
+    bake(
+        scene_for(opened), folder, quality="normal", only={"interreflection"}, progress=_progress, bounces=bounces,
+        views=[View(document.camera, *document.size)], editables=editables, environment=opened.environment,
+    )  # fmt: skip
+
+
 def _note_environment(store: Store, session: Session) -> None:
     """Keep in the store which image lights it, so that the store can be opened by itself."""
     said = session.document.environment
@@ -60,6 +81,9 @@ def _note_environment(store: Store, session: Session) -> None:
 
 def _progress(done: float, total: float, what: str) -> None:
     _say(what=what, done=done, total=total)
+    finished = _PASS.fullmatch(what)
+    if finished and done == total:
+        _say(samples=int(finished[1]))
 
 
 def _say(**words: object) -> None:
@@ -71,6 +95,9 @@ if __name__ == "__main__":
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     try:
-        main(Path(sys.argv[1]), Path(sys.argv[2]), [int(word) for word in sys.argv[3:]])
+        if sys.argv[3:4] == [BOUNCES]:
+            bounce(Path(sys.argv[1]), Path(sys.argv[2]), json.loads(sys.argv[4]))
+        else:
+            main(Path(sys.argv[1]), Path(sys.argv[2]), [int(word) for word in sys.argv[3:]])
     except UserError as error:
         _say(error=str(error))
