@@ -37,10 +37,11 @@ ONLY_IN = {
     "zarr": {"store"},
     "numcodecs": {"store"},
     "numba": {"bake", "editing"},
+    "distributed": {"bake"},
 }
 HEAVY = {
     "mitsuba", "drjit", "wgpu", "rendercanvas", "imgui_bundle", "scipy", "matplotlib", "skimage", "trimesh", "zarr",
-    "PIL", "imageio", "OpenEXR", "colour", "xatlas", "pyoidn", "flip_evaluator", "numba",
+    "PIL", "imageio", "OpenEXR", "colour", "xatlas", "pyoidn", "flip_evaluator", "numba", "distributed",
 }  # fmt: skip
 BANNED_NAMES = {"utils", "util", "helpers", "helper", "manager", "misc", "common", "tools"}
 LONGEST, LONGEST_TEST = 400, 500  # lines
@@ -162,14 +163,15 @@ def test_every_data_file_is_packaged() -> None:
 
 
 def dependencies() -> tuple[dict[str, str], dict[str, str]]:
-    """Distribution -> module, of what the package needs and of what its tests need besides."""
+    """Distribution -> module, of what the package needs, extras included, and of what its tests need besides."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    optional = project["optional-dependencies"]
     module_of = {"pillow": "PIL", "colour-science": "colour"}
 
     def modules(names: list[str]) -> dict[str, str]:
         return {name: module_of.get(name, name.replace("-", "_")) for name in names}
 
-    return modules(project["dependencies"]), modules(project["optional-dependencies"]["test"])
+    return modules(project["dependencies"] + optional["cluster"]), modules(optional["test"])
 
 
 def third_party(paths: list[Path]) -> set[str]:

@@ -24,6 +24,7 @@ from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
 from lambent.bake.view import View
+from lambent.bake.workers import InProcess, Workers
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
@@ -52,6 +53,7 @@ def bake(
     editables: Mapping[str, Editable] | None = None,
     bounces: Bounces | None = None,
     environment: ImageEnvironment | None = None,
+    workers: Workers | None = None,
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date.
 
@@ -78,6 +80,8 @@ def bake(
         Of "interreflection": its series of bands, samples, and the materials that are not edited.
     environment : ImageEnvironment, optional
         What lights the views instead of the scene's own environment.
+    workers : Workers, optional
+        Who traces "interreflection", tile by tile: see `lambent.bake.cluster.opened`. By default this process.
 
     Returns
     -------
@@ -117,7 +121,7 @@ def bake(
             store.forget_all()
         context = BakeContext(
             scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
-            environment, bounces or Bounces(),
+            environment, bounces or Bounces(), workers or InProcess(),
         )  # fmt: skip
         for kind in order:
             if context.stale(kind):

@@ -24,6 +24,7 @@ from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
 from lambent.bake.view import View
+from lambent.bake.workers import InProcess, Workers
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
@@ -55,6 +56,7 @@ class BakeContext:
     `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
     them whole, as views show them. `editables` are terms of materials that are not those of their documents;
     `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
+    `workers` do jobs that other processes can do.
     """
 
     scene: Scene
@@ -69,6 +71,7 @@ class BakeContext:
     editables: Mapping[str, Editable] = field(default_factory=dict)
     environment: ImageEnvironment | None = None
     bounces: Bounces = field(default_factory=Bounces)
+    workers: Workers = field(default_factory=InProcess)
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

@@ -1,0 +1,184 @@
+"""Jobs on other processes and machines, by Dask (`distributed`).
+
+    with opened(count=8) as workers:                         # processes of this machine
+        bake(scene, folder, only={"interreflection"}, views=[view], workers=workers)
+    with opened(address="tcp://10.0.0.1:8786") as workers:   # a cluster that runs already
+        ...
+
+Only this process reads and writes the store. Work and jobs travel as bytes within Dask's tasks, so that the scheduler
+can give them to another worker where one dies.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import pickle
+import signal
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import lru_cache
+from importlib.metadata import version
+from itertools import islice
+from typing import Any, TypeVar
+
+from lambent.bake.engine import engine
+from lambent.core.errors import UserError
+
+J = TypeVar("J")
+R = TypeVar("R")
+AHEAD = 2  # jobs that each worker has: one is sent while another is done
+SECONDS = 30.0  # for the first worker to appear
+LIBRARIES = ("lambent", "mitsuba", "drjit", "numba", "numpy")
+_one_at_a_time = threading.Lock()  # a job uses all threads that its process may
+
+
+@contextmanager
+def opened(count: int | None = None, address: str | None = None) -> Iterator[DaskWorkers]:
+    """`count` new processes of this machine, or the workers of the cluster at `address`, which stay when it ends.
+
+    New processes start Python anew: a program that is a file needs `if __name__ == "__main__":`.
+
+    Raises
+    ------
+    UserError
+        Where Dask is missing, nothing answers at the address, or no worker appears.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        raise UserError("Dask is not installed", field="workers", hint="pip install 'lambent[cluster]'") from error
+    if (count is None) == (address is None):
+        raise UserError("workers are counted or have an address", field="workers", expected="one of both")
+    if count is not None and count < 1:
+        raise UserError("no workers", field="workers", got=count, expected="at least 1")
+    warnings.filterwarnings("ignore", "Sending large graph")  # tiles go with their jobs on purpose
+    with ExitStack() as stack:
+        threads = None
+        if count is not None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-"))
+            threads = max(1, engine().threads // count)
+            with _deaf():
+                local = distributed.LocalCluster(
+                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                    memory_limit=0, local_directory=folder,
+                )  # fmt: skip
+            address = stack.enter_context(local).scheduler_address
+        try:
+            asyncio.run(_connect(address))
+            client = stack.enter_context(distributed.Client(address, timeout=SECONDS))
+            client.wait_for_workers(1, timeout=SECONDS)
+        except (OSError, TimeoutError, ValueError) as error:
+            hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
+            raise UserError("no workers answer", field="cluster", got=address, hint=hint) from error
+        yield DaskWorkers(client, threads)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that are started here do not hear Ctrl-C, which is for the one that started them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+async def _connect(address: str | None) -> None:
+    """Raise what connecting raises. A `Client` that cannot connect may block the next one when it is collected."""
+    from distributed import Security
+    from distributed.comm import connect
+
+    comm = await connect(address, timeout=SECONDS, **Security().get_connection_args("client"))
+    await comm.close()
+
+
+class DaskWorkers:
+    """The workers of a Dask client; see `lambent.bake.workers.Workers`."""
+
+    def __init__(self, client: Any, threads: int | None = None) -> None:
+        self.client, self._threads = client, threads
+
+    def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Jobs and their results, as they are done.
+
+        A job whose worker dies is done by another, until it was with three that died.
+
+        Raises
+        ------
+        UserError
+            Where a worker has other versions of the libraries that results depend on, a job kills its workers, or the
+        scheduler is gone.
+        """
+        from distributed import wait
+
+        left, waiting = iter(jobs), dict[Any, J]()
+        shared = self.client.submit(_same, pickle.dumps(work), pure=False)
+        makers = made_with()
+        try:
+            while True:
+                room = AHEAD * max(1, len(self.client.nthreads())) - len(waiting)
+                for job in islice(left, max(0, room)):
+                    waiting[self.client.submit(_do, shared, pickle.dumps(job), makers, self._threads, pure=False)] = job
+                if not waiting:
+                    return
+                try:
+                    done = wait(list(waiting), return_when="FIRST_COMPLETED").done
+                except asyncio.CancelledError as error:
+                    hint = "what is finished stays; bake again to go on"
+                    raise UserError("the scheduler is gone", field="cluster", hint=hint) from error
+                for future in done:
+                    yield waiting.pop(future), _result(future)
+        finally:
+            self.client.cancel([*waiting, shared])
+
+
+def made_with() -> dict[str, str]:
+    """What results depend on besides jobs: versions, and the engine's variant."""
+    return {name: version(name) for name in LIBRARIES} | {"engine": engine().variant}
+
+
+def _result(future: Any) -> Any:
+    from distributed.scheduler import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker as error:
+        hint = "their logs say why; where memory is short, fewer workers have more of it each"
+        raise UserError("a tile was with several workers that died", field="workers", hint=hint) from error
+
+
+def _same(work: bytes) -> bytes:
+    """The work as the result of a task: unlike scattered data, Dask makes it anew where its holder dies."""
+    return work
+
+
+def _do(work: bytes, job: bytes, makers: dict[str, str], threads: int | None) -> Any:
+    """A job, on a worker."""
+    with _one_at_a_time:
+        mine = made_with()
+        for name, wanted in makers.items():
+            if mine[name] != wanted:
+                raise UserError(f"a worker has another {name}", field="workers", got=mine[name], expected=wanted)
+        if threads is not None:
+            _limit(threads)
+        return _loaded(work)(pickle.loads(job))
+
+
+@lru_cache(maxsize=1)
+def _loaded(work: bytes) -> Any:
+    return pickle.loads(work)
+
+
+def _limit(threads: int) -> None:
+    import drjit as dr
+    import numba
+
+    if dr.thread_count() != threads:
+        dr.set_thread_count(threads)
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
