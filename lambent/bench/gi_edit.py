@@ -1,16 +1,16 @@
 """`gi-edit`: a view edited with its interreflections, from the bake to the frame, beside path tracing and a denoiser.
 
-Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published
-number of samples would take at the rate that was measured. Errors are those of random settings that no bake has seen:
-`colours`, `widths` and `bands` (see `gi_edit_states`), to path traced pictures of as many surfaces. `flip` is of all
-pixels; `relmse` of those whose neighbours show the same object, as a stored pixel is a point and a path traced one a
-mean; `noise_` is between two halves of the reference. `relmse_limit` is extrapolated from half the samples and all of
-them to infinitely many, without the reference's noise: what more samples would not mend. `rival_` is path tracing, guides
-and Open Image Denoise of the first setting, at the fewest samples, in powers of two, whose FLIP is as low.
+Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published number
+of samples would take at the measured rate. Errors are those of random settings that no bake has seen (`gi_edit_states`),
+to path traced pictures of as many surfaces. `flip` is of all pixels; `relmse` of those whose neighbours show the same
+object, as a stored pixel is a point and a path traced one a mean. `noise_flip` is between two halves of the reference,
+`noise_relmse` that of the whole. `relmse_limit` is extrapolated from half the samples and all of them to infinitely many,
+without the reference's noise: what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise
+of the first setting, at the fewest samples, in powers of two, whose FLIP is as low.
 
 Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that what a short
-series leaves out counts: the relative error (root of relmse) times MiB, and times seconds of the bake. The summary names
-the least of each scene.
+series leaves out counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary
+names the least of each scene.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -238,17 +237,17 @@ def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, An
     curve = next(name for name in room.start[material].curves if "highlight" in name)
     whole.activate(material, curve)
     whole.draw()
-    for k, state in enumerate(islice(_drag(room, material, curve), effort.frames + 2)):
+    for state in islice(_drag(room, material, curve), effort.frames + 2):
         began = time.perf_counter()
         whole.show(material, state)
         whole.step()
         whole.image()
         frames.append(1e3 * (time.perf_counter() - began))
-        assert whole.samples and k < effort.frames + 2
     whole.close()
     slowest = max(freezing, key=lambda name: freezing[name])
     return {
-        "freeze_seconds": round(freezing[slowest], 2), "freeze_of": slowest, "frozen_mib": round(held_bytes(whole) / MIB, 1),
+        "freeze_seconds": round(freezing[slowest], 2), "freeze_of": slowest,
+        "frozen_mib": round(held_bytes(whole) / MIB, 1),
         "frame_ms": round(statistics.median(frames[2:]), 2), "frame_worst_ms": round(max(frames[2:]), 2),
     }  # fmt: skip
 
@@ -294,9 +293,7 @@ def _flip(reference: Floats, image: Floats) -> float:
     return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
 
 
-def _rival(
-    room: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
-) -> dict[str, Any]:
+def _rival(room: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort) -> dict[str, Any]:
     from lambent.bake.reference.denoised import DenoisedView
 
     edited = {name: one for name, one in state.items() if name not in room.fixed}

@@ -71,7 +71,7 @@ def tray() -> Editable:
 
 
 def test_by_hand() -> None:
-    """One pixel, one term of two bands: 2 (3 x 0.5 + 5 x 4) = 43 in red, textures and viewer included, and what it emits."""
+    """One pixel, one term of two bands: 2 (3 x 0.5 + 5 x 4) = 43 in red, textures, viewer and emission included."""
     step = Curve(np.where(np.arange(4097)[:, None] < 2048, 0.5, 4.0) * np.ones(3))
     start = Editable("hand", (Term("t", One(), (2.0, 1.0, 0.5), (Factor("c", "theta_h"),)),), {"c": step})
     transport = np.array([[3, 3, 3], [5, 5, 5]], np.float32)[..., None]

@@ -12,7 +12,6 @@ from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable, Factor
 from lambent.store.tails import FIXED, Tails
 
-
 # Few bands at second surfaces are wider than peaks, which shine as brightly only if bands keep their light.
 POLAR = ("theta_h", "theta_r")
 
