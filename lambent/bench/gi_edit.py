@@ -1,12 +1,13 @@
 """`gi-edit`: a view edited with its interreflections, from the bake to the frame, beside path tracing and a denoiser.
 
-Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published number
-of samples would take at the measured rate. Errors are those of random settings that no bake has seen (`gi_edit_states`),
-to path traced pictures of as many surfaces. `flip` is of all pixels; `relmse` of those whose neighbours show the same
-object, as a stored pixel is a point and a path traced one a mean. `noise_flip` is between two halves of the reference,
-`noise_relmse` that of the whole. `relmse_limit` is extrapolated from half the samples and all of them to infinitely many,
-without the reference's noise: what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise
-of the first setting, at the fewest samples, in powers of two, whose FLIP is as low.
+Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published
+number of samples would take at the measured rate. Errors are those of smaller pictures of `error_size` with
+`error_samples`, for random settings that no bake has seen (`gi_edit_states`), to path traced pictures of as many
+surfaces. `flip` is of all pixels; `relmse` of those whose neighbours show the same object, as a stored pixel is a point
+and a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` that of the whole.
+`relmse_limit` is extrapolated from half the samples and all of them to infinitely many, without the reference's noise:
+what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise of the first setting, at the
+fewest samples, in powers of two, whose FLIP is as low; the seconds are those of the large picture.
 
 Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that what a short
 series leaves out counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary
@@ -78,18 +79,21 @@ CASES = (
 
 @dataclass(frozen=True)
 class Effort:
-    """Pictures are smaller by `shrink`; `edge` is that of those by which `series` are compared; samples a pixel.
+    """Pictures are smaller by `shrink`, those of errors by `error_shrink` more; samples are those of a pixel.
 
-    `settings` are random ones of each row; `rival_s` is the time that one picture of the rival may take.
+    `settings` are random ones of each row; `rival_s` is the time that one picture of the rival may take; `edge` that of
+    the pictures by which `series` are compared.
     """
 
     shrink: int = 1
     samples: int = 64
-    reference_spp: int = 256
+    error_shrink: int = 4
+    error_samples: int = 1024
+    reference_spp: int = 2048
     settings: int = 3
     frames: int = 40
-    rival_s: float = 10.0
-    edge: int = 96
+    rival_s: float = 20.0
+    edge: int = 80
     lights: int = 1000
     series: tuple[tuple[int, ...], ...] = SERIES
     cases: tuple[Case, ...] = CASES
@@ -97,8 +101,8 @@ class Effort:
 
 FULL = Effort()
 QUICK = Effort(
-    10, 32, reference_spp=64, settings=1, frames=6, rival_s=0.5, edge=24, lights=100, series=((64, 1), (16, 8, 1)),
-    cases=(CASES[0], CASES[-1]),
+    10, 32, error_shrink=2, error_samples=64, reference_spp=128, settings=1, frames=6, rival_s=0.5, edge=24,
+    lights=100, series=((64, 1), (16, 8, 1)), cases=(CASES[0], CASES[-1]),
 )  # fmt: skip
 
 
@@ -201,26 +205,24 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
         _Room(case, (16, 12), Path(folder) / "warm", 16).bake(case.series, 16)
         room = _Room(case, (width, height), Path(folder) / "room", effort.lights)
         first = room.bake(case.series, min(16, effort.samples))
-        more = room.bake(case.series, effort.samples // 2)
-        half = room.light()
-        more += room.bake(case.series, effort.samples)
+        whole = first + room.bake(case.series, effort.samples)
         light = room.light()
-        settings = room.settings(effort.settings)
-        pictures = [[_drawn(one, state) for state in settings] for one in map(room.picture, (half, light))]
         points = sum(len(part.pixel) for part in light.parts.values())
-        rate = points * effort.samples / (first + more)
-        entries = sum(len(term.codes) for part in light.parts.values() for term in part.terms)
-        room_for = sum(
-            len(part.pixel) * term.bands * len(light.tails) for part in light.parts.values() for term in part.terms
+        rate = points * effort.samples / whole
+        terms = [(len(part.pixel), term) for part in light.parts.values() for term in part.terms]
+        room_for = sum(count * term.bands * len(light.tails) for count, term in terms)
+        small = _Room(
+            case, (width // effort.error_shrink, height // effort.error_shrink), Path(folder) / "small", effort.lights
         )
         return {
             "scene": case.scene, "series": _said(case.series), "size": f"{width}x{height}", "points": points,
             "slots": len(light.tails.slots), "tails": len(light.tails), "samples": effort.samples,
-            "bake_seconds": round(first + more, 2), "first_seconds": round(first, 2),
+            "bake_seconds": round(whole, 2), "first_seconds": round(first, 2),
             "samples_per_second": round(rate), "thesis_samples": case.published,
             "thesis_seconds": round(case.published * points / rate), "stored_mib": round(_stored(room.store) / MIB, 1),
-            "memory_mib": round(held_bytes(light) / MIB, 1), "share_not_zero": round(entries / max(1, room_for), 4),
-            **_times(room, light, effort), **_errors(room, settings, pictures, effort),
+            "memory_mib": round(held_bytes(light) / MIB, 1),
+            "share_not_zero": round(sum(len(term.codes) for _, term in terms) / max(1, room_for), 4),
+            **_times(room, light, effort), **_errors(small, room, effort),
         }  # fmt: skip
 
 
@@ -262,30 +264,35 @@ def _drag(room: _Room, material: str, curve: str) -> Iterator[Editable]:
         yield state
 
 
-def _errors(
-    room: _Room, settings: list[dict[str, Editable]], pictures: list[list[Floats]], effort: Effort
-) -> dict[str, Any]:
-    """Means over the settings, those of each kind, and what the rival takes for the first."""
+def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
+    """Means over the settings, those of each kind, and what the rival takes in the large view for the first."""
+    settings, pictures = room.settings(effort.settings), []
+    for samples in (effort.error_samples // 2, effort.error_samples):
+        room.bake(room.case.series, samples)
+        whole = room.picture(room.light())
+        pictures.append([_drawn(whole, state) for state in settings])
+        whole.close()
     inner, found = room.inner(), []
     for k, state in enumerate(settings):
         halves = room.reference(state, len(room.case.series), effort.reference_spp)
         converged = np.mean(halves, axis=0)
-        between = relative_mse(halves[0], halves[1], inner)  # four times the noise of their mean
-        half, whole = (relative_mse(one[k], converged, inner) for one in pictures)
+        noise = relative_mse(halves[0], halves[1], inner) / 4  # of the mean of both
+        half, full = (relative_mse(one[k], converged, inner) for one in pictures)
         found.append(
             {
-                "flip": _flip(converged, pictures[1][k]), "noise_flip": _flip(halves[0], halves[1]),
-                "relmse": whole, "noise_relmse": between / 4, "relmse_limit": max(0.0, 2 * whole - half - between / 4),
+                "flip": _flip(converged, pictures[1][k]), "noise_flip": _flip(halves[0], halves[1]), "relmse": full,
+                "noise_relmse": noise, "relmse_limit": max(0.0, 2 * full - half - noise),
             }
         )  # fmt: skip
         if k == 0:
-            rival = _rival(room, state, converged, found[0]["flip"], effort)
+            rival = _rival(room, large, state, converged, found[0]["flip"], effort)
     kinds = {
         f"flip_{KINDS[k]}": round(float(np.mean([one["flip"] for one in found[k :: len(KINDS)]])), 4)
         for k in range(min(len(KINDS), len(found)))
     }
     means = {key: float(f"{np.mean([one[key] for one in found]):.3g}") for key in found[0]}
-    return {"settings": len(settings), **means, **kinds, **rival}
+    size = f"{room.size[0]}x{room.size[1]}"
+    return {"error_size": size, "error_samples": samples, "settings": len(settings), **means, **kinds, **rival}
 
 
 def _flip(reference: Floats, image: Floats) -> float:
@@ -293,23 +300,29 @@ def _flip(reference: Floats, image: Floats) -> float:
     return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
 
 
-def _rival(room: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort) -> dict[str, Any]:
+def _rival(
+    room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
+) -> dict[str, Any]:
+    """The fewest samples that come as close in the small view, and the seconds that they take in the large one."""
     from lambent.bake.reference.denoised import DenoisedView
 
     edited = {name: one for name, one in state.items() if name not in room.fixed}
     depth = len(room.case.series)
-    tracer = DenoisedView(room.scene, room.camera, *room.size, max_depth=depth, edited=edited)
+    small, tracer = (
+        DenoisedView(one.scene, one.camera, *one.size, max_depth=depth, edited=edited) for one in (room, large)
+    )
     tracer.denoised(2)  # compiles
     spp, seconds, flip = 1, 0.0, np.inf
     while flip > wanted and seconds < effort.rival_s / 2:
         spp *= 2
+        flip = _flip(converged, small.denoised(spp, seed=3))
         began = time.perf_counter()
-        image = tracer.denoised(spp, seed=3)
+        tracer.denoised(spp, seed=3)
         seconds = time.perf_counter() - began
-        flip = _flip(converged, image)
-    beyond = "" if flip <= wanted else "> "
     said: dict[str, Any] = {"rival_spp": spp, "rival_seconds": round(seconds, 2)}
-    return {**({k: f"{beyond}{v}" for k, v in said.items()} if beyond else said), "rival_flip": round(flip, 4)}
+    if flip > wanted:
+        said = {key: f"> {value}" for key, value in said.items()}
+    return {**said, "rival_flip": round(flip, 4)}
 
 
 def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
@@ -319,10 +332,10 @@ def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         room = _Room(case, size, Path(folder), effort.lights)
         settings, inner = room.settings(effort.settings), room.inner()
-        references = [np.mean(room.reference(state, SURFACES, 4 * effort.reference_spp), axis=0) for state in settings]
+        references = [np.mean(room.reference(state, SURFACES, effort.reference_spp), axis=0) for state in settings]
         for series in effort.series:
             room.bake(series, 1)  # compiles
-            seconds = room.bake(series, 4 * effort.samples)
+            seconds = room.bake(series, effort.error_samples)
             whole = room.picture(room.light())
             compared = list(zip([_drawn(whole, state) for state in settings], references, strict=True))
             relmse = float(np.mean([relative_mse(image, reference, inner) for image, reference in compared]))
