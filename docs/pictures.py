@@ -118,7 +118,7 @@ def interreflections(samples: int = 512) -> None:
             whole.show(name, material)
         whole.draw()
         views = [whole.direct.image(), whole.image()]
-    views.append(render_reference(scene, camera, *size, 1024, max_depth=4, edited=edited)[0])
+    views.append(render_reference(scene, camera, *size, samples, max_depth=4, edited=edited)[0])
     row = [to_bytes(srgb_encode(filmic(image, scene.exposure_ev))) for image in views]
     save("interreflections.jpg", np.concatenate(row, axis=1), width=1200)
 
