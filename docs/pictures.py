@@ -1,9 +1,10 @@
-"""Makes the pictures of the README from what the demo wrote, those of the scenes to edit by path tracing, and that of
-an edit from its transport.
+"""Makes the pictures of the README from what the demo wrote, those of the scenes to edit by path tracing, and those of
+edits from their transport.
 
 python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
 .venv/bin/python docs/pictures.py scenes [NAME...]
 .venv/bin/python docs/pictures.py edit
+.venv/bin/python docs/pictures.py interreflections
 """
 
 from __future__ import annotations
@@ -81,6 +82,47 @@ def edit() -> None:
     save("edit.jpg", np.concatenate(both, axis=1), width=1024)
 
 
+def interreflections(samples: int = 512) -> None:
+    """`builtin:cornell` after edits: direct light, with interreflections, and path traced."""
+    from tempfile import TemporaryDirectory
+
+    from lambent.bake.bake import bake
+    from lambent.bake.bounces import Bounces
+    from lambent.bake.quality import quality_named
+    from lambent.bake.reference.path_traced import render_reference
+    from lambent.bake.view import View
+    from lambent.editing.interreflection.stored import interreflections as stored
+    from lambent.editing.interreflection.whole import WholePicture
+    from lambent.editing.operators import Region
+    from lambent.editing.session import Session
+    from lambent.editing.stored import edited_picture
+    from lambent.scenes import load_scene
+
+    scene, size = load_scene("builtin:cornell"), (450, 450)
+    camera = scene.cameras[0]
+    session = Session.new("builtin:cornell", camera, scene.materials, size=size)
+    start = {name: session.editable(name) for name in scene.materials}
+    quality = quality_named("normal").changed("picture", visibility={"lights": (1000,)})
+    with TemporaryDirectory() as folder:
+        store = bake(
+            scene, Path(folder), quality=quality, only={"transport", "interreflection"}, views=[View(camera, *size)],
+            bounces=Bounces((64, 1, 1, 1), samples),
+        )  # fmt: skip
+        whole = WholePicture(edited_picture(store, session))
+        whole.give(stored(store, camera, size, start), start)
+        session.tint("left_wall", "diffuse", (0.3, 4.0, 9.0))
+        session.tint("right_wall", "diffuse", (4.5, 1.0, 0.8))
+        session.pull("floor", "highlight", Region(a=-0.1, b=0.0, c=0.1, d=0.3), y=5.0)
+        edited = {name: session.editable(name) for name in scene.materials}
+        for name, material in edited.items():
+            whole.show(name, material)
+        whole.draw()
+        views = [whole.direct.image(), whole.image()]
+    views.append(render_reference(scene, camera, *size, samples, max_depth=4, edited=edited)[0])
+    row = [to_bytes(srgb_encode(filmic(image, scene.exposure_ev))) for image in views]
+    save("interreflections.jpg", np.concatenate(row, axis=1), width=1200)
+
+
 def shown(path: Path) -> np.ndarray:
     return to_bytes(read_encoded(path)[..., :3])
 
@@ -103,5 +145,7 @@ if __name__ == "__main__":
         scenes(sys.argv[2:])
     elif sys.argv[1:] == ["edit"]:
         edit()
+    elif sys.argv[1:] == ["interreflections"]:
+        interreflections()
     else:
         main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))

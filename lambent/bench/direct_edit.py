@@ -249,9 +249,9 @@ def _against_path_tracing(
     scene: Scene, pictures: list[Floats], shown: Flags, effort: Effort
 ) -> Iterator[dict[str, Any]]:
     """Errors of edited pictures, and what path tracing with a denoiser takes for as little."""
-    from lambent.bake.reference.denoised import DirectLight
+    from lambent.bake.reference.denoised import DenoisedView
 
-    tracer = DirectLight(scene, scene.cameras[0], effort.size, effort.size)
+    tracer = DenoisedView(scene, scene.cameras[0], effort.size, effort.size, max_depth=1)
     halves = [tracer.image(effort.reference_spp // 2, seed) for seed in (1, 2)]
     converged = np.mean(halves, axis=0)
     exposure_ev = display_exposure(converged)  # of the whole picture: surfaces may be less than its mean asks for

@@ -38,9 +38,6 @@ class Canvas(Protocol):
     def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> Layer:
         """A new layer over pixels (P,), with the viewer's angle (P,) and a texture (P, 3) or none."""
 
-    def clear(self, pixel: Indices) -> None:
-        """Nothing but layers shows at these pixels."""
-
     def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
         """Draw the sum of layers, each with its scale (3,)."""
 
@@ -72,7 +69,7 @@ class HostLayer:
 
 
 class HostCanvas:
-    """`Canvas` in memory; `background` (H, W, 3) is what is not edited."""
+    """`Canvas` in memory; `background` (H, W, 3) is what layers are added to."""
 
     def __init__(self, background: Image) -> None:
         self._background = np.array(background, np.float32)
@@ -80,9 +77,6 @@ class HostCanvas:
 
     def layer(self, pixel: Indices, theta_o: Floats, texture: Floats | None) -> HostLayer:
         return HostLayer(pixel, theta_o, texture)
-
-    def clear(self, pixel: Indices) -> None:
-        self._background.reshape(-1, 3)[pixel] = 0
 
     def compose(self, shown: Sequence[tuple[Layer, NDArray[np.float32]]]) -> None:
         self._image = self._background.copy()

@@ -71,7 +71,7 @@ class EditedPicture:
     Parameters
     ----------
     background : (H, W, 3) float32
-        Linear radiance of what is not edited; 0, or anything, where a part is.
+        Linear radiance of what is not edited; where a part is, what its surfaces emit.
     parts
         By name of the material.
     canvas
@@ -104,7 +104,6 @@ class EditedPicture:
             self._covered[before.pixel] -= 1
         self._covered[part.pixel] += 1
         assert self._covered.max(initial=0) <= 1, f"a pixel of {material} shows another material too"
-        self.canvas.clear(part.pixel)
         self._parts[material], self._terms[material] = part, terms
 
     def show(self, material: str, edited: Editable) -> None:

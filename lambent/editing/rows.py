@@ -43,7 +43,7 @@ class Rows:
     def of_wavelets(cls, transport: Pixels, over: int = 0) -> Rows:
         """Rows of transport (J, 3, P) in W/(sr m^2), scaled by a power of two so that half floats hold them."""
         largest = float(max(transport.max(initial=0.0), -transport.min(initial=0.0)))
-        unit = 2.0 ** np.ceil(np.log2(largest / LARGEST)) if largest > 0 else 1.0
+        unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / LARGEST))
         return cls((transport / np.float32(unit)).astype(np.float16), float(unit), over)
 
     @classmethod

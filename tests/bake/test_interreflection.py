@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lambent.bake.artefacts.interreflection import SMOOTH_ANGLES
 from lambent.bake.bounces import Bounces
 from lambent.bake.view import View
 from lambent.core.camera import Camera
@@ -15,6 +17,7 @@ from lambent.core.shared_exponent import unpacked_rgb
 from lambent.editing.interreflection.powers import second_coefficients
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.geometry import box, patch, placed, sphere
@@ -111,12 +114,18 @@ def interior(store: Store, view: View) -> np.ndarray:
     return np.asarray(np.ptp(around, axis=0) == 0)
 
 
-def path_traced(scene: Scene, hits: int, camera: Camera = FROM_ABOVE, spp: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+def path_traced(
+    scene: Scene,
+    hits: int,
+    camera: Camera = FROM_ABOVE,
+    spp: int = 4096,
+    edited: dict[str, Editable] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
     """Light of paths that meet 2 to `hits` surfaces, and its variance."""
     from lambent.bake.reference.path_traced import render_reference
 
     (whole, noise), (direct, more) = (
-        render_reference(scene, camera, SIZE, SIZE, spp, max_depth=depth) for depth in (hits, 1)
+        render_reference(scene, camera, SIZE, SIZE, spp, max_depth=depth, edited=edited) for depth in (hits, 1)
     )
     return whole - direct, noise + more
 
@@ -156,6 +165,37 @@ def test_a_glossy_ball_between_diffuse_walls(tmp_path: Path) -> None:
     expected, noise = path_traced(scene, 2, AT_BALL)
     assert_same_image(found, (0.03 * found) ** 2, expected, noise)
     assert abs(found.mean() / expected.mean() - 1) < 0.01
+
+
+def stepped(material: Editable, rng: np.random.Generator, sharp: int = 64) -> Editable:
+    """Curves of random steps as wide as the bands; a narrow lobe might be even over the bands that it meets."""
+    curves = dict(material.curves)
+    for term in material.terms:
+        for factor in term.factors:
+            steps = rng.random((4 if factor.over in SMOOTH_ANGLES else sharp, 3)) ** 3
+            curves[factor.curve] = Curve(np.vstack([np.repeat(steps, KNOTS // len(steps), axis=0), steps[-1:]]))
+    return replace(material, curves=curves)
+
+
+@pytest.mark.parametrize(("seen", "place"), [("ball", (0.25, 0.35, -0.1)), ("floor", (-0.2, 0.0, 0.3))])
+def test_random_tables_of_bands(tmp_path: Path, seen: str, place: tuple[float, float, float]) -> None:
+    """Any curves at the first surface and any colours of the others, from one bake; pixels are nearly points.
+
+    Paths meet two surfaces: the third may be the first's material again, which counts by its albedo there.
+    """
+    camera = Camera("near", (0.4, 1.2, 2.2), place, fov_y_deg=0.5)
+    glossy = Material(kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, r0=0.4),))
+    store, view = baked(corner({**FIRST, seen: glossy}), camera, tmp_path / "s", Bounces((64, 1), samples=8192))
+    scene, rng = corner({**FIRST, seen: glossy}), np.random.default_rng(0)
+    for _ in range(3):
+        edited = {name: of_material(Material(kd=tuple(rng.uniform(0, 0.9, 3)))) for name in FIRST}
+        edited[seen] = stepped(of_material(glossy), rng)
+        found = picture(store, view, scene, {**of_scene(scene), **edited}).reshape(SIZE, SIZE, 3)
+        expected, noise = path_traced(scene, 2, camera, edited=edited)
+        assert_same_image(found, (0.05 * found) ** 2, expected, noise)
+        error = np.sqrt(noise.mean(axis=(0, 1)) + found.var(axis=(0, 1))) / SIZE
+        assert (np.abs((found - expected).mean(axis=(0, 1))) < 4 * error).all()
+        assert np.median(error / found.mean(axis=(0, 1))) < 0.03
 
 
 def test_two_glossy_surfaces(tmp_path: Path) -> None:

@@ -36,11 +36,11 @@ def test_the_rival_comes_closer_with_more_samples() -> None:
     from lambent.bake.engine import engine
 
     engine()
-    from lambent.bake.reference.denoised import DirectLight
+    from lambent.bake.reference.denoised import DenoisedView
     from lambent.scenes import load_scene
 
     scene = load_scene("builtin:teatray")
-    tracer = DirectLight(scene, scene.cameras[0], 48, 48)
+    tracer = DenoisedView(scene, scene.cameras[0], 48, 48, max_depth=1)
     reference = np.log(1e-2 + tracer.image(1024, seed=1))
     errors = {spp: np.abs(np.log(1e-2 + tracer.denoised(spp, seed=2)) - reference).mean() for spp in (2, 64)}
     noisy = np.abs(np.log(1e-2 + tracer.image(2, seed=2)) - reference).mean()

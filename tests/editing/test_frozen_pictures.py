@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from itertools import combinations_with_replacement
 from pathlib import Path
 
@@ -19,8 +20,8 @@ from lambent.editing.interreflection.whole import WholePicture
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import DensePairs, Rows
 from lambent.materials.document import Lobe, Material
-from lambent.materials.factored.albedo import albedo
-from lambent.materials.factored.curve import Curve
+from lambent.materials.factored.albedo import albedo, term_albedo
+from lambent.materials.factored.curve import KNOTS, Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable, Term
 from lambent.store.contract import view_artefact_name
@@ -158,6 +159,25 @@ def _no_light(term: Term, points: int) -> Rows | DensePairs:
     if len(term.factors) < 2:
         return Rows(np.zeros((4 if term.factors else 1, 3, points), np.float16))
     return DensePairs(np.zeros((4, 2, 3, points), np.float32))
+
+
+@pytest.mark.parametrize("m", [0.03, 0.07, 0.2])
+def test_bands_wider_than_a_peak_reflect_its_light(m: float) -> None:
+    """16 bands at the second surface under uniform light."""
+    shiny = of_material(Material(lobes=(Lobe(mx=m, my=m, r0=0.5),)))
+    tails = Tails((("shiny", "reflection"),), 2, (SecondBands("shiny", 0, (16, 1)),))
+    steps = second_coefficients(tails, {"shiny": shiny})
+    assert len(steps) == 16
+    flat = replace(shiny.terms[0], scale=(1.0, 1.0, 1.0))
+    bands = np.repeat(steps, KNOTS // 16, axis=0)
+    stepped = {"highlight": Curve(np.vstack([bands, bands[-1:]])), "fresnel": Curve.constant()}
+    found = term_albedo(flat, stepped) / albedo(shiny, "reflection")
+    assert np.abs(found - 1).max() < 0.1, found
+
+
+def test_the_faintest_light_stays_finite() -> None:
+    rows = Rows.of_wavelets(np.full((1, 3, 2), 1e-42, np.float32))
+    assert np.isfinite(rows.values).all() and np.isfinite(rows.unit)
 
 
 def until_exact(whole: WholePicture) -> None:

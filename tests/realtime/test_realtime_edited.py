@@ -137,7 +137,6 @@ def test_pictures_are_composed_as_in_memory(device: Any) -> None:
     theta_o, texture = rng.uniform(0, 1.65, 41), rng.random((41, 3))
     curve, images = Curve.of(lambda x: np.stack([np.cos(x), x, 1 + x * x], axis=1)), []
     for canvas in (HostCanvas(background), GpuCanvas(device, background)):
-        canvas.clear(pixel)
         shown: list[Any] = []
         for k, given in enumerate((texture, None)):
             layer: Any = canvas.layer(pixel, theta_o, given)

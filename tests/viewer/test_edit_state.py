@@ -62,7 +62,7 @@ def exact(state, session=None, lights=LIGHTS[-1]):
     session = session or state.session
     originals = {name: session.original(name) for name in session.document.materials}
     picture = EditedPicture(
-        np.full((6, 8, 3), 0.125, np.float32), parts_of(Store.open(state.loading.folder), session, originals, lights)
+        state.loading.view.backdrop, parts_of(Store.open(state.loading.folder), session, originals, lights)
     )
     for name in originals:
         picture.show(name, session.editable(name))

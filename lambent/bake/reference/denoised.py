@@ -1,6 +1,8 @@
-"""Direct light path traced and denoised: the other way to see an edit soon."""
+"""A view path traced and denoised: the other way to see an edit soon."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import drjit as dr
 import mitsuba as mi
@@ -9,29 +11,48 @@ from numpy.typing import NDArray
 
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
 from lambent.bake.light.denoise import denoise_image
-from lambent.bake.reference.path_traced import built, camera_rays, traced
+from lambent.bake.reference.path_traced import MAX_DEPTH, built, camera_rays, traced
 from lambent.bake.tracing.rays import block_sums, has_holes, independent, intersect
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.materials.document import Material
+from lambent.materials.factored.albedo import term_albedo
+from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 
 GUIDING = 16  # samples a pixel of albedo and normals
 
 
-class DirectLight:
-    """Direct light of a scene in one view by path tracing; the scene is built once."""
+class DenoisedView:
+    """A scene in one view by path tracing; the scene is built once.
 
-    def __init__(self, scene: Scene, camera: Camera, width: int, height: int) -> None:
-        self._builder, self._scene = built(scene)
-        self._camera, self._size = camera, (width, height)
-        worn = [scene.materials[o.material] for o in scene.objects]
-        self._diffuse = mi.Color3f(np.array([np.broadcast_to(m.kd, 3) for m in worn], np.float32).T)
-        self._specular = mi.Color3f(np.array([_specular(m) for m in worn], np.float32).T)
+    Parameters
+    ----------
+    max_depth
+        Surfaces on the longest path; 1 is direct light alone.
+    edited
+        Terms and curves by material name, by which surfaces scatter instead of by their documents.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        camera: Camera,
+        width: int,
+        height: int,
+        *,
+        max_depth: int = MAX_DEPTH,
+        edited: Mapping[str, Editable] | None = None,
+    ) -> None:
+        self._builder, self._scene = built(scene, edited)
+        self._camera, self._size, self._max_depth = camera, (width, height), max_depth
+        looks = {name: _look(material, (edited or {}).get(name)) for name, material in scene.materials.items()}
+        worn = np.array([looks[o.material] for o in scene.objects], np.float32)
+        self._diffuse, self._specular = (mi.Color3f(np.ascontiguousarray(column.T)) for column in worn.swapaxes(0, 1))
 
     def image(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
         """(H, W, 3) radiance of `spp` samples a pixel, at least 2; pixels filtered by a box."""
-        image, _ = traced(self._scene, self._camera, *self._size, spp, seed, max_depth=1)
+        image, _ = traced(self._scene, self._camera, *self._size, spp, seed, max_depth=self._max_depth)
         return image
 
     def denoised(self, spp: int, seed: int = 0) -> Floats:
@@ -55,6 +76,12 @@ class DirectLight:
         return means[0], means[1]
 
 
-def _specular(material: Material) -> Floats:
-    """(3,) what lobes reflect of light from straight above, about."""
-    return np.asarray(sum((np.multiply(lobe.k, lobe.r0) for lobe in material.lobes), np.zeros(3)))
+def _look(material: Material, edited: Editable | None) -> Floats:
+    """(2, 3) what the diffuse term and all others reflect, about: of lobes, light from straight above."""
+    if edited is None:
+        specular = sum((np.multiply(lobe.k, lobe.r0) for lobe in material.lobes), np.zeros(3))
+        return np.stack([np.broadcast_to(material.kd, 3), specular])
+    found = np.zeros((2, 3))
+    for term in edited.terms:
+        found[0 if term.is_diffuse else 1] += term_albedo(term, edited.curves)
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, image_plane
 from lambent.core.progress import Progress, silent
+from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 
@@ -35,6 +37,7 @@ def render_reference(
     progress: Progress = silent,
     *,
     max_depth: int = MAX_DEPTH,
+    edited: Mapping[str, Editable] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Path trace the view of a pinhole camera, pixels filtered by a box.
 
@@ -44,19 +47,23 @@ def render_reference(
         Samples per pixel, at least 2; rounded up to whole passes.
     seed : int
         The same seed gives the same image.
+    max_depth : int
+        Surfaces on the longest path.
+    edited : mapping, optional
+        Terms and curves by material name, by which surfaces scatter instead of by their documents.
 
     Returns
     -------
     image, variance : (height, width, 3) float32
         Radiance in W/(sr m^2), row 0 on top; variance of each pixel's mean, in its square.
     """
-    _, whole = built(scene)
+    _, whole = built(scene, edited)
     return traced(whole, camera, width, height, spp, seed, progress, max_depth=max_depth)
 
 
-def built(scene: Scene) -> tuple[SceneBuilder, Any]:
+def built(scene: Scene, edited: Mapping[str, Editable] | None = None) -> tuple[SceneBuilder, Any]:
     """A scene for `traced`, and its builder."""
-    builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
+    builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)), edited=edited)
     balance_emitters(builder)
     return builder, builder.build()
 

@@ -59,6 +59,11 @@ class Curve:
             raise ValueError(f"{bands} bands do not divide {KNOTS} intervals")
         return np.asarray(self._interval_means.reshape(bands, per_band, 3).mean(axis=1))
 
+    def polar_means(self, bands: int) -> Floats:
+        """As `band_means`, but over the rings of a sphere that the bands are: a peak keeps its light in any band."""
+        weight = -np.diff(np.cos(angles_rad())).reshape(bands, -1, 1)
+        return np.asarray((self._interval_means.reshape(bands, -1, 3) * weight).sum(axis=1) / weight.sum(axis=1))
+
     @cached_property
     def _interval_means(self) -> Floats:
         return np.asarray((self.values[:-1] + self.values[1:]) / 2)

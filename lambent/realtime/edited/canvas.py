@@ -27,7 +27,7 @@ class GpuCanvas:
     Parameters
     ----------
     background : (H, W, 3) float32
-        Linear radiance of what is not edited.
+        Linear radiance that layers are added to.
 
     Attributes
     ----------
@@ -39,10 +39,11 @@ class GpuCanvas:
         self._commands = Commands(device)
         height, self._width, _ = background.shape
         self._stride = self._width + -self._width % TEXELS
-        self._shown = np.ones((height, self._stride, 4), np.float32)
-        self._shown[:, : self._width, :3] = background
-        self._background, self._stale = self._commands.empty(self._shown.nbytes), True
-        self._image = self._commands.empty(self._shown.nbytes)
+        shown = np.ones((height, self._stride, 4), np.float32)
+        shown[:, : self._width, :3] = background
+        self._bytes = shown.nbytes
+        self._background, self._image = (self._commands.empty(self._bytes) for _ in range(2))
+        self._commands.write(self._background, shown)
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST | wgpu.TextureUsage.COPY_SRC
         self.texture = device.create_texture(size=(self._width, height, 1), format=FORMAT, usage=usage)
 
@@ -50,21 +51,12 @@ class GpuCanvas:
         """A new layer over pixels (P,), with the viewer's angle (P,) and a texture (P, 3) or none."""
         return GpuLayer(self._commands, self._texels(pixel), theta_o, texture, self._image)
 
-    def clear(self, pixel: Indices) -> None:
-        """Nothing but layers shows at these pixels."""
-        self._shown.reshape(-1, 4)[self._texels(pixel), :3] = 0
-        self._stale = True
-
     def compose(self, shown: Sequence[tuple[Any, NDArray[np.float32]]]) -> None:
         """Draw the sum of this canvas's layers, each with its scale (3,), into the texture, in one submission."""
-        if self._stale:
-            self._commands.write(self._background, self._shown)
-            self._stale = False
-        size = self._shown.nbytes
-        self._commands.copy(lambda to: to.copy_buffer_to_buffer(self._background, 0, self._image, 0, size))
+        self._commands.copy(lambda to: to.copy_buffer_to_buffer(self._background, 0, self._image, 0, self._bytes))
         for layer, scale in shown:
             layer.compose(scale)
-        layout = {"buffer": self._image, "bytes_per_row": 16 * self._stride, "rows_per_image": len(self._shown)}
+        layout = {"buffer": self._image, "bytes_per_row": 16 * self._stride, "rows_per_image": self.texture.height}
         self._commands.copy(
             lambda to: to.copy_buffer_to_texture(layout, {"texture": self.texture}, self.texture.size)
         )  # fmt: skip

@@ -1,0 +1,357 @@
+"""`gi-edit`: a view edited with its interreflections, from the bake to the frame, beside path tracing and a denoiser.
+
+Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published
+number of samples would take at the measured rate. Errors are those of smaller pictures of `error_size` with
+`error_samples`, for random settings that no bake has seen (`gi_edit_states`), to path traced pictures of as many
+surfaces. `flip` is of all pixels; `relmse` of those whose neighbours show the same object, as a stored pixel is a point
+and a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` that of the whole.
+`relmse_limit` is extrapolated from half the samples and all of them to infinitely many, without the reference's noise:
+what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise of the first setting, at the
+fewest samples, in powers of two, whose FLIP is as low; the seconds are those of the large picture.
+
+Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that what a short
+series leaves out counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary
+names the least of each scene.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.bake import bake
+from lambent.bake.bounces import Bounces
+from lambent.bake.quality import quality_named
+from lambent.bake.view import View
+from lambent.bench.direct_edit import MIB, held_bytes
+from lambent.bench.gi_edit_states import KINDS, interior, relative_mse, setting
+from lambent.core.arrays import Flags, Floats
+from lambent.core.metrics import display_exposure, displayed, flip_error
+from lambent.core.progress import Progress, silent, tracked
+from lambent.editing.interreflection.picture import FrozenPicture
+from lambent.editing.interreflection.stored import Interreflections, interreflections
+from lambent.editing.interreflection.whole import WholePicture
+from lambent.editing.operators import Region
+from lambent.editing.session import Session
+from lambent.editing.stored import edited_picture
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.scenes import load_scene
+from lambent.scenes.scene import Scene
+from lambent.store.store import Store
+
+NAME = "gi-edit"
+DRAG = Region(a=-0.1, b=0.0, c=0.1, d=0.4)
+SERIES = ((64, 1), (64, 1, 1), (64, 1, 1, 1), (128, 1, 1, 1), (64, 16), (128, 8, 1), (16, 8, 1, 1))
+SURFACES = 8  # on the longest paths that series are compared with
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene with a series as it was published: size, samples a pixel, and the material that is dragged."""
+
+    scene: str
+    series: tuple[int, ...]
+    size: tuple[int, int]
+    published: int
+    material: str
+    fixed: frozenset[str] = frozenset()
+
+
+CASES = (
+    Case("cornell", (64, 1, 1, 1), (450, 450), 12_000, "floor"),
+    Case("vase", (64, 1, 1, 1), (512, 512), 4_000, "vase"),
+    Case("loft", (64, 1, 1), (640, 480), 8_000, "floor", frozenset({"books", "toys"})),
+    Case("teatray", (128, 1, 1, 1), (320, 240), 10_000, "glaze"),
+    Case("teatray", (16, 8, 1, 1), (320, 240), 10_000, "glaze"),
+    Case("teatray", (128, 8, 1), (320, 240), 10_000, "glaze"),
+    Case("ring", (64, 16), (400, 400), 4_000, "ring"),
+)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Pictures are smaller by `shrink`, those of errors by `error_shrink` more; samples are those of a pixel.
+
+    `settings` are random ones of each row; `rival_s` is the time that one picture of the rival may take; `edge` that of
+    the pictures by which `series` are compared.
+    """
+
+    shrink: int = 1
+    samples: int = 64
+    error_shrink: int = 4
+    error_samples: int = 1024
+    reference_spp: int = 2048
+    settings: int = 3
+    frames: int = 40
+    rival_s: float = 20.0
+    edge: int = 80
+    lights: int = 1000
+    series: tuple[tuple[int, ...], ...] = SERIES
+    cases: tuple[Case, ...] = CASES
+
+
+FULL = Effort()
+QUICK = Effort(
+    10, 32, error_shrink=2, error_samples=64, reference_spp=128, settings=1, frames=6, rival_s=0.5, edge=24,
+    lights=100, series=((64, 1), (16, 8, 1)), cases=(CASES[0], CASES[-1]),
+)  # fmt: skip
+
+
+def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
+    """Rows per scene and series; the summary has the best series of each scene."""
+    from lambent.bake.engine import engine
+
+    engine()
+    rows = [_row(case, effort) for case in tracked(effort.cases, progress, "scenes")]
+    scenes = {case.scene: case for case in effort.cases}
+    compared = [row for case in tracked(list(scenes.values()), progress, "series") for row in _series(case, effort)]
+    best = {
+        name: {
+            key: min((row for row in compared if row["scene"] == name), key=lambda row: row[key])["series"]
+            for key in ("relmse", "error_mib", "error_seconds")
+        }
+        for name in scenes
+    }
+    return {"rows": rows + compared, "summary": {"reference_spp": effort.reference_spp, "best_series": best}}
+
+
+class _Room:
+    """One view of a scene in a store of its own, and its direct light."""
+
+    def __init__(self, case: Case, size: tuple[int, int], folder: Path, lights: int) -> None:
+        self.case, self.size, self._folder = case, size, folder
+        self.scene: Scene = load_scene(f"builtin:{case.scene}")
+        self.camera = self.scene.cameras[0]
+        self.start = {name: of_material(material) for name, material in self.scene.materials.items()}
+        self.session = Session.new(f"builtin:{case.scene}", self.camera, self.scene.materials, size=size)
+        quality = quality_named("normal").changed("bench", visibility={"lights": (lights,)})
+        self.store = bake(self.scene, folder, quality=quality, only={"transport"}, views=[View(self.camera, *size)])
+
+    def bake(self, series: tuple[int, ...], samples: int) -> float:
+        """Bring the interreflections to so many samples; seconds."""
+        began, view, bounces = time.perf_counter(), View(self.camera, *self.size), Bounces(series, samples, self.fixed)
+        self.store = bake(self.scene, self._folder, only={"interreflection"}, views=[view], bounces=bounces)
+        return time.perf_counter() - began
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        return self.case.fixed
+
+    def light(self) -> Interreflections:
+        return interreflections(self.store, self.camera, self.size, self.start)
+
+    def picture(self, light: Interreflections) -> WholePicture:
+        whole = WholePicture(edited_picture(self.store, self.session))
+        whole.give(light, self.start)
+        return whole
+
+    def settings(self, count: int) -> list[dict[str, Editable]]:
+        """Random ones of each kind in turn; materials that are fixed stay."""
+        found = []
+        for k in range(count):
+            rng = np.random.default_rng(k)
+            found.append(
+                {
+                    name: self.start[name] if name in self.fixed else setting(KINDS[k % len(KINDS)], material, rng)
+                    for name, material in self.scene.materials.items()
+                }
+            )
+        return found
+
+    def reference(self, materials: dict[str, Editable], surfaces: int, spp: int) -> tuple[Floats, Floats]:
+        """Two halves of a path traced picture."""
+        from lambent.bake.reference.path_traced import render_reference
+
+        edited = {name: one for name, one in materials.items() if name not in self.fixed}
+        return tuple(
+            render_reference(
+                self.scene, self.camera, *self.size, max(2, spp // 2), seed, max_depth=surfaces, edited=edited
+            )[0]
+            for seed in (1, 2)
+        )  # type: ignore[return-value]
+
+    def inner(self) -> Flags:
+        return interior(self.store, self.camera, self.size)
+
+
+def _drawn(whole: WholePicture, materials: dict[str, Editable]) -> Floats:
+    for name, one in materials.items():
+        whole.show(name, one)
+    whole.draw()
+    return np.array(whole.image())
+
+
+def _stored(store: Store) -> int:
+    return sum(
+        file.stat().st_size
+        for one in store.artefacts("interreflection")
+        for file in (store.folder / one.name).rglob("*")
+        if file.is_file()
+    )
+
+
+def _row(case: Case, effort: Effort) -> dict[str, Any]:
+    width, height = (edge // effort.shrink for edge in case.size)
+    with tempfile.TemporaryDirectory() as folder:
+        _Room(case, (16, 12), Path(folder) / "warm", 16).bake(case.series, 16)
+        room = _Room(case, (width, height), Path(folder) / "room", effort.lights)
+        first = room.bake(case.series, min(16, effort.samples))
+        whole = first + room.bake(case.series, effort.samples)
+        light = room.light()
+        points = sum(len(part.pixel) for part in light.parts.values())
+        rate = points * effort.samples / whole
+        terms = [(len(part.pixel), term) for part in light.parts.values() for term in part.terms]
+        room_for = sum(count * term.bands * len(light.tails) for count, term in terms)
+        small = _Room(
+            case, (width // effort.error_shrink, height // effort.error_shrink), Path(folder) / "small", effort.lights
+        )
+        return {
+            "scene": case.scene, "series": _said(case.series), "size": f"{width}x{height}", "points": points,
+            "slots": len(light.tails.slots), "tails": len(light.tails), "samples": effort.samples,
+            "bake_seconds": round(whole, 2), "first_seconds": round(first, 2),
+            "samples_per_second": round(rate), "thesis_samples": case.published,
+            "thesis_seconds": round(case.published * points / rate), "stored_mib": round(_stored(room.store) / MIB, 1),
+            "memory_mib": round(held_bytes(light) / MIB, 1),
+            "share_not_zero": round(sum(len(term.codes) for _, term in terms) / max(1, room_for), 4),
+            **_times(room, light, effort), **_errors(small, room, effort),
+        }  # fmt: skip
+
+
+def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, Any]:
+    """Freezing of each material, and frames of a drag of one."""
+    whole, freezing = room.picture(light), {}
+    whole.draw()
+    for name in light.parts:
+        if name not in room.fixed:
+            began = time.perf_counter()
+            FrozenPicture(light, room.start, name, whole.direct.canvas)
+            freezing[name] = time.perf_counter() - began
+    material, frames = room.case.material, []
+    curve = next(name for name in room.start[material].curves if "highlight" in name)
+    whole.activate(material, curve)
+    whole.draw()
+    for state in islice(_drag(room, material, curve), effort.frames + 2):
+        began = time.perf_counter()
+        whole.show(material, state)
+        whole.step()
+        whole.image()
+        frames.append(1e3 * (time.perf_counter() - began))
+    whole.close()
+    slowest = max(freezing, key=lambda name: freezing[name])
+    return {
+        "freeze_seconds": round(freezing[slowest], 2), "freeze_of": slowest,
+        "frozen_mib": round(held_bytes(whole) / MIB, 1),
+        "frame_ms": round(statistics.median(frames[2:]), 2), "frame_worst_ms": round(max(frames[2:]), 2),
+    }  # fmt: skip
+
+
+def _drag(room: _Room, material: str, curve: str) -> Iterator[Editable]:
+    k = 0
+    while True:
+        k += 1
+        room.session.pull(material, curve, DRAG, y=0.02 * k)
+        state = room.session.editable(material)
+        room.session.undo()
+        yield state
+
+
+def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
+    """Means over the settings, those of each kind, and what the rival takes in the large view for the first."""
+    settings, pictures = room.settings(effort.settings), []
+    for samples in (effort.error_samples // 2, effort.error_samples):
+        room.bake(room.case.series, samples)
+        whole = room.picture(room.light())
+        pictures.append([_drawn(whole, state) for state in settings])
+        whole.close()
+    inner, found = room.inner(), []
+    for k, state in enumerate(settings):
+        halves = room.reference(state, len(room.case.series), effort.reference_spp)
+        converged = np.mean(halves, axis=0)
+        noise = relative_mse(halves[0], halves[1], inner) / 4  # of the mean of both
+        half, full = (relative_mse(one[k], converged, inner) for one in pictures)
+        found.append(
+            {
+                "flip": _flip(converged, pictures[1][k]), "noise_flip": _flip(halves[0], halves[1]), "relmse": full,
+                "noise_relmse": noise, "relmse_limit": max(0.0, 2 * full - half - noise),
+            }
+        )  # fmt: skip
+        if k == 0:
+            rival = _rival(room, large, state, converged, found[0]["flip"], effort)
+    kinds = {
+        f"flip_{KINDS[k]}": round(float(np.mean([one["flip"] for one in found[k :: len(KINDS)]])), 4)
+        for k in range(min(len(KINDS), len(found)))
+    }
+    means = {key: float(f"{np.mean([one[key] for one in found]):.3g}") for key in found[0]}
+    size = f"{room.size[0]}x{room.size[1]}"
+    return {"error_size": size, "error_samples": samples, "settings": len(settings), **means, **kinds, **rival}
+
+
+def _flip(reference: Floats, image: Floats) -> float:
+    exposure_ev = display_exposure(reference)
+    return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
+
+
+def _rival(
+    room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
+) -> dict[str, Any]:
+    """The fewest samples that come as close in the small view, and the seconds that they take in the large one."""
+    from lambent.bake.reference.denoised import DenoisedView
+
+    edited = {name: one for name, one in state.items() if name not in room.fixed}
+    depth = len(room.case.series)
+    small, tracer = (
+        DenoisedView(one.scene, one.camera, *one.size, max_depth=depth, edited=edited) for one in (room, large)
+    )
+    tracer.denoised(2)  # compiles
+    spp, seconds, flip = 1, 0.0, np.inf
+    while flip > wanted and seconds < effort.rival_s / 2:
+        spp *= 2
+        flip = _flip(converged, small.denoised(spp, seed=3))
+        began = time.perf_counter()
+        tracer.denoised(spp, seed=3)
+        seconds = time.perf_counter() - began
+    said: dict[str, Any] = {"rival_spp": spp, "rival_seconds": round(seconds, 2)}
+    if flip > wanted:
+        said = {key: f"> {value}" for key, value in said.items()}
+    return {**said, "rival_flip": round(flip, 4)}
+
+
+def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
+    """Each series in one small picture, with the same samples, against paths of any length."""
+    size = effort.edge, round(effort.edge * case.size[1] / case.size[0])
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        room = _Room(case, size, Path(folder), effort.lights)
+        settings, inner = room.settings(effort.settings), room.inner()
+        references = [np.mean(room.reference(state, SURFACES, effort.reference_spp), axis=0) for state in settings]
+        for series in effort.series:
+            room.bake(series, 1)  # compiles
+            seconds = room.bake(series, effort.error_samples)
+            whole = room.picture(room.light())
+            compared = list(zip([_drawn(whole, state) for state in settings], references, strict=True))
+            relmse = float(np.mean([relative_mse(image, reference, inner) for image, reference in compared]))
+            flip = float(np.mean([_flip(reference, image) for image, reference in compared]))
+            mib = _stored(room.store) / MIB
+            whole.close()
+            rows.append(
+                {
+                    "scene": case.scene, "series": _said(series), "size": f"{size[0]}x{size[1]}", "surfaces": SURFACES,
+                    "bake_seconds": round(seconds, 2), "stored_mib": round(mib, 2), "flip": round(flip, 4),
+                    "relmse": float(f"{relmse:.3g}"), "error_mib": float(f"{np.sqrt(relmse) * mib:.3g}"),
+                    "error_seconds": float(f"{np.sqrt(relmse) * seconds:.3g}"),
+                }
+            )  # fmt: skip
+    return rows
+
+
+def _said(series: tuple[int, ...]) -> str:
+    return ",".join(map(str, series))

@@ -1,0 +1,79 @@
+"""Random settings of materials that no bake has seen, and how far pictures of them are from a reference."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats
+from lambent.core.camera import Camera
+from lambent.core.plain import triple
+from lambent.materials.document import Material
+from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.curve import KNOTS, Curve
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.terms import Editable
+from lambent.store.contract import view_artefact_name
+from lambent.store.store import Store
+
+KINDS = ("bands", "colours", "widths")
+STEPS = 16  # of a curve of random steps
+WHITEST = 0.8  # albedo of what is random
+
+
+def setting(kind: str, material: Material, rng: np.random.Generator) -> Editable:
+    """A material at random.
+
+    Parameters
+    ----------
+    kind : {'colours', 'widths', 'bands'}
+        Another diffuse colour; wide or narrow lobes as well; or curves of random steps, in all terms.
+    """
+    lobes = list(material.lobes)
+    if kind == "widths":
+        factors = np.exp(rng.uniform(np.log(0.5), np.log(4.0), len(lobes)))
+        lobes = [
+            lobe.model_copy(update={"mx": min(0.6, f * lobe.mx), "my": min(0.6, f * lobe.my)})
+            for f, lobe in zip(factors, lobes, strict=True)
+        ]
+    colour = rng.uniform(0.05, WHITEST, 3) if np.max(material.kd) > 0 else np.zeros(3)
+    made = of_material(material.model_copy(update={"kd": triple(colour), "lobes": tuple(lobes)}))
+    return _no_whiter(stepped(made, rng)) if kind == "bands" else made
+
+
+def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
+    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets."""
+    curves = {}
+    for name, curve in editable.curves.items():
+        steps = rng.random((STEPS, 3)) * 2 * curve.values.mean(axis=0)
+        curves[name] = Curve(steps[np.minimum(np.arange(KNOTS + 1) * STEPS // KNOTS, STEPS - 1)])
+    return replace(editable, curves=curves)
+
+
+def _no_whiter(editable: Editable) -> Editable:
+    """Terms scaled so that no albedo is above `WHITEST`."""
+    sides = {"transmission" if term.side == "transmission" else "reflection" for term in editable.terms}
+    most = max((float(albedo(editable, side).max()) for side in sides), default=0.0)
+    factor = min(1.0, WHITEST / max(most, 1e-9))
+    terms = tuple(replace(term, scale=triple(np.multiply(term.scale, factor))) for term in editable.terms)
+    return replace(editable, terms=terms)
+
+
+def relative_mse(image: Floats, reference: Floats, shown: Flags) -> float:
+    """Mean of (a - b)^2 / (b^2 + a hundredth of the squared mean) over the pixels that are shown."""
+    a, b = image[shown], reference[shown]
+    return float(np.mean((a - b) ** 2 / (b**2 + 0.01 * b.mean() ** 2)))
+
+
+def interior(store: Store, camera: Camera, size: tuple[int, int]) -> Flags:
+    """(H, W) pixels that show a surface, and whose neighbours show the same object."""
+    pixel, number = (
+        store.read(view_artefact_name(camera, *size, "view_points", part)).astype(np.int64)
+        for part in ("pixel", "object")
+    )
+    shown = np.full(size[0] * size[1], -1)
+    shown[pixel] = number
+    padded = np.pad(shown.reshape(size[::-1]), 1, mode="edge")
+    around = [np.roll(padded, (i, j), (0, 1))[1:-1, 1:-1] for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    return np.asarray((np.ptp(around, axis=0) == 0) & (around[4] >= 0))
