@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.artefacts.interreflection import SMOOTH_ANGLES
 from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.series import SMOOTH_ANGLES
 from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError

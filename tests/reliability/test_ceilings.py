@@ -142,6 +142,7 @@ OWN_FILES = {
     "materials/shader_layout.py: files('lambent.materials').joinpath('lobes.wgsl').read_text": "the package's shader",
     "realtime/incident/__init__.py: Path(look_up.__file__).with_suffix('.wgsl').read_text": "the package's shader",
     "realtime/shader_source.py: path.read_text": "the package's shader",
+    "viewer/modes/edit/baking.py: words.read_text": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: np.load": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: words.read_text": "what its own worker wrote",
 }
