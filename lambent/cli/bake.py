@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +18,7 @@ from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
+    from lambent.bake.workers import Workers
     from lambent.scenes.scene import Scene
 
     Kind = str
@@ -55,6 +57,10 @@ def command(
     fixed: Annotated[
         list[str] | None, typer.Option(help="Of interreflections: a material that is not edited. Repeatable.")
     ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
+    ] = None,
+    cluster: Annotated[str | None, typer.Option(help="Of interreflections: address of a Dask scheduler.")] = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
@@ -73,16 +79,27 @@ def command(
     for name in fixed or ():
         known("material", name, what.materials, field="--fixed")
     bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()))
-    with progress_bar() as progress:
+    with progress_bar() as progress, _workers(workers, cluster) as shared:
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
-            light_map=light_map, probes=probes, bounces=bounces, **edited,
+            light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     seconds = store.documents.get("timings", {})
     facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings}
     rows = [(name, f"{value:.1f} s") for name, value in seconds.items()]
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
+
+
+def _workers(count: int | None, address: str | None) -> AbstractContextManager[Workers | None]:
+    """Who does the work of interreflections; None: this process."""
+    if count is None and address is None:
+        return nullcontext()
+    from lambent.bake.cluster import opened
+
+    if count is not None and address is not None:
+        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
+    return opened(count, address)
 
 
 def _edited(scene: Scene, store: Path, names: list[str], session: Path | None) -> dict[str, Any]:
