@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.wavelets import TAPS
-from lambent.editing.products import Halves, half_of_float
+from lambent.editing.products import Halves, half_of_float, unit_of
 
 TOGETHER = 32  # points whose rows stay in the second-level cache
 
@@ -63,14 +60,6 @@ def folded(
     return out.view(np.float16), scale
 
 
-@intrinsic
-def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
-    def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
-        return builder.bitcast(args[0], ir.FloatType())
-
-    return types.float32(types.uint32), generate
-
-
 @numba.njit(parallel=True, fastmath=True, cache=True)
 def _fold(out, spans, steps, values, idle, places, taps):  # type: ignore[no-untyped-def]
     """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
@@ -94,14 +83,14 @@ def _fold(out, spans, steps, values, idle, places, taps):  # type: ignore[no-unt
                     red, green, blue = np.float32(0), np.float32(0), np.float32(0)
                     last = j
                 bits = values[n]
-                unit = _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg,var-annotated]
+                unit = unit_of(bits)
                 red += idle[k, 0] * unit * np.float32(bits & 511)
                 green += idle[k, 1] * unit * np.float32(bits >> 9 & 511)
                 blue += idle[k, 2] * unit * np.float32(bits >> 18 & 511)
             row[last, 0] += red
             row[last, 1] += green
             row[last, 2] += blue
-            _to_wavelets(row, before, taps)
+            to_wavelets(row, before, taps)
         for j in range(bands):
             for c in range(3):
                 for i in range(count):
@@ -109,7 +98,7 @@ def _fold(out, spans, steps, values, idle, places, taps):  # type: ignore[no-unt
 
 
 @numba.njit(fastmath=True, cache=True)
-def _to_wavelets(row, before, taps):  # type: ignore[no-untyped-def]
+def to_wavelets(row, before, taps):  # type: ignore[no-untyped-def]
     """`core.wavelets.transformed` of one row (J, 4), in place."""
     a, b, c, d = taps
     size = len(row)

@@ -46,6 +46,20 @@ def half_of_float(_typing, value):  # type: ignore[no-untyped-def]
     return types.uint16(types.float32), generate
 
 
+@intrinsic
+def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
+    def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
+        return builder.bitcast(args[0], ir.FloatType())
+
+    return types.float32(types.uint32), generate
+
+
+@numba.njit(cache=True)
+def unit_of(bits):  # type: ignore[no-untyped-def]
+    """What a mantissa of 1 stands for in a colour of `core.shared_exponent`."""
+    return _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
+
+
 @numba.njit(parallel=True, fastmath=True, cache=True)
 def _add(picture, transport, rows, weights, begin, end):  # type: ignore[no-untyped-def]
     channels = len(picture)

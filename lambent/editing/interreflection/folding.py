@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.wavelets import TAPS
-from lambent.editing.folding import TOGETHER, _to_wavelets
+from lambent.editing.folding import TOGETHER, to_wavelets
 from lambent.editing.interreflection.stored import TermLight
-from lambent.editing.products import Halves, Pixels, half_of_float
+from lambent.editing.products import Halves, Pixels, half_of_float, unit_of
 from lambent.editing.rows import LARGEST
 
 
@@ -64,14 +61,6 @@ def _tables(
     )  # fmt: skip
 
 
-@intrinsic
-def _float_of_bits(_typing, bits):  # type: ignore[no-untyped-def]
-    def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
-        return builder.bitcast(args[0], ir.FloatType())
-
-    return types.float32(types.uint32), generate
-
-
 @numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _pixels(out, ends, codes, values, units, band, tail, power):  # type: ignore[no-untyped-def]
     bands = np.uint32(len(band))
@@ -79,7 +68,7 @@ def _pixels(out, ends, codes, values, units, band, tail, power):  # type: ignore
         for n in range(ends[p], ends[p + 1]):
             z, j = codes[n] // bands, codes[n] % bands
             bits = values[n]
-            unit = units[p] * _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
+            unit = units[p] * unit_of(bits)
             q = power[z]
             out[q, 0, p] += unit * np.float32(bits & 511) * band[j, 0] * tail[z, 0]
             out[q, 1, p] += unit * np.float32(bits >> 9 & 511) * band[j, 1] * tail[z, 1]
@@ -100,13 +89,13 @@ def _rows(out, ends, codes, values, units, band, tail, power, row, taps):  # typ
             for n in range(ends[p], ends[p + 1]):
                 z, j = codes[n] // bands, codes[n] % bands
                 bits = values[n]
-                unit = units[p] * _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
+                unit = units[p] * unit_of(bits)
                 at = sums[i, power[z], row[j]]
                 at[0] += unit * np.float32(bits & 511) * band[j, 0] * tail[z, 0]
                 at[1] += unit * np.float32(bits >> 9 & 511) * band[j, 1] * tail[z, 1]
                 at[2] += unit * np.float32(bits >> 18 & 511) * band[j, 2] * tail[z, 2]
             for q in range(powers):
-                _to_wavelets(sums[i, q], before, taps)
+                to_wavelets(sums[i, q], before, taps)
         for q in range(powers):
             for j in range(count):
                 for c in range(3):
