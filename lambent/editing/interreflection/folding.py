@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.wavelets import TAPS
-from lambent.editing.folding import TOGETHER, to_wavelets
+from lambent.editing.folding import TOGETHER, write_wavelets
 from lambent.editing.interreflection.stored import TermLight
-from lambent.editing.products import Halves, Pixels, half_of_float, unit_of
+from lambent.editing.products import Halves, Pixels, unit_of
 from lambent.editing.rows import LARGEST
 
 
@@ -81,23 +81,17 @@ def _rows(out, ends, codes, values, units, band, tail, power, row, taps):  # typ
     bands = np.uint32(len(band))
     for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
         first = block * TOGETHER
-        some = min(TOGETHER, points - first)
-        sums = np.zeros((TOGETHER, powers, count, 4), np.float32)
-        before = np.empty((count, 4), np.float32)
-        for i in range(some):
+        sums = np.zeros((powers, count, TOGETHER, 4), np.float32)
+        before = np.empty((count, TOGETHER, 4), np.float32)
+        for i in range(min(TOGETHER, points - first)):
             p = first + i
             for n in range(ends[p], ends[p + 1]):
                 z, j = codes[n] // bands, codes[n] % bands
                 bits = values[n]
                 unit = units[p] * unit_of(bits)
-                at = sums[i, power[z], row[j]]
+                at = sums[power[z], row[j], i]
                 at[0] += unit * np.float32(bits & 511) * band[j, 0] * tail[z, 0]
                 at[1] += unit * np.float32(bits >> 9 & 511) * band[j, 1] * tail[z, 1]
                 at[2] += unit * np.float32(bits >> 18 & 511) * band[j, 2] * tail[z, 2]
-            for q in range(powers):
-                to_wavelets(sums[i, q], before, taps)
         for q in range(powers):
-            for j in range(count):
-                for c in range(3):
-                    for i in range(some):
-                        out[q, j, c, first + i] = half_of_float(sums[i, q, j, c])  # type: ignore[call-arg]
+            write_wavelets(out[q], first, sums[q], before, taps)
