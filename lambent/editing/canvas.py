@@ -94,7 +94,7 @@ def viewed(texture: Pixels, theta_o: NDArray[np.float32], viewer: Curve) -> Pixe
     return np.asarray(_times_curve(texture, theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(parallel=True, cache=True, nogil=True)
 def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
     out = np.empty_like(texture)
     last = len(values) - 2
@@ -106,7 +106,7 @@ def _times_curve(texture, step, values):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _compose(image, pixel, picture, scale, multiplier):  # type: ignore[no-untyped-def]
     step = 0 if multiplier.shape[1] == 1 else 1
     for p in numba.prange(len(pixel)):

@@ -7,6 +7,8 @@ The result is transport of one curve, in the wavelets that `IncrementalPicture` 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 import numpy as np
 from llvmlite import ir
@@ -78,7 +80,7 @@ def _add_light(_typing, sums, at, means, of, bits):  # type: ignore[no-untyped-d
         return ir.Constant(whole, list(numbers if len(numbers) == channels else numbers * channels))
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        def place(k):  # type: ignore[no-untyped-def]
+        def place(k: int) -> Any:
             data = context.make_array(signature.args[k])(context, builder, args[k]).data
             return builder.bitcast(builder.gep(data, [args[k + 1]]), real.as_pointer())
 
@@ -98,7 +100,7 @@ def _add_light(_typing, sums, at, means, of, bits):  # type: ignore[no-untyped-d
     return types.void(sums, types.intp, means, types.intp, types.uint32), generate
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-untyped-def]
     """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
     bands, _, points = out.shape
@@ -118,7 +120,7 @@ def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-un
 
 @numba.njit(fastmath=True, cache=True)
 def write_wavelets(out, first, rows, before, taps):  # type: ignore[no-untyped-def]
-    """out[:, :, first:] (J, 3, P) = halves of `core.wavelets.transformed` of rows (J, TOGETHER, 4), which it changes."""
+    """out[:, :, first:] (J, 3, P) = halves of `core.wavelets.transformed` of rows (J, TOGETHER, 4), which change."""
     bands, _, points = out.shape
     a, b, c, d = taps
     size = bands

@@ -60,7 +60,7 @@ def unit_of(bits):  # type: ignore[no-untyped-def]
     return _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _add(picture, transport, rows, weights, begin, end):  # type: ignore[no-untyped-def]
     channels = len(picture)
     blocks = (end - begin + BLOCK - 1) // BLOCK

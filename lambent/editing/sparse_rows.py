@@ -58,7 +58,7 @@ class SparseRows:
             )  # fmt: skip
 
 
-@numba.njit(parallel=True, cache=True)
+@numba.njit(parallel=True, cache=True, nogil=True)
 def _add(picture, spans, points, values, block, rows, weights, begin, end):  # type: ignore[no-untyped-def]
     first_block, last_block = begin // block, (end - 1) // block
     for b in numba.prange(first_block, last_block + 1):

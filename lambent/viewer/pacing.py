@@ -8,6 +8,7 @@ to the picture, up to a stated count; then nothing is drawn any more.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 REST_S = 0.25
@@ -31,6 +32,19 @@ class Plan:
 
 
 WHOLE = Plan(1.0, None)
+
+
+class Beat:
+    """When frames begin: `period_s` apart. One that begins late shortens the wait for the next, by half at most."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s, self._due_s = period_s, -math.inf
+
+    def wait_s(self, now_s: float) -> float:
+        """Seconds from a frame that begins now to the next one."""
+        due_s = max(self._due_s, now_s - self._period_s / 2) + self._period_s
+        self._due_s = min(due_s, now_s + self._period_s)
+        return self._due_s - now_s
 
 
 class Resolution:

@@ -13,10 +13,11 @@ import glfw
 import numpy as np
 import wgpu
 from rendercanvas.glfw import RenderCanvas, loop
-from wgpu.utils.imgui import ImguiRenderer
 
 from lambent.viewer import layout
+from lambent.viewer.interface import renderer
 from lambent.viewer.mode import Image, Mode
+from lambent.viewer.pacing import Beat
 from lambent.viewer.screen import least
 
 MAX_FPS = 60
@@ -36,7 +37,7 @@ class Window:
         # Not an sRGB format: Dear ImGui's colours are meant to be blended as they are, and the picture comes encoded.
         surface = context.get_preferred_format(self._device.adapter).removesuffix("-srgb")
         context.configure(device=self._device, format=surface)
-        self._imgui = ImguiRenderer(self._device, self.canvas)
+        self._imgui = renderer(self._device, self.canvas)
         self._imgui.set_gui(self._interface)
         layout.set_style()
         self._context = context
@@ -45,6 +46,7 @@ class Window:
         self._popup_open = False
         self._extra_frames = 0
         self._drawn_s = self.screen.clock()
+        self._beat = Beat(1 / MAX_FPS)
         self._moving = False  # between this frame and the next
         self._wake_at_s: float | None = None
         self._working = False  # between two parts of a frame at rest
@@ -80,6 +82,8 @@ class Window:
 
     def _draw(self) -> None:
         with self._watched():
+            # The canvas sleeps from one frame's begin, and wakes late: counted from there, lateness would add up.
+            self.canvas.set_update_mode("ondemand", max_fps=1 / self._beat.wait_s(self.screen.clock()))
             self._advance()
             self._show()
             self._schedule()

@@ -72,7 +72,7 @@ class EditDrawing(Drawing):
     def update(self, place: Rect, pixel_ratio: float) -> None:
         """Upload what is new of the last frame."""
         self._ratio = pixel_ratio
-        frame = self._state.painter.frame
+        frame = self._state.painter.take()
         if frame is None or frame is self._frame:
             return
         self._frame = frame

@@ -25,7 +25,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.viewer.modes.edit.tone import Bytes, displayed
 
 FADE_S = 0.5
-FRAME_S = 1 / 60
+FRAME_S = 0.05  # a frame that nobody takes is followed by the next one after so long
 Materials = Mapping[str, Editable]
 
 
@@ -62,12 +62,14 @@ class Frame:
 class Painter:
     """Draws frames of the size (height, width) until it is closed. `frame` is the last one; errors are in `error`.
 
-    Only this thread touches the picture. `run` has it do something between two frames.
+    Only this thread touches the picture. `run` has it do something between two frames. The next frame is drawn as soon
+    as the last one was taken, or something else is wanted: frames that a slower window never shows take no time.
     """
 
     def __init__(self, size: tuple[int, int], clock: Callable[[], float] = time.monotonic) -> None:
         self.frame: Frame | None = None
         self.error: Exception | None = None
+        self._taken: Frame | None = None
         self._clock = clock
         self._picture = WholePicture(EditedPicture(np.zeros((*size, 3), np.float32), {}))
         self._parts: dict[str, list[Part]] = {}  # the one in the picture first, then those that served before
@@ -85,6 +87,14 @@ class Painter:
         with self._changed:
             self._wish = wish
             self._changed.notify()
+
+    def take(self) -> Frame | None:
+        """The last frame, to be shown."""
+        with self._changed:
+            if self._taken is not self.frame:
+                self._taken = self.frame
+                self._changed.notify()
+            return self._taken
 
     def run(self, task: Callable[[], None]) -> None:
         """Do something in the thread of the picture, before the next frame."""
@@ -156,9 +166,9 @@ class Painter:
             task()
         self._draw(wish, began_s)
         with self._changed:
-            rest_s = FRAME_S - (self._clock() - began_s)
-            if rest_s > 0 and wish is self._wish and not self._tasks and not self._closed:
-                self._changed.wait(rest_s)
+            self._changed.wait_for(
+                lambda: self._taken is self.frame or wish is not self._wish or self._tasks or self._closed, FRAME_S
+            )
         return True
 
     def _draw(self, wish: Wish, began_s: float) -> None:

@@ -12,6 +12,7 @@ from lambent.core.colour import HALF_MAX, luminance, neutral, shown
 from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE
+from lambent.editing.half_table import looked_up
 from lambent.realtime.frame_state import FALSE_COLOUR
 
 Bytes = NDArray[np.uint8]
@@ -24,13 +25,13 @@ def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> B
 
     False colours, on `scale`, are of the luminance without exposure.
     """
+    if view in BY_CHANNEL:
+        return looked_up(radiance, _table(view, exposure_ev))
     out = np.empty((*radiance.shape[:2], 4), np.uint8)
     out[..., 3] = 255
     if view == FALSE_COLOUR:
         number = _half_bits(luminance(radiance))
         out[..., :3] = _false_colours(scale)[number]
-    elif view in BY_CHANNEL:
-        out[..., :3] = _table(view, exposure_ev)[_half_bits(radiance)]
     else:
         assert view == "neutral", view
         for top in range(0, len(out), ROWS):
