@@ -65,15 +65,18 @@ class SentCanvas(HostCanvas):
         self._device.queue.write_texture({"texture": self.texture}, self._texels, rows, (width, height, 1))
 
 
+def sums(device: Any) -> bool:
+    """Whether a device sums faster than the processor's cores: a real GPU does."""
+    return not adapter_info(device).is_software
+
+
 def backend(device: Any) -> Backend:
     """What makes the canvas of a picture that a device shows.
 
     A real GPU sums. A software adapter runs the same shaders on the same cores as numba, and takes longer
     (docs/editing.md), so that numba sums there.
     """
-    if adapter_info(device).is_software:
-        return partial(SentCanvas, device)
-    return partial(ShadedCanvas, device)
+    return partial(ShadedCanvas if sums(device) else SentCanvas, device)
 
 
 def on_device(device: Any, make: Callable[[Backend], EditedPicture], say: Callable[[str], None]) -> EditedPicture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -46,9 +47,10 @@ class _Dispatch:
 
 
 class Commands:
-    """What one canvas asks of its device."""
+    """What one canvas asks of its device. Threads may record and submit at the same time."""
 
     def __init__(self, device: Any) -> None:
+        self._lock = threading.RLock()
         self.device, self._layouts = device, Layouts(device)
         self.timer = PassTimer(device)
         self._recorded: list[_Dispatch | Callable[[Any], None]] = []
@@ -105,18 +107,24 @@ class Commands:
     def dispatch(self, shader: str, parameters: bytes, work: list[tuple[Any, int, int]]) -> None:
         """Record a shader over bind groups, each with its number of workgroups in x and y."""
         assert len(parameters) <= REACH
-        if len(self._bytes) + len(parameters) > ROOM:
-            self.submit()
-        offset = len(self._bytes)
-        self._bytes += parameters.ljust(len(parameters) + -len(parameters) % ALIGNED, b"\0")
-        self._recorded += [_Dispatch(shader, offset, group, (x, y)) for group, x, y in work if x > 0]
+        with self._lock:
+            if len(self._bytes) + len(parameters) > ROOM:
+                self.submit()
+            offset = len(self._bytes)
+            self._bytes += parameters.ljust(len(parameters) + -len(parameters) % ALIGNED, b"\0")
+            self._recorded += [_Dispatch(shader, offset, group, (x, y)) for group, x, y in work if x > 0]
 
     def copy(self, encode: Callable[[Any], None]) -> None:
         """Record a copy between buffers and textures: `encode` gets the command encoder."""
-        self._recorded.append(encode)
+        with self._lock:
+            self._recorded.append(encode)
 
     def submit(self) -> None:
         """Send all that was recorded."""
+        with self._lock:
+            self._submit()
+
+    def _submit(self) -> None:
         if not self._recorded:
             return
         if self._bytes:

@@ -24,8 +24,10 @@ def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
     from lambent.realtime.device import open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.mode import EditMode
+    from lambent.viewer.modes.edit.shown import backend_of
     from lambent.viewer.modes.edit.state import EditState
     from lambent.viewer.modes.edit.subject import opened
 
-    state = EditState(opened(path, screen.folder, **options), screen)
-    return EditMode(state, EditDrawing(open_device(), state))
+    subject, device = opened(path, screen.folder, **options), open_device()
+    state = EditState(subject, screen, backend=backend_of(device))
+    return EditMode(state, EditDrawing(device, state))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import wgpu
 
 from lambent.core.errors import UserError
@@ -17,6 +16,7 @@ from lambent.realtime.device import adapter_info
 from lambent.viewer.edits import unused
 from lambent.viewer.mode import Divider, Drawing, Image
 from lambent.viewer.modes.edit.painter import Frame
+from lambent.viewer.modes.edit.shown import Shown
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.tone import Bytes
 from lambent.viewer.screen import Rect, Statistics
@@ -35,7 +35,7 @@ class EditDrawing(Drawing):
         self._pair = [texture.create_view() for texture in self._textures]
         # Another view of B: Dear ImGui's backend forgets a view a frame after it had another name.
         self._alone = [self._textures[1].create_view()]
-        self._uploaded: list[Bytes | None] = [None, None]
+        self._put: list[Shown | None] = [None, None]
         self._outline: tuple[object, Image] | None = None
         self._frame: Frame | None = None
         self._adapter = adapter_info(device).name if device is not None else ""
@@ -77,13 +77,11 @@ class EditDrawing(Drawing):
             return
         self._frame = frame
         for k, shown in enumerate((frame.compared, frame.shown)):
-            if shown is not None and shown is not self._uploaded[k]:
-                self._upload(self._textures[k], shown)
-                self._uploaded[k] = shown
-        height, width = frame.shown.shape[:2]
-        self._state.screen.statistics = Statistics(
-            self._adapter, frame_ms=1e3 * frame.seconds, resolution=(width, height)
-        )
+            if shown is not None and shown is not self._put[k]:
+                shown.put(self._textures[k])
+                self._put[k] = shown
+        size = self._state.session.document.size
+        self._state.screen.statistics = Statistics(self._adapter, frame_ms=1e3 * frame.seconds, resolution=size)
 
     def save(self) -> None:
         """Write the picture, PNG as shown and EXR as radiance; the picture A beside it where two are compared."""
@@ -92,13 +90,11 @@ class EditDrawing(Drawing):
             screen.say("picture not saved: there is none yet")
             return
         stem = unused(screen.folder, plain_name(self._state.subject.name, "scene"), ".png", ".exr", "-A.png", "-A.exr")
-        pictures = [("", frame.shown, frame.radiance)]
-        if frame.compared is not None and frame.compared_radiance is not None:
-            pictures.append(("-A", frame.compared, frame.compared_radiance))
+        pictures = [("", frame.shown)] + ([("-A", frame.compared)] if frame.compared is not None else [])
         try:
-            for ending, shown, radiance in pictures:
-                write_image(screen.folder / f"{stem}{ending}.exr", radiance)
-                write_shown(screen.folder / f"{stem}{ending}.png", self._with_scale(shown[..., :3]))
+            for ending, shown in pictures:
+                write_image(screen.folder / f"{stem}{ending}.exr", shown.radiance)
+                write_shown(screen.folder / f"{stem}{ending}.png", self._with_scale(shown.bytes[..., :3]))
         except (UserError, OSError) as error:
             screen.say(f"picture not saved: {error}")
         else:
@@ -115,8 +111,3 @@ class EditDrawing(Drawing):
     def _texture(self, width: int, height: int) -> Any:
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
         return self.device.create_texture(size=(width, height, 1), format=FORMAT, usage=usage)
-
-    def _upload(self, texture: Any, shown: Bytes) -> None:
-        height, width = shown.shape[:2]
-        rows = {"bytes_per_row": 4 * width, "rows_per_image": height}
-        self.device.queue.write_texture({"texture": texture}, np.ascontiguousarray(shown), rows, (width, height, 1))

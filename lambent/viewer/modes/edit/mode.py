@@ -107,7 +107,7 @@ class EditMode(Mode):
     def _lines(self) -> list[str]:
         """Work in the background, and its errors."""
         state = self.state
-        lines = [state.trouble] if state.trouble else []
+        lines = [line for line in (state.trouble, state.painter.notice) if line]
         if state.baking is not None:
             lines.append(state.baking.line)
         elif state.loading.busy:

@@ -22,7 +22,8 @@ from lambent.editing.interreflection.whole import ALL_HITS, WholePicture
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
-from lambent.viewer.modes.edit.tone import Bytes, displayed
+from lambent.realtime.edited.commands import OutOfGpuMemory
+from lambent.viewer.modes.edit.shown import Backend, Fading, OnHost, Shown, faded
 
 FADE_S = 0.5
 FRAME_S = 0.05  # a frame that nobody takes is followed by the next one after so long
@@ -43,35 +44,48 @@ class Wish:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame: bytes (H, W, 4) of B and A, radiance (H, W, 3) of both, and the wish that it shows.
+    """A frame: the pictures B and A, and the wish that it shows.
 
     `needed` are materials whose transport does not serve the wish; they are shown as they were.
     """
 
     number: int
     wish: Wish
-    shown: Bytes
-    radiance: Image
-    compared: Bytes | None = None
-    compared_radiance: Image | None = None
+    shown: Shown
+    compared: Shown | None = None
     needed: frozenset[str] = frozenset()
     settled: bool = False
     seconds: float = 0.0
 
+    @property
+    def radiance(self) -> Image:
+        """(H, W, 3) of B."""
+        return self.shown.radiance
+
+    @property
+    def compared_radiance(self) -> Image | None:
+        return self.compared.radiance if self.compared is not None else None
+
 
 class Painter:
-    """Draws frames of the size (height, width) until it is closed. `frame` is the last one; errors are in `error`.
+    """Draws frames of the size (height, width) until it is closed. `frame` is the last one; errors are in `error`, and
+    `notice` is a line about what the user should know.
 
     Only this thread touches the picture. `run` has it do something between two frames. The next frame is drawn as soon
     as the last one was taken, or something else is wanted: frames that a slower window never shows take no time.
     """
 
-    def __init__(self, size: tuple[int, int], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, size: tuple[int, int], clock: Callable[[], float] = time.monotonic, backend: Backend | None = None
+    ) -> None:
         self.frame: Frame | None = None
         self.error: Exception | None = None
+        self.notice = ""
         self._taken: Frame | None = None
         self._clock = clock
-        self._picture = WholePicture(EditedPicture(np.zeros((*size, 3), np.float32), {}))
+        self._backend = backend if backend is not None else OnHost()
+        self._light: Interreflections | None = None
+        self._picture = self._anew(np.zeros((*size, 3), np.float32))
         self._parts: dict[str, list[Part]] = {}  # the one in the picture first, then those that served before
         self._given: dict[str, Editable] = {}  # what the picture was told last
         self._fade: Image | None = None
@@ -122,8 +136,8 @@ class Painter:
         """Begin anew with what is seen without reflection: under another light, parts from before are of no use."""
         before = self._image()
         self._picture.close()
-        self._picture, self._parts, self._given = WholePicture(EditedPicture(backdrop, {})), {}, {}
-        self._compared = None
+        self._parts, self._given, self._light, self._compared = {}, {}, None, None
+        self._picture = self._anew(backdrop)
         if before.any():
             self._fade_over(before)
 
@@ -138,6 +152,7 @@ class Painter:
 
     def give(self, light: Interreflections) -> None:
         """Add interreflections, or replace them by less noisy ones."""
+        self._light = light
         self._picture.give(light, {name: self._given.get(name, part.start) for name, part in light.parts.items()})
         self._compared = None
 
@@ -162,9 +177,14 @@ class Painter:
                 return False
             wish, task = self._wish, self._tasks.popleft() if self._tasks else None
         began_s = self._clock()
-        if task is not None:
-            task()
-        self._draw(wish, began_s)
+        try:
+            if task is not None:
+                task()
+            self._draw(wish, began_s)
+        except OutOfGpuMemory as error:
+            self.notice = f"{error.message}: the processor's cores draw the picture"
+            self._go_on_without_gpu(wish)
+            self._draw(wish, began_s)
         with self._changed:
             self._changed.wait_for(
                 lambda: self._taken is self.frame or wish is not self._wish or self._tasks or self._closed, FRAME_S
@@ -176,15 +196,15 @@ class Painter:
         self._picture.see(wish.surfaces)
         if self._picture.step() and self.frame is not None:
             self._fade_over(self.frame.radiance)
-        radiance = self._image()
-        compared = self._image_of(wish.compared, wish.now) if wish.compared is not None else None
+        look = wish.view, wish.exposure_ev, wish.scale
+        compared = None
+        if wish.compared is not None:
+            compared = self._backend.still(self._image_of(wish.compared, wish.now), look)
+        self._picture.compose()
+        shown = self._backend.show(self._picture.direct.canvas, look, self._fading())
         settled = self._picture.is_settled and self._fade is None and not self._tasks
-        how = wish.view, wish.exposure_ev, wish.scale
-        self.frame = Frame(
-            self.frame.number + 1 if self.frame else 1, wish, displayed(radiance, *how), radiance,
-            displayed(compared, *how) if compared is not None else None, compared, needed, settled,
-            self._clock() - began_s,
-        )  # fmt: skip
+        number, seconds = self.frame.number + 1 if self.frame else 1, self._clock() - began_s
+        self.frame = Frame(number, wish, shown, compared, needed, settled, seconds)
 
     def _show(self, name: str, made: Editable) -> bool:
         """Let the picture go to a material; False where it has no transport for that."""
@@ -223,15 +243,28 @@ class Painter:
 
     def _image(self) -> Image:
         """The picture now, with the rest of what fades."""
-        image = self._picture.image()
-        if self._fade is None:
-            return image
+        return faded(self._picture.image(), self._fading())
+
+    def _fading(self) -> Fading | None:
         left = 1 - (self._clock() - self._fade_from_s) / FADE_S
-        if left <= 0:
+        if self._fade is None or left <= 0:
             self._fade = None
-            return image
-        smooth = np.float32(left * left * (3 - 2 * left))
-        return np.maximum(image + smooth * self._fade, 0)
+            return None
+        return self._fade, left * left * (3 - 2 * left)
+
+    def _anew(self, backdrop: Image) -> WholePicture:
+        self._backdrop = backdrop
+        return WholePicture(EditedPicture(backdrop, {}, self._backend.canvas))
+
+    def _go_on_without_gpu(self, wish: Wish) -> None:
+        """Have the processor's cores draw all that the picture has."""
+        self._picture.close()
+        self._backend, self._given = self._backend.without_gpu(), {}
+        self._picture, self._compared = self._anew(self._backdrop), None
+        for name, (part, *_) in self._parts.items():
+            self._place(name, part, wish.now.get(name))
+        if self._light is not None:
+            self.give(self._light)
 
     def _fade_over(self, before: Image) -> None:
         """Go over from an image to what the picture shows now."""

@@ -19,6 +19,7 @@ from lambent.viewer.modes.edit.files import Files, Tables
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading
 from lambent.viewer.modes.edit.painter import Materials, Painter, Wish, checked
+from lambent.viewer.modes.edit.shown import Backend
 from lambent.viewer.modes.edit.subject import Subject
 from lambent.viewer.screen import Screen
 
@@ -59,6 +60,7 @@ class EditState:
         lights: Sequence[int] = LIGHTS,
         bake: Callable[..., Baking] = Baking,
         tables: Tables | None = None,
+        backend: Backend | None = None,
     ) -> None:
         self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
         self.look = Look(exposure_ev=subject.scene.exposure_ev, shows=("full",))
@@ -67,7 +69,7 @@ class EditState:
         self.pointed: tuple[str, str] | None = None  # object and material under the mouse
         self.selected_s = -1e9  # when the selection was made
         self.trouble = ""
-        self.painter = Painter(self.session.document.size[::-1])
+        self.painter = Painter(self.session.document.size[::-1], backend=backend)
         self.loading = Loading(self.painter, subject.store)
         self.baking: Baking | None = None
         self.files = Files(self.session, screen, subject.name, subject.home, tables or Tables())

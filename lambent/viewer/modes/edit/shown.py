@@ -1,0 +1,161 @@
+"""Pictures as the window shows them: bytes that the processor made, or textures that never leave the GPU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from lambent.core.arrays import Image
+from lambent.core.false_colour import Range
+from lambent.editing.canvas import Canvas, HostCanvas
+from lambent.realtime.edited.display import Display
+from lambent.realtime.targets import DISPLAY_FORMAT, pixels, target_texture
+from lambent.viewer.edited import ShadedCanvas, sums
+from lambent.viewer.modes.edit.tone import Bytes, displayed
+
+Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours
+Fading = tuple[Image, float]  # what is added to a picture, and the share of it that is left
+
+
+class Shown(Protocol):
+    """A picture (H, W) of a frame."""
+
+    @property
+    def radiance(self) -> Image:
+        """(H, W, 3) float32."""
+
+    @property
+    def bytes(self) -> Bytes:
+        """(H, W, 4), encoded."""
+
+    def put(self, texture: Any) -> None:
+        """Bring it into a texture of the window."""
+
+
+class Backend(Protocol):
+    """Where pictures are summed and made visible."""
+
+    def canvas(self, background: Image) -> Canvas:
+        """What a picture is drawn on."""
+
+    def show(self, canvas: Any, look: Look, fading: Fading | None) -> Shown:
+        """The picture of a canvas that `canvas` made, as last composed."""
+
+    def still(self, image: Image, look: Look) -> Shown:
+        """A picture that stays: linear radiance."""
+
+    def without_gpu(self) -> Backend:
+        """The processor's cores, for the same window."""
+
+
+@dataclass(frozen=True)
+class HostShown:
+    """`Shown` in memory."""
+
+    device: Any
+    radiance: Image
+    bytes: Bytes
+
+    def put(self, texture: Any) -> None:
+        height, width = self.bytes.shape[:2]
+        rows = {"bytes_per_row": 4 * width, "rows_per_image": height}
+        self.device.queue.write_texture({"texture": texture}, self.bytes, rows, (width, height, 1))
+
+
+class OnHost:
+    """`Backend` of the processor's cores; without a device nothing can be put into textures."""
+
+    def __init__(self, device: Any = None) -> None:
+        self._device = device
+        self._still: tuple[Image, Look, HostShown] | None = None
+
+    def canvas(self, background: Image) -> HostCanvas:
+        return HostCanvas(background)
+
+    def show(self, canvas: Any, look: Look, fading: Fading | None) -> HostShown:
+        return self._made(faded(canvas.image(), fading), look)
+
+    def still(self, image: Image, look: Look) -> HostShown:
+        if self._still is None or self._still[0] is not image or self._still[1] != look:
+            self._still = image, look, self._made(image, look)
+        return self._still[2]
+
+    def _made(self, image: Image, look: Look) -> HostShown:
+        return HostShown(self._device, image, displayed(image, *look))
+
+    def without_gpu(self) -> OnHost:
+        return self
+
+
+@dataclass(frozen=True)
+class GpuShown:
+    """`Shown` in textures that the next frame is drawn over; reading them back waits for the GPU."""
+
+    device: Any
+    light: Any
+    texture: Any
+    fading: Fading | None = None
+
+    @cached_property
+    def radiance(self) -> Image:
+        return faded(np.array(pixels(self.device, self.light)), self.fading)
+
+    @cached_property
+    def bytes(self) -> Bytes:
+        return np.pad(pixels(self.device, self.texture), ((0, 0), (0, 0), (0, 1)), constant_values=255)
+
+    def put(self, texture: Any) -> None:
+        encoder = self.device.create_command_encoder()
+        encoder.copy_texture_to_texture({"texture": self.texture}, {"texture": texture}, self.texture.size)
+        self.device.queue.submit([encoder.finish()])
+
+
+class OnGpu:
+    """`Backend` of compute shaders: a frame is a few submissions, and no picture crosses to the processor or back."""
+
+    def __init__(self, device: Any) -> None:
+        self._device, self._display = device, Display(device)
+        self._targets: dict[tuple[str, int, int], Any] = {}
+        self._sent: dict[str, tuple[Image, Any]] = {}  # images that stay, with their textures
+
+    def canvas(self, background: Image) -> ShadedCanvas:
+        return ShadedCanvas(self._device, background)
+
+    def show(self, canvas: Any, look: Look, fading: Fading | None) -> GpuShown:
+        target = self._target("canvas", canvas.texture)
+        more = (self._texture("fading", fading[0]), fading[1]) if fading is not None else ()
+        self._display.draw(canvas.texture, target, *look, *more)
+        return GpuShown(self._device, canvas.texture, target, fading)
+
+    def still(self, image: Image, look: Look) -> GpuShown:
+        light = self._texture("still", image)
+        target = self._target("still", light)
+        self._display.draw(light, target, *look)
+        return GpuShown(self._device, light, target)
+
+    def without_gpu(self) -> OnHost:
+        return OnHost(self._device)
+
+    def _target(self, name: str, light: Any) -> Any:
+        key = (name, *light.size[:2])
+        if key not in self._targets:
+            self._targets[key] = target_texture(self._device, light.size, DISPLAY_FORMAT)
+        return self._targets[key]
+
+    def _texture(self, name: str, image: Image) -> Any:
+        if name not in self._sent or self._sent[name][0] is not image:
+            self._sent[name] = image, self._display.texture(image)
+        return self._sent[name][1]
+
+
+def faded(image: Image, fading: Fading | None) -> Image:
+    """An image with what fades."""
+    return image if fading is None else np.maximum(image + np.float32(fading[1]) * fading[0], 0)
+
+
+def backend_of(device: Any) -> Backend:
+    """The faster one: a software adapter runs shaders on the cores that numba has, and takes several times as long."""
+    return OnGpu(device) if sums(device) else OnHost(device)
