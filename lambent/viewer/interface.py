@@ -12,8 +12,8 @@ POWER = "pow(color.rgb, vec3<f32>(uniforms.gamma))"
 def renderer(device: Any, canvas: Any) -> ImguiRenderer:
     """wgpu's renderer without its gamma.
 
-    Its shader takes every pixel of the window to a power. On a surface without sRGB that is the power of 1, and a third
-    of a frame on a software adapter.
+    Its shader takes every pixel of the window to a power. On a surface without sRGB that is the power of 1, and 29 %
+    of what a software adapter does for a frame.
     """
     source = imgui_backend.FRAGMENT_SHADER_SRC
     assert POWER in source, "this version of wgpu has another shader"

@@ -146,13 +146,18 @@ def test_monomials_are_those_of_the_material_alone() -> None:
 
 def whole_picture(light_of: Interreflections) -> WholePicture:
     """Direct light of nothing, and interreflections."""
+    whole = WholePicture(EditedPicture(np.zeros((*SIZE, 3), np.float32), dark_parts(light_of)))
+    whole.give(light_of, START)
+    return whole
+
+
+def dark_parts(light_of: Interreflections) -> dict[str, Part]:
+    """Transport of nothing for the same pixels."""
     parts = {}
     for name, part in light_of.parts.items():
         transport = tuple(_no_light(term, len(part.pixel)) for term in START[name].terms)
         parts[name] = Part(START[name], part.pixel, part.theta_o, transport)
-    whole = WholePicture(EditedPicture(np.zeros((*SIZE, 3), np.float32), parts))
-    whole.give(light_of, START)
-    return whole
+    return parts
 
 
 def _no_light(term: Term, points: int) -> Rows | DensePairs:

@@ -107,7 +107,9 @@ def new_state(screen, folder, backend=None, **materials):
     """The state on a scene whose store is not there yet, and its bakes."""
     session = Session.new("small room", CAMERA, {"tray": TRAY, "wall": WALL, **materials}, size=SIZE)
     bakes = Bakes()
-    return EditState(Subject(session, SCENE, folder, folder / "store", None), screen, LIGHTS, bakes, backend=backend), bakes
+    return EditState(
+        Subject(session, SCENE, folder, folder / "store", None), screen, LIGHTS, bakes, backend=backend
+    ), bakes
 
 
 def until(state, condition):

@@ -1,18 +1,25 @@
 """The window's picture of edits: the same from the processor's cores and from textures of a GPU."""
 
+import time
+from functools import partial
+
 import numpy as np
 import pytest
 import wgpu
 
 from lambent.core.false_colour import Range
 from lambent.editing.operators import Region
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.of_lobes import of_material
 from lambent.realtime.device import AdapterInfo, open_device
 from lambent.realtime.targets import pixels
 from lambent.viewer import edited
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.drawing import EditDrawing
+from lambent.viewer.modes.edit.painter import Painter, Wish, checked
 from lambent.viewer.modes.edit.shown import OnGpu, OnHost, backend_of
 from lambent.viewer.screen import Rect
+from tests.editing.test_frozen_pictures import DIFFUSE, SIZE, START, dark_parts, expected, light
 from tests.viewer.edited_view import LIGHTS, new_state, settled, until
 
 VIEWS = ("filmic", "neutral", "linear", "false-colour")
@@ -99,7 +106,7 @@ def test_more_lights_fade_in_on_the_gpu_too(device, opened, monkeypatch):
         state.painter.run(lambda state=state: state.painter._fade_over(0.5 * state.painter.frame.radiance))
         clock.now_s = state.painter._fade_from_s = 0.0
         number = state.painter.frame.number
-        until(state, lambda: state.painter.frame.number > number + 3)
+        until(state, lambda state=state, number=number: state.painter.frame.number > number + 3)
         assert np.allclose(state.painter.frame.radiance, before / 2, rtol=1e-3)
         shown.append(state.painter.frame.shown.bytes.astype(int))
         clock.now_s = 1.0
@@ -127,8 +134,35 @@ def test_without_room_on_the_gpu_the_cores_go_on_with_all_edits(device, opened, 
     assert isinstance(state.painter._backend, OnHost)
 
 
-@pytest.mark.parametrize(("type", "expected"), [("CPU", OnHost), ("DiscreteGPU", OnGpu), ("IntegratedGPU", OnGpu)])
-def test_a_real_gpu_shows_its_own_textures(device, monkeypatch, type, expected):
-    monkeypatch.setattr(edited, "adapter_info", lambda _: AdapterInfo("it", type, "Vulkan", ""))
-    assert isinstance(backend_of(device), expected)
+@pytest.mark.parametrize("made", [OnHost, OnGpu])
+def test_interreflections_are_the_whole_sum_while_materials_are_edited_in_turn(device, made):
+    """The background makes layers of the canvas while the painter draws on it."""
+    source, painter = light(DIFFUSE), Painter(SIZE, backend=made(device))
+    painter.run(partial(painter.begin, np.zeros((*SIZE, 3), np.float32)))
+    for name, part in dark_parts(source).items():
+        painter.run(partial(painter.put, name, part))
+    painter.run(partial(painter.give, source))
+    now = dict(START)
+    for k in range(12):
+        lobes = (Lobe(mx=0.1 + 0.02 * k, my=0.1 + 0.02 * k, r0=0.5),)
+        kd = (0.1, 0.05 * k, 0.4)
+        now["glossy" if k % 2 else "paper"] = of_material(
+            Material(kd=kd, lobes=lobes) if k % 2 else Material(kd=kd, kt_d=0.2)
+        )
+        painter.want(Wish(dict(now)))
+        time.sleep(0.01)
+    end = time.monotonic() + 60
+    while painter.busy:
+        checked(painter)
+        assert time.monotonic() < end, "it never settles"
+        painter.take()
+        time.sleep(0.001)
+    reference = expected(source, now)
+    assert np.abs(painter.frame.radiance - reference).max() < 2e-3 * reference.max()
+    painter.close()
 
+
+@pytest.mark.parametrize(("type", "wanted"), [("CPU", OnHost), ("DiscreteGPU", OnGpu), ("IntegratedGPU", OnGpu)])
+def test_a_real_gpu_shows_its_own_textures(device, monkeypatch, type, wanted):
+    monkeypatch.setattr(edited, "adapter_info", lambda _: AdapterInfo("it", type, "Vulkan", ""))
+    assert isinstance(backend_of(device), wanted)

@@ -23,7 +23,7 @@ from lambent.store.store import Store
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.painter import FADE_S
 from lambent.viewer.modes.edit.state import OFF, UNEDITED
-from lambent.viewer.modes.edit.tone import displayed
+from lambent.viewer.modes.edit.tone import _half_bits, _table, displayed
 from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, new_state, settled, until
 
 LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
@@ -297,6 +297,31 @@ def test_false_colours_are_of_luminance():
     wanted = to_bytes(false_colour(photometric(light), scale)).astype(int)
     made = displayed(light, "false-colour", 3.0, scale)[..., :3]
     assert np.abs(made - wanted).max() <= 2
+
+
+def test_the_bytes_of_a_drag_are_those_of_the_table():
+    """Every rounding, infinity and what is no number included."""
+    rng = np.random.default_rng(2)
+    light = rng.integers(0, 2**32, (64, 64, 3), dtype=np.uint32).view(np.float32)
+    with np.errstate(invalid="ignore"):
+        made, wanted = displayed(light, "filmic", 0.5, Range()), _table("filmic", 0.5)[_half_bits(light)]
+    assert np.isnan(light).any() and np.array_equal(made[..., :3], wanted) and (made[..., 3] == 255).all()
+
+
+def test_frames_that_nobody_takes_are_not_painted(ready, monkeypatch):
+    """While it changes, the picture is painted once for each frame of the window."""
+    state, _ = ready
+    settled(state)
+    monkeypatch.setattr(painter, "FRAME_S", 60.0)
+    monkeypatch.setattr(painter, "FADE_S", 1e9)
+    state.painter.run(lambda: state.painter._fade_over(0 * state.painter.frame.radiance))
+    first = state.painter.frame.number
+    until(state, lambda: state.painter.frame.number > first)
+    for k in range(1, 5):
+        time.sleep(0.02)
+        assert state.painter.frame.number == first + k
+        assert state.painter.take() is state.painter.take()
+        until(state, lambda k=k: state.painter.frame.number > first + k)
 
 
 def test_an_error_in_the_thread_reaches_the_window(ready):

@@ -2,9 +2,10 @@
 
 import itertools
 
+import numpy as np
 import pytest
 
-from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Pacer, Plan, prior_share
+from lambent.viewer.pacing import BUDGET_S, REST_S, SCALES, Beat, Pacer, Plan, prior_share
 
 
 def pacer(**options):
@@ -172,3 +173,26 @@ def test_an_adapter_that_is_too_slow_is_left_alone():
         scales.append(p.moving.scale)
         p.cost(p.moving, 0.06 + 0.8 * p.moving.scale**2)
     assert set(scales[100:]) <= {0.18, 0.25} and scales[100:].count(0.25) <= 2
+
+
+def test_frames_begin_a_period_apart_however_late_the_canvas_wakes():
+    beat, now_s, begun = Beat(0.016), 100.0, []
+    beat.wait_s(now_s - 0.016)
+    for late_s in (0.0, 0.001, 0.004, 0.002, 0.007, 0.0, 0.001):
+        begun.append(now_s)
+        now_s += beat.wait_s(now_s) + late_s
+    assert now_s == pytest.approx(99.992 + 7 * 0.016 + 0.001), "the first period is a half"
+    assert max(np.diff(begun)) < 0.016 + 0.008
+
+
+def test_a_frame_that_takes_long_is_not_made_up_for():
+    beat = Beat(0.016)
+    beat.wait_s(5.0)
+    assert beat.wait_s(6.0) == pytest.approx(0.008), "half a period at least: the window looks at events in between"
+    assert beat.wait_s(6.008) == pytest.approx(0.016)
+
+
+def test_a_frame_that_an_event_brings_early_delays_none():
+    beat = Beat(0.016)
+    beat.wait_s(5.0)
+    assert beat.wait_s(5.001) == pytest.approx(0.016)
