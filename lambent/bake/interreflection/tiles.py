@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.series import Bins
-from lambent.bake.tiles import seed_of
+from lambent.bake.tiles import seed_of, slices
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
 from lambent.scenes.scene import Scene
 from lambent.store.tails import SecondBands, Tails
@@ -20,7 +22,7 @@ from lambent.store.tails import SecondBands, Tails
 if TYPE_CHECKING:
     from lambent.bake.interreflection.binning import SecondTerm
     from lambent.bake.interreflection.paths import Surfaces
-    from lambent.bake.interreflection.sums import Sums
+    from lambent.bake.interreflection.sums import Sorted, Sums
     from lambent.bake.transport.bands import Bands
     from lambent.bake.transport.view_points import ViewPoints
     from lambent.bake.transport.view_tracer import ViewTracer
@@ -101,24 +103,40 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
+        from lambent.bake.interreflection.sums import Sums
+
+        points, bins = len(job.points), self.bins[job.material]
+        held = [tile.sums(job.before) for tile in job.held] or [Sums.none(points) for _ in bins.bands]
+        adding: list[Future[list[Sums]]] = []
+        with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # while the next paths are traced
+            for some in self._at_once(points, job.samples - job.before):
+                new = self._traced(job, some)
+                wait(adding)  # so that the paths of two blocks are in memory, not more
+                adding.append(adder.submit(self._added, [total.of(some) for total in held], new, bins.bands))
+        blocks = zip(*(block.result() for block in adding), strict=True)
+        return tuple(Tile.of(Sums.joined(term), job.samples) for term in blocks)
+
+    def _at_once(self, points: int, samples: int) -> list[slice]:
+        """Points whose new samples are traced together: a point's sums are written once, however many there are."""
+        most = max(1, (PATHS >> 2 if self._seconds else PATHS) // samples)
+        return slices(points, -(-points // -(-points // most)))
+
+    def _traced(self, job: Job, some: slice) -> list[Sorted]:
+        """All new samples of some of a job's points, by term."""
         from lambent.bake.interreflection.binning import Sorting
         from lambent.bake.interreflection.directions import shares_of
         from lambent.bake.interreflection.paths import trace
-        from lambent.bake.interreflection.sums import Sums
 
-        points, bins = job.points, self.bins[job.material]
-        sums = [tile.sums(job.before) for tile in job.held] or [Sums.none(len(points)) for _ in bins.bands]
-        at_once = max(1, (PATHS >> 2 if self._seconds else PATHS) // len(points))
-        for first in range(job.before, job.samples, at_once):
-            count = min(at_once, job.samples - first)
-            seed = seed_of(self.seed, job.name, first)
-            paths = trace(self._surfaces, points, shares_of(bins.editable), self.tails, count, seed)
-            sorting = Sorting(paths, points, self.tails, self._seconds)
-            found = (sorting.by_term(term, _bands(factors)) for term, factors in bins.terms)
-            new = found if bins.terms else [sorting.whole(bins.editable)]
-            zipped = zip(sums, new, bins.bands, strict=True)
-            sums = [total.and_of(more, bands, len(self.tails)) for total, more, bands in zipped]
-        return tuple(Tile.of(total, job.samples) for total in sums)
+        bins, points, count = self.bins[job.material], job.points.where(some), job.samples - job.before
+        seed = seed_of(self.seed, job.name, job.before, some.start)
+        paths = trace(self._surfaces, points, shares_of(bins.editable), self.tails, count, seed)
+        sorting = Sorting(paths, points, self.tails, self._seconds)
+        if not bins.terms:
+            return [sorting.whole(bins.editable)]
+        return [sorting.by_term(term, _bands(factors)) for term, factors in bins.terms]
+
+    def _added(self, held: list[Sums], new: list[Sorted], bands: list[int]) -> list[Sums]:
+        return [total.and_of(more, n, len(self.tails)) for total, more, n in zip(held, new, bands, strict=True)]
 
     @cached_property
     def _surfaces(self) -> Surfaces:
