@@ -73,10 +73,10 @@ class Sorting:
 
     def _sorted(self, value: Any, band: Any) -> Sorted:
         value = dr.select(self._paths.weight > 0, value * self._paths.weight, 0.0)
-        factor = dr.empty(mi.Float, 4 * dr.width(self._paths.wi))
-        put(factor, value, band, dr.arange(mi.UInt32, dr.width(self._paths.wi)))
+        first = dr.empty(mi.Float, 4 * dr.width(self._paths.wi))
+        put(first, value, band, dr.arange(mi.UInt32, dr.width(self._paths.wi)))
         light = self._paths.light.numpy().reshape(len(self._widths), -1, 4)
-        return Sorted(factor.numpy().reshape(-1, 4), light, self._second, self._widths)
+        return Sorted(first.numpy().reshape(-1, 4), light, self._paths.arrived.numpy(), self._second, self._widths)
 
 
 def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rough: Any = None) -> tuple[Any, Any]:
@@ -112,7 +112,8 @@ def _second_surfaces(paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], 
             way[0] = dr.select(here, value, way[0])
             way[1] = dr.select(here, band + begin, way[1])
         begin += size
-    together, index = dr.empty(mi.Float, 4 * 2 * len(found) * width), dr.arange(mi.UInt32, width)
+    together = dr.empty(mi.Float, 4 * 2 * len(found) * width)
+    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
     for k, (value, band) in enumerate(way for term in found for way in term):
-        put(together, value, band, k * width + index)
+        put(together, value, band, k * stride + index)
     return np.asarray(together.numpy().reshape(len(found), 2, width, 4))

@@ -28,6 +28,8 @@ class Sorted:
         Factor of the light that arrives, and the band.
     light : (entries, n, 4) float32
         What arrives, and its tail without the second surface's bands.
+    arrived : (n,) uint32
+        Bit e is set where entry e has light.
     second : (terms, 2, n, 4) float32
         Factor and band of the second surface's terms, for the light that was sampled there and for where the path went
         on. Without second surfaces that count by bands, there are no terms.
@@ -37,6 +39,7 @@ class Sorted:
 
     first: NDArray[np.float32]
     light: NDArray[np.float32]
+    arrived: NDArray[np.uint32]
     second: NDArray[np.float32]
     widths: NDArray[np.int64]
 
@@ -82,7 +85,7 @@ class Sums:
         codes, light = np.empty(room[-1], np.uint32), np.empty((room[-1], 3), np.float32)
         counts = _add(
             codes, light, room, self.ends, self.codes, self.light, samples.first, _bits(samples.first), samples.light,
-            _bits(samples.light), samples.second, _bits(samples.second), samples.widths, bands, bands * tails,
+            _bits(samples.light), samples.arrived, samples.second, _bits(samples.second), samples.widths, bands, bands * tails,
             max(1, min(TOGETHER, points // SHARES)),
         )  # fmt: skip
         ends = np.concatenate([[0], np.cumsum(counts)])
@@ -95,7 +98,7 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
-    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, factor, second, widths, bands, size, together
+    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands, size, together
 ):
     points = len(ends) - 1
     samples, entries, terms = len(band) // points, len(tail), len(factor)
@@ -114,7 +117,7 @@ def _add(  # type: ignore[no-untyped-def]
                 if first[i, 0] + first[i, 1] + first[i, 2] <= 0:
                     continue
                 for e in range(entries):
-                    if light[e, i, 0] + light[e, i, 1] + light[e, i, 2] <= 0:
+                    if not arrived[i] >> e & 1:
                         continue
                     for t in range(max(terms, 1)):
                         code = tail[e, i]
