@@ -167,7 +167,7 @@ def _follow(  # type: ignore[no-untyped-def]
     scene, sampler, ray, active, light, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
     sheets, slow, materials, material, at_second,
 ):  # fmt: skip
-    """Write the light of all path lengths: entry WAYS (hits - 2) + way of each sample. Returns which arrived, by bits."""
+    """Write the light of all path lengths, entry WAYS (hits - 2) + way of each sample. Returns bits of what arrived."""
     width = dr.width(ray.o)
     index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
     throughput = mi.Color3f(1.0)

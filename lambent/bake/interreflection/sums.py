@@ -5,7 +5,6 @@ Threads take points. Each adds up a point's samples in one dense row, which stay
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numba
@@ -64,19 +63,6 @@ class Sums:
     def none(cls, points: int) -> Sums:
         return cls(np.zeros(points + 1, np.int64), np.zeros(0, np.uint32), np.zeros((0, 3), np.float32))
 
-    @classmethod
-    def joined(cls, parts: Sequence[Sums]) -> Sums:
-        """Of the points of all parts."""
-        counts = np.concatenate([np.diff(part.ends) for part in parts])
-        codes, light = np.concatenate([part.codes for part in parts]), np.concatenate([part.light for part in parts])
-        return cls(np.concatenate([[0], np.cumsum(counts)]), codes, light)
-
-    def of(self, points: slice) -> Sums:
-        """Of some points."""
-        ends = self.ends[points.start : points.stop + 1]
-        some = slice(ends[0], ends[-1])
-        return Sums(ends - ends[0], self.codes[some], self.light[some])
-
     def and_of(self, samples: Sorted, bands: int, tails: int) -> Sums:
         """These sums and those of more samples."""
         points = len(self.ends) - 1
@@ -85,8 +71,8 @@ class Sums:
         codes, light = np.empty(room[-1], np.uint32), np.empty((room[-1], 3), np.float32)
         counts = _add(
             codes, light, room, self.ends, self.codes, self.light, samples.first, _bits(samples.first), samples.light,
-            _bits(samples.light), samples.arrived, samples.second, _bits(samples.second), samples.widths, bands, bands * tails,
-            max(1, min(TOGETHER, points // SHARES)),
+            _bits(samples.light), samples.arrived, samples.second, _bits(samples.second), samples.widths, bands,
+            bands * tails, max(1, min(TOGETHER, points // SHARES)),
         )  # fmt: skip
         ends = np.concatenate([[0], np.cumsum(counts)])
         return Sums(ends, *_closed_up(codes, light, room, ends))
@@ -98,7 +84,23 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
-    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands, size, together
+    codes,
+    sums,
+    room,
+    ends,
+    old_codes,
+    old_sums,
+    first,
+    band,
+    light,
+    tail,
+    arrived,
+    factor,
+    second,
+    widths,
+    bands,
+    size,
+    together,
 ):
     points = len(ends) - 1
     samples, entries, terms = len(band) // points, len(tail), len(factor)
@@ -121,7 +123,11 @@ def _add(  # type: ignore[no-untyped-def]
                         continue
                     for t in range(max(terms, 1)):
                         code = tail[e, i]
-                        r, g, b = first[i, 0] * light[e, i, 0], first[i, 1] * light[e, i, 1], first[i, 2] * light[e, i, 2]
+                        r, g, b = (
+                            first[i, 0] * light[e, i, 0],
+                            first[i, 1] * light[e, i, 1],
+                            first[i, 2] * light[e, i, 2],
+                        )
                         if terms > 0:
                             way = min(e, 1)
                             r, g, b = (

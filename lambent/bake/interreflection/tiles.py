@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cached_property
@@ -48,20 +48,22 @@ class Tile:
     points: int
 
     @classmethod
-    def of(cls, sums: Sums, samples: int) -> Tile:
-        light = sums.light / np.float32(samples)
-        unit = 2.0 ** np.ceil(np.log2(max(float(light.max(initial=0.0)), 1e-30) / (LARGEST / 4)))
-        counts = np.diff(sums.ends).astype(np.uint32)
-        array = np.concatenate([counts, sums.codes, packed_rgb(light / np.float32(unit))])
-        return cls(array, float(unit), len(counts))
+    def of(cls, parts: Sequence[Sums], samples: int) -> Tile:
+        """Of all points, some after others."""
+        largest = max(float(part.light.max(initial=0.0)) for part in parts) / samples
+        unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / (LARGEST / 4)))
+        counts = np.concatenate([np.diff(part.ends).astype(np.uint32) for part in parts])
+        packed = [packed_rgb(part.light / np.float32(samples) / np.float32(unit)) for part in parts]
+        return cls(np.concatenate([counts, *(part.codes for part in parts), *packed]), float(unit), len(counts))
 
-    def sums(self, samples: int) -> Sums:
-        """The sums of its samples."""
+    def sums(self, samples: int, some: slice = slice(None)) -> Sums:
+        """The sums of its samples, at some points."""
         from lambent.bake.interreflection.sums import Sums
 
-        counts, codes, light = unpacked(self.array, self.points)
-        ends = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        return Sums(ends, codes, light * np.float32(self.unit * samples))
+        ends = np.concatenate([[0], np.cumsum(self.array[: self.points], dtype=np.int64)])
+        first, last, _ = some.indices(self.points)
+        codes, packed = (half[ends[first] : ends[last]] for half in np.split(self.array[self.points :], 2))
+        return Sums(ends[first : last + 1] - ends[first], codes, unpacked_rgb(packed) * np.float32(self.unit * samples))
 
 
 def unpacked(
@@ -103,18 +105,13 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
-        from lambent.bake.interreflection.sums import Sums
-
-        points, bins = len(job.points), self.bins[job.material]
-        held = [tile.sums(job.before) for tile in job.held] or [Sums.none(points) for _ in bins.bands]
         adding: list[Future[list[Sums]]] = []
-        with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # while the next paths are traced
-            for some in self._at_once(points, job.samples - job.before):
+        with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # beside the next paths
+            for some in self._at_once(len(job.points), job.samples - job.before):
                 new = self._traced(job, some)
                 wait(adding)  # so that the paths of two blocks are in memory, not more
-                adding.append(adder.submit(self._added, [total.of(some) for total in held], new, bins.bands))
-        blocks = zip(*(block.result() for block in adding), strict=True)
-        return tuple(Tile.of(Sums.joined(term), job.samples) for term in blocks)
+                adding.append(adder.submit(self._added, job, some, new))
+        return tuple(Tile.of(term, job.samples) for term in zip(*(block.result() for block in adding), strict=True))
 
     def _at_once(self, points: int, samples: int) -> list[slice]:
         """Points whose new samples are traced together: a point's sums are written once, however many there are."""
@@ -135,8 +132,14 @@ class TileTracer:
             return [sorting.whole(bins.editable)]
         return [sorting.by_term(term, _bands(factors)) for term, factors in bins.terms]
 
-    def _added(self, held: list[Sums], new: list[Sorted], bands: list[int]) -> list[Sums]:
-        return [total.and_of(more, n, len(self.tails)) for total, more, n in zip(held, new, bands, strict=True)]
+    def _added(self, job: Job, some: slice, new: list[Sorted]) -> list[Sums]:
+        """All samples of some of a job's points, by term."""
+        from lambent.bake.interreflection.sums import Sums
+
+        none = Sums.none(some.stop - some.start)
+        held = [tile.sums(job.before, some) for tile in job.held] or [none] * len(new)
+        zipped = zip(held, new, self.bins[job.material].bands, strict=True)
+        return [sums.and_of(more, bands, len(self.tails)) for sums, more, bands in zipped]
 
     @cached_property
     def _surfaces(self) -> Surfaces:
