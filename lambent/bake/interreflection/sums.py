@@ -84,8 +84,8 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 @numba.njit(parallel=True, cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
-    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands, size,
-    together,
+    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands,
+    size, together,
 ):  # fmt: skip
     points = len(ends) - 1
     samples, entries, terms = len(band) // points, len(tail), len(factor)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -109,7 +109,8 @@ class TileTracer:
         with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # beside the next paths
             for some in self._at_once(len(job.points), job.samples - job.before):
                 new = self._traced(job, some)
-                wait(adding)  # so that the paths of two blocks are in memory, not more
+                if adding:
+                    adding[-1].result()  # so that the paths of two blocks are in memory, not more
                 adding.append(adder.submit(self._added, job, some, new))
         return tuple(Tile.of(term, job.samples) for term in zip(*(block.result() for block in adding), strict=True))
 
