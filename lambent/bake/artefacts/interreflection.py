@@ -30,7 +30,7 @@ OF_VIEWS = True
 ON_REQUEST = True
 REVISION = 1
 POINTS = 1 << 12  # of a tile
-FIRST_PASS = 16  # samples
+FIRST_PASS, LONGEST_PASS = 16, 1 << 16  # samples
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def bake(context: BakeContext) -> None:
             _bring(context, work, view, samples)
         if samples == bounces.samples:
             break
-        samples *= 2
+        samples += min(samples, LONGEST_PASS)
     for view in context.views:
         context.put(KIND, view.name(KIND, "samples"), np.array([samples], np.uint32), view.meta)
 

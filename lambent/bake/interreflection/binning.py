@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.interreflection.evaluation import Curves, quotient_of
-from lambent.bake.interreflection.paths import WAYS, Paths
+from lambent.bake.interreflection.paths import WAYS, Paths, put
 from lambent.bake.interreflection.sums import Sorted
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
@@ -48,7 +48,7 @@ class Sorting:
         numbers = range(2, tails.most_hits + 1)
         self._widths = np.repeat([len(tails.multisets(n)) for n in numbers], WAYS)
         width = dr.width(paths.wi)
-        self._second = np.zeros((0, 2, 3, width), np.float32), np.zeros((0, 2, width), np.uint32)
+        self._second = np.zeros((0, 2, width, 4), np.float32)
         if paths.second is not None:
             self._second = _second_surfaces(paths, tails, seconds, self._ops)
 
@@ -73,12 +73,10 @@ class Sorting:
 
     def _sorted(self, value: Any, band: Any) -> Sorted:
         value = dr.select(self._paths.weight > 0, value * self._paths.weight, 0.0)
-        band = mi.UInt32(band) + dr.zeros(mi.UInt32, dr.width(value))
-        dr.eval(value, band)
-        return Sorted(
-            np.stack([np.array(value[c]) for c in range(3)]), np.array(band), self._paths.light, self._paths.tail,
-            *self._second, self._widths,
-        )  # fmt: skip
+        first = dr.empty(mi.Float, 4 * dr.width(self._paths.wi))
+        put(first, value, band, dr.arange(mi.UInt32, dr.width(self._paths.wi)))
+        light = self._paths.light.numpy().reshape(len(self._widths), -1, 4)
+        return Sorted(first.numpy().reshape(-1, 4), light, self._paths.arrived.numpy(), self._second, self._widths)
 
 
 def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rough: Any = None) -> tuple[Any, Any]:
@@ -97,10 +95,8 @@ def by_bands(term: Term, bands: Sequence[Bands], wi: Any, wo: Any, ops: Any, rou
     return dr.select(seen, value * light[2], 0.0), band
 
 
-def _second_surfaces(
-    paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], ops: Any
-) -> tuple[np.ndarray, np.ndarray]:
-    """Factors (terms, 2, 3, n) and bands (terms, 2, n) of the terms that the second surface of each path has."""
+def _second_surfaces(paths: Paths, tails: Tails, seconds: Sequence[SecondTerm], ops: Any) -> np.ndarray:
+    """(terms, 2, n, 4) factors and bands of the terms that the second surface of each path has, as of `Sorted`."""
     second, begin, turn = paths.second, 0, dict[int, int]()
     assert second is not None
     width = dr.width(paths.wi)
@@ -116,6 +112,8 @@ def _second_surfaces(
             way[0] = dr.select(here, value, way[0])
             way[1] = dr.select(here, band + begin, way[1])
         begin += size
-    dr.eval(found)
-    factors = [[np.stack([np.array(value[c]) for c in range(3)]) for value, _ in term] for term in found]
-    return np.array(factors, np.float32), np.array([[np.array(band) for _, band in term] for term in found], np.uint32)
+    together = dr.empty(mi.Float, 4 * 2 * len(found) * width)
+    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
+    for k, (value, band) in enumerate(way for term in found for way in term):
+        put(together, value, band, k * stride + index)
+    return np.asarray(together.numpy().reshape(len(found), 2, width, 4))

@@ -98,10 +98,11 @@ class Paths:
         Direction in the point's frame.
     weight : mi.Float
         1 / density of the direction; 0 where it is left out.
-    light : (3, entries, n) float32
-        What arrives by paths that meet 2, 3, ... surfaces, in WAYS each.
-    tail : (entries, n) uint32
-        The tail that each has; where the second surface counts by bands, that of its first band.
+    light : mi.Float
+        (entries, n, 4): red, green and blue that arrive by paths that meet 2, 3, ... surfaces, in WAYS each, and
+        the bits of the tail; where the second surface counts by bands, that of its first band.
+    arrived : mi.UInt32
+        Bit e is set where light arrived at entry e; `light` has nothing where it is not.
     second : Second or None
     """
 
@@ -110,8 +111,8 @@ class Paths:
     at: Any
     wi: Any
     weight: Any
-    light: np.ndarray
-    tail: np.ndarray
+    light: Any
+    arrived: Any
     second: Second | None
 
 
@@ -140,15 +141,14 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
     meant = dr.dot(flat, t * wo.x + b * wo.y + n * wo.z) * wo.z
     passes = dr.dot(flat, ray.d) * meant * wi.z <= 0
     lights = WAYS * (tails.most_hits - 1)
-    light = [dr.zeros(mi.Float, lights * width) for _ in range(3)]
-    tail = dr.zeros(mi.UInt32, lights * width)
+    light = dr.empty(mi.Float, 4 * lights * width)
     orders = [tails.begin(hits) + tails.multisets(hits).number_of_order for hits in range(2, tails.most_hits + 1)]
     slow = bool(tails.second)
     at_second = [dr.zeros(mi.Float, width if slow else 1) for _ in range(9)]
     material = dr.full(mi.UInt32, NONE, width if slow else 1)
     begin = np.cumsum([0, *(len(order) for order in orders)])
-    _follow(
-        surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, tail, surfaces.object_numbers,
+    arrived = _follow(
+        surfaces.scene, sampler, ray, (pdf > 0) & ~passes, light, surfaces.object_numbers,
         mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 0])), mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 1])),
         mi.UInt32(np.concatenate(orders).astype(np.uint32)), mi.UInt32(begin.astype(np.uint32)),
         dr.opaque(mi.UInt32, len(tails.slots)), dr.opaque(mi.UInt32, tails.most_hits),
@@ -156,23 +156,22 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
         mi.UInt32(surfaces.material.astype(np.uint32)), material, at_second,
     )  # fmt: skip
     weight = dr.select((pdf > 0) & ~passes, dr.rcp(dr.maximum(pdf, 1e-20)), 0.0)
-    dr.eval(wi, weight, light, tail, material, at_second)
+    dr.eval(wi, weight, light, arrived, material, at_second)
 
     second = Second(material, *(mi.Vector3f(*at_second[k : k + 3]) for k in (0, 3, 6))) if slow else None
-    arrived = np.stack([np.array(channel) for channel in light]).reshape(3, lights, width)
-    return Paths(count, samples, at, wi, weight, arrived, np.array(tail).reshape(lights, width), second)
+    return Paths(count, samples, at, wi, weight, light, arrived, second)
 
 
 @dr.syntax
 def _follow(  # type: ignore[no-untyped-def]
-    scene, sampler, ray, active, light, tail, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
+    scene, sampler, ray, active, light, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
     sheets, slow, materials, material, at_second,
 ):  # fmt: skip
-    """Write the light of all path lengths: entry WAYS (hits - 2) + way of each sample."""
+    """Write the light of all path lengths, entry WAYS (hits - 2) + way of each sample. Returns bits of what arrived."""
     width = dr.width(ray.o)
-    index = dr.arange(mi.UInt32, width)
+    index, stride = dr.arange(mi.UInt32, width), dr.opaque(mi.UInt32, width)  # kernels do not depend on it
     throughput = mi.Color3f(1.0)
-    depth, order = mi.UInt32(1), mi.UInt32(0)
+    depth, order, arrived = mi.UInt32(1), mi.UInt32(0), mi.UInt32(0)
     origin, pdf, direct = dr.zeros(mi.SurfaceInteraction3f, width), mi.Float(0), mi.Bool(False)
     ctx = mi.BSDFContext()
     while active:
@@ -183,7 +182,10 @@ def _follow(  # type: ignore[no-untyped-def]
         other = scene.pdf_emitter_direction(origin, ds, met & ~direct)
         share = dr.select(direct | (other <= 0), 1.0, pdf / (pdf + other))
         brought = throughput * emitter.eval(si, met) * share
-        _write(light, tail, brought, _number(numbers, begins, depth - 1, order, met), 2 * depth - 3, index, width, met)
+        met &= dr.max(brought) > 0
+        entry = WAYS * depth - 3
+        put(light, brought, _number(numbers, begins, depth - 1, order, met), entry * stride + index, met)
+        arrived |= dr.select(met, 1 << entry, 0)
 
         active &= si.is_valid() & (depth < most)
         shape = dr.gather(mi.UInt32, objects, dr.reinterpret_array(mi.UInt32, si.shape), active)
@@ -232,16 +234,10 @@ def _follow(  # type: ignore[no-untyped-def]
         value *= throughput * f * dr.select(lit.delta, 1.0, lit.pdf / (lit.pdf + pdf_lit))
         shines &= dr.max(value) > 0
         shines &= ~rays.hidden(scene, si.p, si.n, lit.p, shines, holes)
-        _write(
-            light,
-            tail,
-            value,
-            _number(numbers, begins, depth, _and(order, slot_lit, members, depth, slow), shines),
-            2 * depth - 2,
-            index,
-            width,
-            shines,
-        )
+        order_lit = _and(order, slot_lit, members, depth, slow)
+        number = _number(numbers, begins, depth, order_lit, shines)
+        put(light, value, number, (entry + 1) * stride + index, shines)
+        arrived |= dr.select(shines, 1 << (entry + 1), 0)
 
         # Where the path goes on.
         local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d(active))
@@ -274,6 +270,7 @@ def _follow(  # type: ignore[no-untyped-def]
         origin = mi.SurfaceInteraction3f(at)
         ray = rays.leaving(scene, si.p, si.n, d)
         depth += 1
+    return arrived
 
 
 def _and(order: Any, slot: Any, members: Any, depth: Any, slow: bool) -> Any:
@@ -298,8 +295,7 @@ def _number(numbers: Any, begins: Any, met: Any, order: Any, active: Any) -> Any
     return dr.gather(mi.UInt32, numbers, dr.gather(mi.UInt32, begins, met - 1, active) + order, active)
 
 
-def _write(light: Any, tail: Any, value: Any, number: Any, entry: Any, index: Any, width: Any, active: Any) -> None:
-    at = entry * width + index
-    for c in range(3):
-        dr.scatter(light[c], value[c], at, active)
-    dr.scatter(tail, number, at, active)
+def put(numbers: Any, value: Any, bits: Any, at: Any, active: Any = True) -> None:
+    """Write rows of three numbers and 32 bits, which take one store, into (n, 4) `numbers`."""
+    bits = dr.reinterpret_array(mi.Float, mi.UInt32(bits))
+    dr.scatter(numbers, mi.Vector4f(value[0], value[1], value[2], bits), at, active)

@@ -11,36 +11,35 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-TOGETHER = 16  # points that use one dense row, one after another
+TOGETHER = 16  # points that use one dense row, one after another; fewer where there would be fewer SHARES of work
+SHARES = 64
 
 
 @dataclass(frozen=True)
 class Sorted:
     """Samples of points, sorted into the bands of a term: sample s of point p has the number p * samples + s.
 
+    Each row of four has a colour, and the bits of a number.
+
     Attributes
     ----------
-    value : (3, n) float32
-        Factor of the light that arrives.
-    band : (n,) uint32
-    light : (3, entries, n) float32
-    tail : (entries, n) uint32
-        Without the second surface's bands.
-    factor : (terms, 2, 3, n) float32
-        Of the second surface's terms, for the light that was sampled there and for where the path went on. Without
-        second surfaces that count by bands, there are no terms.
-    second : (terms, 2, n) uint32
-        Their bands.
+    first : (n, 4) float32
+        Factor of the light that arrives, and the band.
+    light : (entries, n, 4) float32
+        What arrives, and its tail without the second surface's bands.
+    arrived : (n,) uint32
+        Bit e is set where entry e has light.
+    second : (terms, 2, n, 4) float32
+        Factor and band of the second surface's terms, for the light that was sampled there and for where the path went
+        on. Without second surfaces that count by bands, there are no terms.
     widths : (entries,) int64
         Tails of each of these bands.
     """
 
-    value: NDArray[np.float32]
-    band: NDArray[np.uint32]
+    first: NDArray[np.float32]
     light: NDArray[np.float32]
-    tail: NDArray[np.uint32]
-    factor: NDArray[np.float32]
-    second: NDArray[np.uint32]
+    arrived: NDArray[np.uint32]
+    second: NDArray[np.float32]
     widths: NDArray[np.int64]
 
 
@@ -67,28 +66,34 @@ class Sums:
     def and_of(self, samples: Sorted, bands: int, tails: int) -> Sums:
         """These sums and those of more samples."""
         points = len(self.ends) - 1
-        each = len(samples.band) // points * len(samples.tail) * max(1, len(samples.factor))
-        room = self.ends + each * np.arange(points + 1)
+        each = len(samples.first) // points * len(samples.light) * max(1, len(samples.second))
+        room = np.concatenate([[0], np.cumsum(np.minimum(np.diff(self.ends) + each, bands * tails))])
         codes, light = np.empty(room[-1], np.uint32), np.empty((room[-1], 3), np.float32)
         counts = _add(
-            codes, light, room, self.ends, self.codes, self.light, samples.value, samples.band, samples.light,
-            samples.tail, samples.factor, samples.second, samples.widths, bands, bands * tails,
+            codes, light, room, self.ends, self.codes, self.light, samples.first, _bits(samples.first), samples.light,
+            _bits(samples.light), samples.arrived, samples.second, _bits(samples.second), samples.widths, bands,
+            bands * tails, max(1, min(TOGETHER, points // SHARES)),
         )  # fmt: skip
         ends = np.concatenate([[0], np.cumsum(counts)])
         return Sums(ends, *_closed_up(codes, light, room, ends))
 
 
+def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
+    return rows.view(np.uint32)[..., 3]
+
+
 @numba.njit(parallel=True, cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
-    codes, sums, room, ends, old_codes, old_sums, value, band, light, tail, factor, second, widths, bands, size
-):
+    codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands,
+    size, together,
+):  # fmt: skip
     points = len(ends) - 1
     samples, entries, terms = len(band) // points, len(tail), len(factor)
     counts = np.zeros(points, np.int64)
-    for block in numba.prange((points + TOGETHER - 1) // TOGETHER):
+    for block in numba.prange((points + together - 1) // together):
         row = np.zeros((size, 3), np.float32)
         met = np.zeros(size, np.bool_)
-        for p in range(block * TOGETHER, min(points, (block + 1) * TOGETHER)):
+        for p in range(block * together, min(points, (block + 1) * together)):
             here, n = codes[room[p] : room[p + 1]], 0
             for k in range(ends[p], ends[p + 1]):
                 code = old_codes[k]
@@ -96,22 +101,22 @@ def _add(  # type: ignore[no-untyped-def]
                 for c in range(3):
                     row[code, c] = old_sums[k, c]
             for i in range(p * samples, (p + 1) * samples):
-                if value[0, i] + value[1, i] + value[2, i] <= 0:
+                if first[i, 0] + first[i, 1] + first[i, 2] <= 0:
                     continue
                 for e in range(entries):
-                    if light[0, e, i] + light[1, e, i] + light[2, e, i] <= 0:
+                    if not arrived[i] >> e & 1:
                         continue
                     for t in range(max(terms, 1)):
                         code = tail[e, i]
                         r, g, b = (
-                            value[0, i] * light[0, e, i],
-                            value[1, i] * light[1, e, i],
-                            value[2, i] * light[2, e, i],
+                            first[i, 0] * light[e, i, 0],
+                            first[i, 1] * light[e, i, 1],
+                            first[i, 2] * light[e, i, 2],
                         )
                         if terms > 0:
                             way = min(e, 1)
                             r, g, b = (
-                                r * factor[t, way, 0, i], g * factor[t, way, 1, i], b * factor[t, way, 2, i]
+                                r * factor[t, way, i, 0], g * factor[t, way, i, 1], b * factor[t, way, i, 2]
                             )  # fmt: skip
                             if not r + g + b > 0:
                                 continue

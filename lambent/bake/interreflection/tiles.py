@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
 from lambent.bake.interreflection.series import Bins
-from lambent.bake.tiles import seed_of
+from lambent.bake.tiles import seed_of, slices
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
 from lambent.scenes.scene import Scene
 from lambent.store.tails import SecondBands, Tails
@@ -20,7 +22,7 @@ from lambent.store.tails import SecondBands, Tails
 if TYPE_CHECKING:
     from lambent.bake.interreflection.binning import SecondTerm
     from lambent.bake.interreflection.paths import Surfaces
-    from lambent.bake.interreflection.sums import Sums
+    from lambent.bake.interreflection.sums import Sorted, Sums
     from lambent.bake.transport.bands import Bands
     from lambent.bake.transport.view_points import ViewPoints
     from lambent.bake.transport.view_tracer import ViewTracer
@@ -46,20 +48,22 @@ class Tile:
     points: int
 
     @classmethod
-    def of(cls, sums: Sums, samples: int) -> Tile:
-        light = sums.light / np.float32(samples)
-        unit = 2.0 ** np.ceil(np.log2(max(float(light.max(initial=0.0)), 1e-30) / (LARGEST / 4)))
-        counts = np.diff(sums.ends).astype(np.uint32)
-        array = np.concatenate([counts, sums.codes, packed_rgb(light / np.float32(unit))])
-        return cls(array, float(unit), len(counts))
+    def of(cls, parts: Sequence[Sums], samples: int) -> Tile:
+        """Of all points, some after others."""
+        largest = max(float(part.light.max(initial=0.0)) for part in parts) / samples
+        unit = 2.0 ** np.ceil(np.log2(max(largest, 1e-30) / (LARGEST / 4)))
+        counts = np.concatenate([np.diff(part.ends).astype(np.uint32) for part in parts])
+        packed = [packed_rgb(part.light / np.float32(samples) / np.float32(unit)) for part in parts]
+        return cls(np.concatenate([counts, *(part.codes for part in parts), *packed]), float(unit), len(counts))
 
-    def sums(self, samples: int) -> Sums:
-        """The sums of its samples."""
+    def sums(self, samples: int, some: slice = slice(None)) -> Sums:
+        """The sums of its samples, at some points."""
         from lambent.bake.interreflection.sums import Sums
 
-        counts, codes, light = unpacked(self.array, self.points)
-        ends = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-        return Sums(ends, codes, light * np.float32(self.unit * samples))
+        ends = np.concatenate([[0], np.cumsum(self.array[: self.points], dtype=np.int64)])
+        first, last, _ = some.indices(self.points)
+        codes, packed = (half[ends[first] : ends[last]] for half in np.split(self.array[self.points :], 2))
+        return Sums(ends[first : last + 1] - ends[first], codes, unpacked_rgb(packed) * np.float32(self.unit * samples))
 
 
 def unpacked(
@@ -101,24 +105,42 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
+        adding: list[Future[list[Sums]]] = []
+        with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # beside the next paths
+            for some in self._at_once(len(job.points), job.samples - job.before):
+                new = self._traced(job, some)
+                if adding:
+                    adding[-1].result()  # so that the paths of two blocks are in memory, not more
+                adding.append(adder.submit(self._added, job, some, new))
+        return tuple(Tile.of(term, job.samples) for term in zip(*(block.result() for block in adding), strict=True))
+
+    def _at_once(self, points: int, samples: int) -> list[slice]:
+        """Points whose new samples are traced together: a point's sums are written once, however many there are."""
+        most = max(1, (PATHS >> 2 if self._seconds else PATHS) // samples)
+        return slices(points, -(-points // -(-points // most)))
+
+    def _traced(self, job: Job, some: slice) -> list[Sorted]:
+        """All new samples of some of a job's points, by term."""
         from lambent.bake.interreflection.binning import Sorting
         from lambent.bake.interreflection.directions import shares_of
         from lambent.bake.interreflection.paths import trace
+
+        bins, points, count = self.bins[job.material], job.points.where(some), job.samples - job.before
+        seed = seed_of(self.seed, job.name, job.before, some.start)
+        paths = trace(self._surfaces, points, shares_of(bins.editable), self.tails, count, seed)
+        sorting = Sorting(paths, points, self.tails, self._seconds)
+        if not bins.terms:
+            return [sorting.whole(bins.editable)]
+        return [sorting.by_term(term, _bands(factors)) for term, factors in bins.terms]
+
+    def _added(self, job: Job, some: slice, new: list[Sorted]) -> list[Sums]:
+        """All samples of some of a job's points, by term."""
         from lambent.bake.interreflection.sums import Sums
 
-        points, bins = job.points, self.bins[job.material]
-        sums = [tile.sums(job.before) for tile in job.held] or [Sums.none(len(points)) for _ in bins.bands]
-        at_once = max(1, (PATHS >> 2 if self._seconds else PATHS) // len(points))
-        for first in range(job.before, job.samples, at_once):
-            count = min(at_once, job.samples - first)
-            seed = seed_of(self.seed, job.name, first)
-            paths = trace(self._surfaces, points, shares_of(bins.editable), self.tails, count, seed)
-            sorting = Sorting(paths, points, self.tails, self._seconds)
-            found = (sorting.by_term(term, _bands(factors)) for term, factors in bins.terms)
-            new = found if bins.terms else [sorting.whole(bins.editable)]
-            zipped = zip(sums, new, bins.bands, strict=True)
-            sums = [total.and_of(more, bands, len(self.tails)) for total, more, bands in zipped]
-        return tuple(Tile.of(total, job.samples) for total in sums)
+        none = Sums.none(some.stop - some.start)
+        held = [tile.sums(job.before, some) for tile in job.held] or [none] * len(new)
+        zipped = zip(held, new, self.bins[job.material].bands, strict=True)
+        return [sums.and_of(more, bands, len(self.tails)) for sums, more, bands in zipped]
 
     @cached_property
     def _surfaces(self) -> Surfaces:

@@ -105,7 +105,7 @@ class Trial:
         more = work(Job(name, whole, name, samples + batch, samples, held))
         traced = time.perf_counter()
         for tile in more:
-            Tile.of(tile.sums(samples), samples)
+            Tile.of([tile.sums(samples)], samples)
         packed = time.perf_counter() - traced
         disk, writing = _written(more)
         passes = 1 + max(0.0, log2(bounces.samples / 16))

@@ -1,0 +1,123 @@
+"""Points of a tile are traced and added up some at a time: the same light, in bounded memory, by the same kernels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection import tiles
+from lambent.bake.interreflection.series import bins_of, tails_of
+from lambent.bake.interreflection.sums import Sorted, Sums
+from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
+from lambent.bake.transport.view_points import ViewPoints
+from lambent.bake.transport.view_tracer import ViewTracer
+from lambent.bake.view import View
+from lambent.materials.document import Lobe, Material
+from lambent.scenes.scene import Scene
+from tests.bake.test_interreflection import FIRST, FROM_ABOVE, INSIDE, corner, furnace, of_scene
+
+GLOSSY = Material(kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, r0=0.5),))
+
+
+def traced_by(scene: Scene, series: tuple[int, ...], view: View) -> tuple[TileTracer, ViewPoints]:
+    editables, bounces, tracer = of_scene(scene), Bounces(series), ViewTracer(scene)
+    work = TileTracer(scene, tails_of(editables, bounces), bins_of(editables, bounces), 0, tracer)
+    return work, tracer.points(view)
+
+
+def random_samples(points: int, samples: int, terms: int, rng: np.random.Generator) -> Sorted:
+    """Of 3 bands at the first surface, 2 x 5 tails of two lengths, and, where they count, 2 bands at the second."""
+
+    def rows(*shape: int, numbers: int) -> np.ndarray:
+        found = rng.random((*shape, 4), np.float32)
+        found.view(np.uint32)[..., 3] = rng.integers(0, numbers, shape, np.uint32)
+        return found
+
+    n = points * samples
+    light = rows(4, n, numbers=5)
+    light.view(np.uint32)[2:, :, 3] += 10 if terms else 5
+    arrived = rng.integers(0, 16, n, np.uint32)
+    return Sorted(rows(n, numbers=3), light, arrived, rows(terms, 2, n, numbers=2), np.full(4, 5, np.int64))
+
+
+def by_hand(samples: Sorted, points: int, bands: int, tails: int) -> np.ndarray:
+    """(points, codes, 3) sums."""
+    total = np.zeros((points, bands * tails, 3))
+    bits = [array.view(np.uint32)[..., 3] for array in (samples.first, samples.light, samples.second)]
+    for i in range(len(samples.first)):
+        for e in np.flatnonzero(samples.arrived[i] >> np.arange(4) & 1):
+            light = samples.first[i, :3].astype(float) * samples.light[e, i, :3]
+            for second, band in (
+                zip(samples.second[:, min(e, 1), i], bits[2][:, min(e, 1), i], strict=True)
+                if len(samples.second)
+                else [(np.ones(4), 0)]
+            ):
+                code = (bits[1][e, i] + band * 5) * bands + bits[0][i]
+                total[i * points // len(samples.first), code] += light * second[:3]
+    return total
+
+
+@pytest.mark.parametrize("terms", [0, 2])
+def test_sums_are_those_of_loops(terms: int) -> None:
+    rng, points, tails = np.random.default_rng(terms), 6, 20 if terms else 10
+    first, then = (random_samples(points, samples, terms, rng) for samples in (7, 40))
+    sums = Sums.none(points).and_of(first, 3, tails).and_of(then, 3, tails)
+    dense = np.zeros((points, 3 * tails, 3))
+    dense[np.repeat(np.arange(points), np.diff(sums.ends)), sums.codes] = sums.light
+    assert np.allclose(dense, by_hand(first, points, 3, tails) + by_hand(then, points, 3, tails), rtol=1e-5)
+    assert all((np.diff(sums.codes[a:b].astype(int)) > 0).all() for a, b in zip(sums.ends, sums.ends[1:], strict=False))
+    tile = Tile.of([sums], 47)
+    parts = [tile.sums(47, some) for some in (slice(0, 1), slice(1, 4), slice(4, 6))]
+    assert np.allclose(np.concatenate([part.light for part in parts]), sums.light, rtol=0, atol=sums.light.max() / 256)
+    again = Tile.of(parts, 47)
+    assert again.unit == tile.unit and np.array_equal(again.array, tile.array)
+
+
+def test_many_samples_are_traced_for_few_points_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A furnace's light is known whatever the blocks; no block has more paths than may be in memory."""
+    from lambent.bake.interreflection import paths
+
+    widths: list[tuple[int, int]] = []
+    trace = paths.trace
+
+    def watched(surfaces: Any, points: Any, sides: Any, tails: Any, samples: int, seed: int) -> Any:
+        widths.append((len(points), samples))
+        return trace(surfaces, points, sides, tails, samples, seed)
+
+    monkeypatch.setattr(paths, "trace", watched)
+    monkeypatch.setattr(tiles, "PATHS", 1 << 12)
+    scene = furnace(0.5)
+    work, points = traced_by(scene, (4, 1, 1), View(INSIDE, 7, 7))
+    (few,) = work(Job("grey", points, "some", 16))
+    (many,) = work(Job("grey", points, "some", 1000, 16, (few,)))
+    assert widths[0] == (49, 16)
+    assert [samples for _, samples in widths[1:]] == [984] * 13
+    assert sum(count for count, _ in widths[1:]) == 49
+    assert all(count * samples <= 1 << 12 for count, samples in widths[1:])
+    (huge,) = work(Job("grey", points.where(slice(0, 2)), "other", 5000))
+    assert widths[-2:] == [(1, 5000)] * 2
+    for tile in (many, huge):
+        sums = tile.sums(1)
+        surfaces = work.tails.hits[sums.codes // 4]
+        for hits in (2, 3):  # light of 1 from everywhere, times a cosine
+            assert sums.light[surfaces == hits].sum() / 3 / tile.points == pytest.approx(np.pi, rel=0.03)
+
+
+@pytest.mark.parametrize("series", [(16, 1, 1), (16, 8)])
+def test_kernels_do_not_depend_on_the_number_of_paths(series: tuple[int, ...]) -> None:
+    import drjit as dr
+
+    scene = corner({**FIRST, "floor": GLOSSY, "ball": GLOSSY})
+    work, points = traced_by(scene, series, View(FROM_ABOVE, 12, 12))
+    mine = points.where(np.array([o.material == "floor" for o in scene.objects])[points.object])
+    work(Job("floor", mine, "first", 8))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        work(Job("floor", mine, "same", 24))
+        work(Job("floor", mine.where(slice(0, 9)), "same", 101))
+        history = dr.kernel_history((dr.KernelType.JIT,))
+    assert len(history) > 4
+    assert not [kernel["size"] for kernel in history if not kernel["cache_hit"]]
