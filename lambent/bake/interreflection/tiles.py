@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
+from lambent.bake.interreflection.as_baked import shapes_of
 from lambent.bake.interreflection.series import Bins
 from lambent.bake.tiles import seed_of
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
@@ -88,7 +89,10 @@ class Job:
 
 
 class TileTracer:
-    """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first."""
+    """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first.
+
+    A `tracer` that is given has the materials of `bins`.
+    """
 
     def __init__(
         self, scene: Scene, tails: Tails, bins: Mapping[str, Bins], seed: int, tracer: ViewTracer | None = None
@@ -125,9 +129,11 @@ class TileTracer:
         from lambent.bake.interreflection.paths import Surfaces
         from lambent.bake.transport.view_tracer import ViewTracer
 
-        tracer = self._tracer = self._tracer or ViewTracer(self.scene)  # which its scene needs
+        editables = {name: bins.editable for name, bins in self.bins.items()}
+        tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # which its scene needs
         worn = [o.material for o in self.scene.objects]
-        return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails)
+        shapes = shapes_of(self.scene, editables)
+        return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails, shapes)
 
     @cached_property
     def _seconds(self) -> list[SecondTerm]:

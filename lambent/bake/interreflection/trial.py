@@ -44,7 +44,7 @@ class Trial:
     """Measures a view. `shown` are the points of each material."""
 
     def __init__(self, scene: Scene, view: View, editables: Mapping[str, Editable]) -> None:
-        self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene)
+        self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene, editables)
         self._points = self._tracer.points(view)
         worn = np.array([o.material for o in scene.objects])[self._points.object]
         self._at = {name: np.random.default_rng(0).permutation(np.flatnonzero(worn == name)) for name in editables}
