@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera
+from lambent.core.metrics import display_exposure, displayed, flip_error
 from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.materials.factored.albedo import albedo
@@ -64,6 +66,27 @@ def relative_mse(image: Floats, reference: Floats, shown: Flags) -> float:
     """Mean of (a - b)^2 / (b^2 + a hundredth of the squared mean) over the pixels that are shown."""
     a, b = image[shown], reference[shown]
     return float(np.mean((a - b) ** 2 / (b**2 + 0.01 * b.mean() ** 2)))
+
+
+def flip_between(reference: Floats, image: Floats, shown: Flags | None = None) -> float:
+    """Mean FLIP; of pixels that are `shown`, where the others are alike in both."""
+    exposure_ev = display_exposure(reference)
+    if shown is None:
+        return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
+    image = np.where(shown[..., None], image, reference)
+    return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev))[shown].mean())
+
+
+def summed_up(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Means over settings, FLIP and relMSE of each kind, and of the worst; setting k is of kind k modulo `KINDS`."""
+    means = {key: np.mean([one[key] for one in errors]) for key in errors[0]}
+    kinds = {
+        f"{key}_{kind}": np.mean([one[key] for one in errors[k :: len(KINDS)]])
+        for k, kind in enumerate(KINDS[: len(errors)])
+        for key in ("flip", "flip_limit", "relmse_limit")
+    }
+    worst = {f"{key}_worst": max(one[key] for one in errors) for key in ("flip", "flip_limit", "relmse_limit")}
+    return {key: float(f"{value:.3g}") for key, value in {**means, **kinds, **worst}.items()}
 
 
 def interior(store: Store, camera: Camera, size: tuple[int, int]) -> Flags:

@@ -86,7 +86,9 @@ def test_strengths_of_what_is_glossy_are_exact_too(tmp_path: Path) -> None:
     """Where all of a material is scaled alike, or its one term is tinted, by channels and to black and from it."""
     dark = GLOSS.model_copy(update={"lobes": (GLOSS.lobes[0].model_copy(update={"k": (0.9, 0.5, 0.0)}),)})
     scene = room({**FIRST, "back": dark, "floor": SHINY})
-    tinted = of_material(GLOSS.model_copy(update={"lobes": (GLOSS.lobes[0].model_copy(update={"k": (0.1, 0.9, 0.7)}),)}))
+    tinted = of_material(
+        GLOSS.model_copy(update={"lobes": (GLOSS.lobes[0].model_copy(update={"k": (0.1, 0.9, 0.7)}),)})
+    )
     half = of_material(SHINY)
     half = replace(half, terms=tuple(replace(t, scale=tuple(0.5 * x for x in t.scale)) for t in half.terms))
     compared(scene, {"back": tinted, "floor": half}, tmp_path, (16, 1))
