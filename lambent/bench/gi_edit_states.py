@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lambent.bake.interreflection.series import SMOOTH, SMOOTH_ANGLES
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera
 from lambent.core.metrics import display_exposure, displayed, flip_error
@@ -20,7 +21,7 @@ from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 
 KINDS = ("bands", "colours", "widths")
-STEPS = 16  # of a curve of random steps
+STEPS, SMOOTH_STEPS = 16, SMOOTH  # of a curve of random steps; over angles without narrow peaks
 WHITEST = 0.8  # albedo of what is random
 
 
@@ -45,11 +46,16 @@ def setting(kind: str, material: Material, rng: np.random.Generator) -> Editable
 
 
 def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
-    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets."""
+    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets.
+
+    Steps are as wide as bands, or as several.
+    """
     curves = {}
+    over = {factor.curve: factor.over for term in editable.terms for factor in term.factors}
     for name, curve in editable.curves.items():
-        steps = rng.random((STEPS, 3)) * 2 * curve.values.mean(axis=0)
-        curves[name] = Curve(steps[np.minimum(np.arange(KNOTS + 1) * STEPS // KNOTS, STEPS - 1)])
+        count = STEPS if over.get(name, "theta_o") not in SMOOTH_ANGLES else SMOOTH_STEPS
+        steps = rng.random((count, 3)) * 2 * curve.values.mean(axis=0)
+        curves[name] = Curve(steps[np.minimum(np.arange(KNOTS + 1) * count // KNOTS, count - 1)])
     return replace(editable, curves=curves)
 
 

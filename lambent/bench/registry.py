@@ -2,8 +2,9 @@
 
 A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of a frozen dataclass of its
 own), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also
-takes `inputs`; if it compares with published figures, `against`; if it draws settings at random, `settings`. Names, rows and fields are those of
-docs/performance.md; times are medians of at least five runs taken in turns, their spread beside them.
+takes `inputs`; if it compares with published figures, `against`; if it draws settings at random, `settings`. Names,
+rows and fields are those of docs/performance.md; times are medians of at least five runs taken in turns, their spread
+beside them.
 """
 
 from __future__ import annotations

@@ -123,9 +123,9 @@ def test_materials_that_are_not_those_of_their_documents(tmp_path: Path) -> None
 
 def test_a_store_knows_the_state_that_it_is_baked_of(tmp_path: Path) -> None:
     """Another highlight makes its tiles stale; another colour of what is Lambertian does not."""
-    few = Bounces((4, 1), samples=16)
 
-    def keys(materials: dict[str, Material]) -> dict[str, str]:
+    def keys(materials: dict[str, Material], diffuse_seen: bool = False) -> dict[str, str]:
+        few = Bounces((4, 1), samples=16, diffuse_seen=diffuse_seen)
         store, _ = baked(room(materials), AT_WALL, tmp_path / "s", few, size=4)
         return {a.name: a.key for a in store.artefacts("interreflection")}
 
@@ -134,6 +134,21 @@ def test_a_store_knows_the_state_that_it_is_baked_of(tmp_path: Path) -> None:
     wider = SHINY.model_copy(update={"lobes": (SHINY.lobes[0].model_copy(update={"mx": 0.2, "my": 0.2}),)})
     after = keys({**FIRST, "floor": wider})
     assert before.keys() == after.keys() and not set(before.values()) & set(after.values())
+    diffuse = keys({**FIRST, "floor": wider}, diffuse_seen=True)
+    assert not set(after.values()) & set(diffuse.values())
+    assert keys({**FIRST, "floor": SHINY}, diffuse_seen=True) == diffuse
+
+
+def test_surfaces_seen_as_diffuse_ones(tmp_path: Path) -> None:
+    """The picture of a glossy room is then that of Lambertian walls of the same albedos."""
+    scene, found = room(GLOSSY), []
+    even = {name: Material(kd=tuple(albedo(one, "reflection"))) for name, one in of_scene(scene).items() if one.terms}
+    for k, (shown, diffuse_seen) in enumerate([(scene, True), (room({**GLOSSY, **even}), False), (scene, False)]):
+        bounces = Bounces((16, 1), samples=512, diffuse_seen=diffuse_seen)
+        store, view = baked(shown, AT_WALL, tmp_path / str(k), bounces)
+        found.append(picture(store, view, shown, of_scene(shown)))
+    assert np.allclose(found[0], found[1], rtol=0.02, atol=1e-4)
+    assert not np.allclose(found[0], found[2], rtol=0.02, atol=1e-4)
 
 
 @pytest.mark.parametrize(("material", "expected"), [

@@ -63,7 +63,7 @@ def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
     bounces, editables, scene = context.bounces, _editables(context), context.in_views
     tails, bins = tails_of(editables, bounces), bins_of(editables, bounces)
-    work = TileTracer(scene, tails, bins, context.seed, context.view_tracer)
+    work = TileTracer(scene, tails, bins, context.seed, context.view_tracer, bounces.diffuse_seen)
     for view in context.views:
         _put_tails(context, view)
     samples = FIRST_PASS
@@ -172,8 +172,8 @@ def _series_key(context: BakeContext, view: View) -> str:
 
 def _as_baked(context: BakeContext) -> list[Any]:
     """The state of the materials whose BRDFs paths know: not of those that scatter by the cosine."""
-    scene, editables = context.in_views, _editables(context)
-    known = context.bounces.fixed | shapes_of(scene, editables).keys()
+    scene, editables, bounces = context.in_views, _editables(context), context.bounces
+    known = bounces.fixed | (set() if bounces.diffuse_seen else shapes_of(scene, editables).keys())
     textures: Any = texture_inputs(scene, *SCATTERING_TEXTURES)
     return [[name, state_of(one), textures.get(name)] for name, one in editables.items() if name in known]
 

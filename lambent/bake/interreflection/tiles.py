@@ -91,16 +91,23 @@ class Job:
 class TileTracer:
     """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first.
 
-    A `tracer` that is given has the materials of `bins`.
+    A `tracer` that is given has the materials of `bins`; `diffuse_seen` is that of `Bounces`.
     """
 
     def __init__(
-        self, scene: Scene, tails: Tails, bins: Mapping[str, Bins], seed: int, tracer: ViewTracer | None = None
+        self,
+        scene: Scene,
+        tails: Tails,
+        bins: Mapping[str, Bins],
+        seed: int,
+        tracer: ViewTracer | None = None,
+        diffuse_seen: bool = False,
     ) -> None:
         self.scene, self.tails, self.bins, self.seed, self._tracer = scene, tails, bins, seed, tracer
+        self._diffuse_seen = diffuse_seen
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TileTracer, (self.scene, self.tails, self.bins, self.seed)
+        return TileTracer, (self.scene, self.tails, self.bins, self.seed, None, self._diffuse_seen)
 
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
@@ -132,7 +139,7 @@ class TileTracer:
         editables = {name: bins.editable for name, bins in self.bins.items()}
         tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # which its scene needs
         worn = [o.material for o in self.scene.objects]
-        shapes = shapes_of(self.scene, editables)
+        shapes = {} if self._diffuse_seen else shapes_of(self.scene, editables)
         return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails, shapes)
 
     @cached_property

@@ -120,7 +120,7 @@ class Trial:
 
     def _work(self, bounces: Bounces) -> TileTracer:
         tails, bins = tails_of(self.editables, bounces), bins_of(self.editables, bounces)
-        return TileTracer(self.scene, tails, bins, 0, self._tracer)
+        return TileTracer(self.scene, tails, bins, 0, self._tracer, bounces.diffuse_seen)
 
 
 def _repeated(tile: Tile, points: int) -> Tile:
