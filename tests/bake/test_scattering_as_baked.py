@@ -94,6 +94,7 @@ def test_strengths_of_what_is_glossy_are_exact_too(tmp_path: Path) -> None:
     compared(scene, {"back": tinted, "floor": half}, tmp_path, (16, 1))
 
 
+@pytest.mark.slow
 def test_a_textured_floor_beside_a_wall(tmp_path: Path) -> None:
     """Texel by texel, not by their mean, where nothing is edited."""
     texels = np.full((2, 64, 3), 0.2, np.float16)
@@ -107,6 +108,7 @@ def test_a_textured_floor_beside_a_wall(tmp_path: Path) -> None:
     assert abs(picture(store, view, scene, of_scene(scene)).mean() / mean - 1) > 0.03, "the texture matters here"
 
 
+@pytest.mark.slow
 def test_light_through_a_glossy_sheet(tmp_path: Path) -> None:
     """A sheet between the lamp and the wall, which scatters to both sides, each with a slot of its own."""
     sheet = Material(kd=0.2, kt_d=0.2, lobes=(Lobe(side="transmission", mx=0.2, my=0.2, r0=0.1, k=0.7, alpha=0.5),))
