@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from lambent.bake.interreflection.as_baked import (
     state_of,
     unlike_documents,
 )
+from lambent.bake.interreflection.series import bins_of, tails_of
 from lambent.core.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
@@ -192,3 +194,26 @@ def test_states_differ_by_the_whole_of_a_curve() -> None:
     assert state_of(named) == state_of(start)
     scene = room({**FIRST, "floor": SHINY})
     assert set(unlike_documents(scene, {"floor": named, "back": moved, "nowhere": moved})) == {"back"}
+
+
+def test_another_process_traces_the_same() -> None:
+    """A tracer that was sent has the same surfaces: models in place of documents, and whether others are diffuse."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.interreflection.tiles import Job, TileTracer
+    from lambent.bake.transport.view_tracer import ViewTracer
+    from lambent.bake.view import View
+
+    scene, few = room(GLOSSY), Bounces((4, 1, 1))
+    editables = {**of_scene(scene), **MODELS}
+    tracer = ViewTracer(scene, editables)
+    job = Job("seen", tracer.points(View(AT_WALL, 4, 4)), "job", 16)
+    found = []
+    for diffuse in (False, True):
+        here = TileTracer(scene, tails_of(editables, few), bins_of(editables, few), 0, tracer, diffuse)
+        there = pickle.loads(pickle.dumps(here))
+        one, other = here(job), there(job)
+        assert all(np.array_equal(a.array, b.array) and a.unit == b.unit for a, b in zip(one, other, strict=True))
+        found.append(one[0].array)
+    assert not np.array_equal(*found)
