@@ -1,4 +1,4 @@
-"""Paths that do not know the BRDFs: what light they bring to the pixel's surface, and over which tail.
+"""Paths that do not know the edits: what light they bring to the pixel's surface, and over which tail.
 
 A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos. Lambertian ones
 scatter by the cosine, which cancels, so the path carries 1 until a light is seen; others by their BRDF as it is baked
