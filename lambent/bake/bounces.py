@@ -22,11 +22,15 @@ class Bounces:
         Paths per pixel. More can be added to a store later.
     fixed : frozenset of str
         Materials that are not edited. They scatter as they are, and need neither bands nor tails of their own.
+    diffuse_seen : bool
+        Surfaces seen in others are Lambertian, as in the thesis, and do not keep the shape that their lobes have as
+        baked. For edits that make narrow lobes anything else.
     """
 
     series: tuple[int, ...] = (64, 1, 1, 1)
     samples: int = 1024
     fixed: frozenset[str] = frozenset()
+    diffuse_seen: bool = False
 
     def __post_init__(self) -> None:
         said = ",".join(map(str, self.series))

@@ -146,4 +146,4 @@ class BakeContext:
         """The scene of the views as it is traced, and its lights."""
         from lambent.bake.transport.view_tracer import ViewTracer
 
-        return ViewTracer(self.in_views)
+        return ViewTracer(self.in_views, self.editables)

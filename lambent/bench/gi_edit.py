@@ -2,12 +2,13 @@
 
 Rows with `samples` are scenes with the series of their published figures; `thesis_seconds` is what the published
 number of samples would take at the measured rate. Errors are those of smaller pictures of `error_size` with
-`error_samples`, for random settings that no bake has seen (`gi_edit_states`), to path traced pictures of as many
-surfaces. `flip` is of all pixels; `relmse` of those whose neighbours show the same object, as a stored pixel is a point
-and a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` that of the whole.
-`relmse_limit` is extrapolated from half the samples and all of them to infinitely many, without the reference's noise:
-what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise of the first setting, at the
-fewest samples, in powers of two, whose FLIP is as low; the seconds are those of the large picture.
+`error_samples`, to path traced pictures of as many surfaces: `opened_` of the materials as the scene has them, the
+others means over random `settings` that no bake has seen (`gi_edit_states`), of each kind, and the worst. `flip` is of
+all pixels; `relmse` and `flip_inside` of those whose neighbours show the same object, as a stored pixel is a point and
+a path traced one a mean. `noise_flip` is between two halves of the reference, `noise_relmse` that of the whole. A
+`_limit` is extrapolated from half the samples and all of them to infinitely many, without the reference's noise, as if
+squares added up: what more samples would not mend. `rival_` is path tracing, guides and Open Image Denoise of the first
+setting, at the fewest samples, in powers of two, whose FLIP is as low; the seconds are those of the large picture.
 
 Rows with `error_mib` compare series in small pictures with paths of up to `surfaces` surfaces, so that what a short
 series leaves out counts: the relative error (root of `relmse`) times MiB, and times seconds of the bake. The summary
@@ -20,7 +21,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -32,9 +33,9 @@ from lambent.bake.bounces import Bounces
 from lambent.bake.quality import quality_named
 from lambent.bake.view import View
 from lambent.bench.direct_edit import MIB, held_bytes
-from lambent.bench.gi_edit_states import KINDS, interior, relative_mse, setting
+from lambent.bench.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
 from lambent.core.arrays import Flags, Floats
-from lambent.core.metrics import display_exposure, displayed, flip_error
+from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent, tracked
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.stored import Interreflections, interreflections
@@ -90,7 +91,7 @@ class Effort:
     error_shrink: int = 4
     error_samples: int = 1024
     reference_spp: int = 2048
-    settings: int = 3
+    settings: int = 20
     frames: int = 40
     rival_s: float = 20.0
     edge: int = 80
@@ -101,15 +102,22 @@ class Effort:
 
 FULL = Effort()
 QUICK = Effort(
-    10, 32, error_shrink=2, error_samples=64, reference_spp=128, settings=1, frames=6, rival_s=0.5, edge=24,
+    10, 32, error_shrink=2, error_samples=64, reference_spp=128, settings=3, frames=6, rival_s=0.5, edge=24,
     lights=100, series=((64, 1), (16, 8, 1)), cases=(CASES[0], CASES[-1]),
 )  # fmt: skip
 
 
-def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
-    """Rows per scene and series; the summary has the best series of each scene."""
+def run(effort: Effort, settings: int | None = None, progress: Progress = silent) -> dict[str, Any]:
+    """Rows per scene and series; the summary has the best series of each scene.
+
+    `settings` are random ones of each row, where they are not those of the effort.
+    """
     from lambent.bake.engine import engine
 
+    if settings is not None:
+        if settings < 1:
+            raise UserError("no settings", field="--settings", got=settings, expected="at least 1")
+        effort = replace(effort, settings=settings)
     engine()
     rows = [_row(case, effort) for case in tracked(effort.cases, progress, "scenes")]
     scenes = {case.scene: case for case in effort.cases}
@@ -265,39 +273,39 @@ def _drag(room: _Room, material: str, curve: str) -> Iterator[Editable]:
 
 
 def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
-    """Means over the settings, those of each kind, and what the rival takes in the large view for the first."""
-    settings, pictures = room.settings(effort.settings), []
+    """Of the scene as it is, of the settings, and what the rival takes in the large view for the first of these."""
+    states, pictures = [room.start, *room.settings(effort.settings)], []
     for samples in (effort.error_samples // 2, effort.error_samples):
         room.bake(room.case.series, samples)
         whole = room.picture(room.light())
-        pictures.append([_drawn(whole, state) for state in settings])
+        pictures.append([_drawn(whole, state) for state in states])
         whole.close()
-    inner, found = room.inner(), []
-    for k, state in enumerate(settings):
-        halves = room.reference(state, len(room.case.series), effort.reference_spp)
-        converged = np.mean(halves, axis=0)
-        noise = relative_mse(halves[0], halves[1], inner) / 4  # of the mean of both
-        half, full = (relative_mse(one[k], converged, inner) for one in pictures)
-        found.append(
-            {
-                "flip": _flip(converged, pictures[1][k]), "noise_flip": _flip(halves[0], halves[1]), "relmse": full,
-                "noise_relmse": noise, "relmse_limit": max(0.0, 2 * full - half - noise),
-            }
-        )  # fmt: skip
-        if k == 0:
-            rival = _rival(room, large, state, converged, found[0]["flip"], effort)
-    kinds = {
-        f"flip_{KINDS[k]}": round(float(np.mean([one["flip"] for one in found[k :: len(KINDS)]])), 4)
-        for k in range(min(len(KINDS), len(found)))
-    }
-    means = {key: float(f"{np.mean([one[key] for one in found]):.3g}") for key in found[0]}
+    inner, found, rival = room.inner(), [], dict[str, Any]()
+    for k, (state, half, full) in enumerate(zip(states, *pictures, strict=True)):
+        one, other = room.reference(state, len(room.case.series), effort.reference_spp)
+        found.append(_error(half, full, (one, other), inner))
+        if k == 1:
+            converged = np.mean([one, other], axis=0)
+            rival = _rival(room, large, state, converged, found[1]["flip"], effort)
     size = f"{room.size[0]}x{room.size[1]}"
-    return {"error_size": size, "error_samples": samples, "settings": len(settings), **means, **kinds, **rival}
+    opened = {f"opened_{key}": float(f"{value:.3g}") for key, value in found[0].items()}
+    said = {"error_size": size, "error_samples": samples, "settings": effort.settings}
+    return {**said, **opened, **summed_up(found[1:]), **rival}
 
 
-def _flip(reference: Floats, image: Floats) -> float:
-    exposure_ev = display_exposure(reference)
-    return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
+def _error(half: Floats, full: Floats, references: tuple[Floats, Floats], inner: Flags) -> dict[str, float]:
+    """Of pictures of half the samples and of all of them."""
+    converged = np.mean(references, axis=0)
+    noise = relative_mse(*references, inner) / 4  # of the mean of both
+    relmse = [relative_mse(one, converged, inner) for one in (half, full)]
+    inside = [flip_between(converged, one, inner) for one in (half, full)]
+    noise_inside = flip_between(*references, inner) / 2
+    flip_limit = np.sqrt(max(0.0, 2 * inside[1] ** 2 - inside[0] ** 2 - noise_inside**2))
+    return {
+        "flip": flip_between(converged, full), "flip_inside": inside[1], "flip_limit": float(flip_limit),
+        "noise_flip": flip_between(*references), "relmse": relmse[1], "noise_relmse": noise,
+        "relmse_limit": max(0.0, 2 * relmse[1] - relmse[0] - noise),
+    }  # fmt: skip
 
 
 def _rival(
@@ -315,7 +323,7 @@ def _rival(
     spp, seconds, flip = 1, 0.0, np.inf
     while flip > wanted and seconds < effort.rival_s / 2:
         spp *= 2
-        flip = _flip(converged, small.denoised(spp, seed=3))
+        flip = flip_between(converged, small.denoised(spp, seed=3))
         began = time.perf_counter()
         tracer.denoised(spp, seed=3)
         seconds = time.perf_counter() - began
@@ -339,7 +347,7 @@ def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
             whole = room.picture(room.light())
             compared = list(zip([_drawn(whole, state) for state in settings], references, strict=True))
             relmse = float(np.mean([relative_mse(image, reference, inner) for image, reference in compared]))
-            flip = float(np.mean([_flip(reference, image) for image, reference in compared]))
+            flip = float(np.mean([flip_between(reference, image) for image, reference in compared]))
             mib = _stored(room.store) / MIB
             whole.close()
             rows.append(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from lambent.bake.interreflection.series import SMOOTH, SMOOTH_ANGLES
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera
+from lambent.core.metrics import display_exposure, displayed, flip_error
 from lambent.core.plain import triple
 from lambent.materials.document import Material
 from lambent.materials.factored.albedo import albedo
@@ -18,7 +21,7 @@ from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store
 
 KINDS = ("bands", "colours", "widths")
-STEPS = 16  # of a curve of random steps
+STEPS, SMOOTH_STEPS = 16, SMOOTH  # of a curve of random steps; over angles without narrow peaks
 WHITEST = 0.8  # albedo of what is random
 
 
@@ -43,11 +46,16 @@ def setting(kind: str, material: Material, rng: np.random.Generator) -> Editable
 
 
 def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
-    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets."""
+    """Curves of random steps, about as large as they were: a narrow lobe might be even over the bands it meets.
+
+    Steps are as wide as bands, or as several.
+    """
     curves = {}
+    over = {factor.curve: factor.over for term in editable.terms for factor in term.factors}
     for name, curve in editable.curves.items():
-        steps = rng.random((STEPS, 3)) * 2 * curve.values.mean(axis=0)
-        curves[name] = Curve(steps[np.minimum(np.arange(KNOTS + 1) * STEPS // KNOTS, STEPS - 1)])
+        count = STEPS if over.get(name, "theta_o") not in SMOOTH_ANGLES else SMOOTH_STEPS
+        steps = rng.random((count, 3)) * 2 * curve.values.mean(axis=0)
+        curves[name] = Curve(steps[np.minimum(np.arange(KNOTS + 1) * count // KNOTS, count - 1)])
     return replace(editable, curves=curves)
 
 
@@ -64,6 +72,27 @@ def relative_mse(image: Floats, reference: Floats, shown: Flags) -> float:
     """Mean of (a - b)^2 / (b^2 + a hundredth of the squared mean) over the pixels that are shown."""
     a, b = image[shown], reference[shown]
     return float(np.mean((a - b) ** 2 / (b**2 + 0.01 * b.mean() ** 2)))
+
+
+def flip_between(reference: Floats, image: Floats, shown: Flags | None = None) -> float:
+    """Mean FLIP; of pixels that are `shown`, where the others are alike in both."""
+    exposure_ev = display_exposure(reference)
+    if shown is None:
+        return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev)).mean())
+    image = np.where(shown[..., None], image, reference)
+    return float(flip_error(displayed(reference, exposure_ev), displayed(image, exposure_ev))[shown].mean())
+
+
+def summed_up(errors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Means over settings, FLIP and relMSE of each kind, and of the worst; setting k is of kind k modulo `KINDS`."""
+    means = {key: np.mean([one[key] for one in errors]) for key in errors[0]}
+    kinds = {
+        f"{key}_{kind}": np.mean([one[key] for one in errors[k :: len(KINDS)]])
+        for k, kind in enumerate(KINDS[: len(errors)])
+        for key in ("flip", "flip_limit", "relmse_limit")
+    }
+    worst = {f"{key}_worst": max(one[key] for one in errors) for key in ("flip", "flip_limit", "relmse_limit")}
+    return {key: float(f"{value:.3g}") for key, value in {**means, **kinds, **worst}.items()}
 
 
 def interior(store: Store, camera: Camera, size: tuple[int, int]) -> Flags:

@@ -2,8 +2,9 @@
 
 A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of a frozen dataclass of its
 own), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also
-takes `inputs`; if it compares with published figures, `against`. Names, rows and fields are those of
-docs/performance.md; times are medians of at least five runs taken in turns, their spread beside them.
+takes `inputs`; if it compares with published figures, `against`; if it draws settings at random, `settings`. Names,
+rows and fields are those of docs/performance.md; times are medians of at least five runs taken in turns, their spread
+beside them.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ def run_bench(
     *,
     inputs: Sequence[Path] = (),
     against: Sequence[Path] = (),
+    settings: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run one bench; the report holds bench, machine, inputs, rows and summary, ready for JSON.
@@ -46,7 +48,7 @@ def run_bench(
     Raises
     ------
     UserError
-        Where there is no such bench, or an input cannot be read or is not wanted.
+        Where there is no such bench, an input cannot be read, or an option is not one of this bench.
     """
     files = [*inputs, *against]
     for path in files:
@@ -54,10 +56,13 @@ def run_bench(
             raise UserError("input does not exist", file=path)
     found = benches()
     module = found[known("bench", name, found)]
-    options = {key: list(paths) for key, paths in (("inputs", inputs), ("against", against)) if paths}
+    options: dict[str, Any] = {key: list(paths) for key, paths in (("inputs", inputs), ("against", against)) if paths}
+    options |= {"settings": settings} if settings is not None else {}
     refused = options.keys() - inspect.signature(module.run).parameters.keys()
     if "inputs" in refused:
         raise UserError("this bench reads no inputs", got=inputs[0])
+    if "settings" in refused:
+        raise UserError("this bench draws no settings at random", field="--settings", got=name)
     if refused:
         raise UserError("this bench compares with nothing published", field="--against", got=name)
     if isinstance(effort, str):

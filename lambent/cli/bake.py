@@ -57,6 +57,9 @@ def command(
     fixed: Annotated[
         list[str] | None, typer.Option(help="Of interreflections: a material that is not edited. Repeatable.")
     ] = None,
+    diffuse_seen: Annotated[
+        bool, typer.Option("--diffuse-seen", help="Of interreflections: surfaces seen in others are diffuse.")
+    ] = False,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
     ] = None,
@@ -78,7 +81,7 @@ def command(
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
     for name in fixed or ():
         known("material", name, what.materials, field="--fixed")
-    bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()))
+    bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()), diffuse_seen)
     with progress_bar() as progress, _workers(workers, cluster) as shared:
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,

@@ -17,6 +17,9 @@ def command(
     against: Annotated[
         list[Path] | None, typer.Option(help="Published parameters (.fit) to compare with (fit). Repeatable.")
     ] = None,
+    settings: Annotated[
+        int | None, typer.Option(help="Random settings of materials in each row (gi-edit), 20 unless --quick.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Measure, and print the rows with the machine they were measured on.
@@ -27,7 +30,9 @@ def command(
 
     with progress_bar() as progress:
         effort = "quick" if quick else "full"
-        report = run_bench(name, effort, inputs=input_ or (), against=against or (), progress=progress)
+        report = run_bench(
+            name, effort, inputs=input_ or (), against=against or (), settings=settings, progress=progress
+        )
     names = list(dict.fromkeys(key for row in report["rows"] for key in row))
     rows = [names, *([words(row.get(key, "")) for key in names] for row in report["rows"])]
     summary = [(key, words(value)) for key, value in {**report["machine"], **report["summary"]}.items()]

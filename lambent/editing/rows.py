@@ -81,7 +81,12 @@ class DensePairs:
 @lru_cache(maxsize=256)
 def coefficients_of(curve: Curve, count: int) -> Floats:
     """(count, 3) wavelets of a curve: what rows are multiplied by."""
-    wavelets = transformed(curve.band_means(count))
+    return wavelets_of(curve.band_means(count))
+
+
+def wavelets_of(means: Floats) -> Floats:
+    """(count, 3) wavelets of coefficients of bands."""
+    wavelets = transformed(means)
     wavelets[np.abs(wavelets) < NOTHING * np.abs(wavelets).max()] = 0.0
     wavelets.flags.writeable = False
     return wavelets

@@ -14,7 +14,7 @@ from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.shared_exponent import unpacked_rgb
-from lambent.editing.interreflection.powers import second_coefficients
+from lambent.editing.interreflection.powers import bands_of, second_coefficients
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.curve import KNOTS, Curve
@@ -74,17 +74,17 @@ def picture(
     for tile in tiles:
         *_, name, term, place = tile.name.split("/")
         array, points = store.read(tile.name), tile.meta["points"]
-        counts, rest = array[:points], array[points:]
+        entries, rest = array[:points], array[points:]
         codes, light = rest[: len(rest) // 2], unpacked_rgb(rest[len(rest) // 2 :]) * tile.meta["unit"]
-        coefficients = np.ones((1, 3))
-        for curve, count in tile.meta["curves"]:
-            means = materials[name].curves[curve].band_means(count)
-            coefficients = (coefficients[:, None] * means[None]).reshape(-1, 3)
-        scale = np.ones(3) if tile.meta["term"] < 0 else np.array(materials[name].terms[int(term)].scale)
+        scale, coefficients = np.ones(3), np.ones((1, 3))
+        if tile.meta["term"] >= 0:
+            shown = materials[name].terms[int(term)]
+            counts = tuple(count for _, count in tile.meta["curves"])
+            scale, coefficients = np.array(shown.scale), bands_of(shown.factors, counts, materials[name])
         tail, band = np.divmod(codes, len(coefficients))
         mine = np.flatnonzero(worn == name)
         first = int(place) * store.artefact(tile.name.rpartition("/")[0] + "/0").meta["points"]  # the last is shorter
-        at = np.repeat(mine[first : first + points], counts)
+        at = np.repeat(mine[first : first + points], entries)
         np.add.at(total, at, light * weights[tail] * coefficients[band] * scale)
     return total
 

@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bench.gi_edit import CASES, QUICK, run
-from lambent.bench.gi_edit_states import KINDS, WHITEST, relative_mse, setting
+from lambent.bench.gi_edit import CASES, FULL, QUICK, run
+from lambent.bench.gi_edit_states import KINDS, WHITEST, flip_between, relative_mse, setting, summed_up
+from lambent.bench.registry import run_bench
+from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.of_lobes import of_material
@@ -27,6 +29,8 @@ def test_rows_of_a_scene_and_of_its_series() -> None:
     assert row["stored_mib"] >= 0 and row["memory_mib"] > 0 and 0 < row["share_not_zero"] < 1
     assert row["freeze_seconds"] > 0 and 0 < row["frame_ms"] <= row["frame_worst_ms"]
     assert 0 < row["flip"] < 0.3 and 0 < row["noise_flip"] < 0.3 and 0 < row["relmse"] < 1
+    assert 0 < row["opened_flip"] < 0.3 and row["settings"] == 3
+    assert all(row["flip_worst"] >= row[f"flip_{kind}"] > 0 for kind in KINDS)
     close, slow = row["rival_flip"] <= row["flip"] + 1e-4, isinstance(row["rival_seconds"], str)
     assert close != slow, "either it came as close, or it says how long it tried"
     assert [one["series"] for one in compared] == ["64,1", "16,8"]
@@ -55,3 +59,28 @@ def test_relative_errors() -> None:
     shown = np.array([[True, True], [False, False]])
     image = np.where(shown[..., None], 1.1, 50.0)
     assert relative_mse(image, reference, shown) == pytest.approx(0.01 / 1.01)
+
+
+def test_edges_of_objects_do_not_count_inside() -> None:
+    rng = np.random.default_rng(0)
+    reference = rng.uniform(0.2, 0.8, (24, 24, 3))
+    shown = np.ones((24, 24), bool)
+    shown[:, 11:13] = False
+    image = reference.copy()
+    image[:, 11:13] = 5.0
+    assert flip_between(reference, image) > 0.05 and flip_between(reference, image, shown) == 0.0
+
+
+def test_means_over_settings_and_the_worst() -> None:
+    errors = [{"flip": 0.1 * k, "flip_limit": 0.0, "relmse_limit": 0.01 * k} for k in range(1, 7)]
+    found = summed_up(errors)
+    assert found["flip"] == pytest.approx(0.35) and found["flip_worst"] == pytest.approx(0.6)
+    assert [found[f"flip_{kind}"] for kind in KINDS] == pytest.approx([0.25, 0.35, 0.45])
+    assert found["relmse_limit_worst"] == pytest.approx(0.06)
+
+
+def test_settings_are_counted() -> None:
+    assert FULL.settings == 20 and QUICK.settings < 20
+    for mistake, name in ((0, "gi-edit"), (3, "fit")):
+        with pytest.raises(UserError, match="--settings"):
+            run_bench(name, "quick", settings=mistake)

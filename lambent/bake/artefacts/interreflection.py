@@ -15,6 +15,7 @@ import numpy as np
 from lambent.bake.artefacts.view_points import points_key
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
+from lambent.bake.interreflection.as_baked import SCATTERING_TEXTURES, shapes_of, state_of
 from lambent.bake.interreflection.series import Bins, bins_of, tails_of, worn
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
 from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inputs
@@ -28,7 +29,7 @@ KIND = "interreflection"
 NEEDS = ("view_points",)
 OF_VIEWS = True
 ON_REQUEST = True
-REVISION = 1
+REVISION = 2
 POINTS = 1 << 12  # of a tile
 FIRST_PASS, LONGEST_PASS = 16, 1 << 16  # samples
 
@@ -62,7 +63,7 @@ def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
     bounces, editables, scene = context.bounces, _editables(context), context.in_views
     tails, bins = tails_of(editables, bounces), bins_of(editables, bounces)
-    work = TileTracer(scene, tails, bins, context.seed, context.view_tracer)
+    work = TileTracer(scene, tails, bins, context.seed, context.view_tracer, bounces.diffuse_seen)
     for view in context.views:
         _put_tails(context, view)
     samples = FIRST_PASS
@@ -117,7 +118,7 @@ def parts(context: BakeContext, view: View) -> Iterator[Part]:
     textures: Any = texture_inputs(context.in_views, "diffuse", "specular")
     rough: Any = texture_inputs(context.in_views, "roughness")
     for material, bins in bins_of(_editables(context), context.bounces).items():
-        angles = [(term.fixed, [n for _, n in factors]) for term, factors in bins.terms] or repr(bins.editable)
+        angles = [(term.fixed, [n for _, n in factors]) for term, factors in bins.terms] or state_of(bins.editable)
         inputs = [textures.get(material), rough.get(material) if any(map(varies, bins.editable.terms)) else None]
         yield Part(view, material, bins, key_of(KIND, REVISION, key, angles, inputs))
 
@@ -161,15 +162,20 @@ def _put_tails(context: BakeContext, view: View) -> None:
 
 def _series_key(context: BakeContext, view: View) -> str:
     """The key of all that tiles depend on, but the material of their points."""
-    scene, bounces = context.in_views, context.bounces
-    fixed = [
-        [m, repr(context.editable(m)), scene.materials[m].model_dump_json()] for m in worn(scene) if m in bounces.fixed
-    ]
-    lights, tails = light_inputs(scene), tails_of(_editables(context), bounces).said()
+    scene, bounces, editables = context.in_views, context.bounces, _editables(context)
+    lights, tails = light_inputs(scene), tails_of(editables, bounces).said()
     return key_of(
-        KIND, REVISION, points_key(context, view), geometry_inputs(scene), lights, fixed, tails,
+        KIND, REVISION, points_key(context, view), geometry_inputs(scene), lights, _as_baked(context), tails,
         context.seed,
     )  # fmt: skip
+
+
+def _as_baked(context: BakeContext) -> list[Any]:
+    """The state of the materials whose BRDFs paths know: not of those that scatter by the cosine."""
+    scene, editables, bounces = context.in_views, _editables(context), context.bounces
+    known = bounces.fixed | (set() if bounces.diffuse_seen else shapes_of(scene, editables).keys())
+    textures: Any = texture_inputs(scene, *SCATTERING_TEXTURES)
+    return [[name, state_of(one), textures.get(name)] for name, one in editables.items() if name in known]
 
 
 def _editables(context: BakeContext) -> dict[str, Editable]:

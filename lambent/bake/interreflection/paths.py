@@ -1,13 +1,14 @@
-"""Paths that do not know the BRDFs: what light they bring to the pixel's surface, and over which tail.
+"""Paths that do not know the edits: what light they bring to the pixel's surface, and over which tail.
 
-A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos: they scatter by
-the cosine, which cancels, so the path carries 1 until a light is seen. Lights are sampled at every surface and met by
-the path as well, balanced (Veach 1997). Surfaces that are not edited scatter by their own BRDF, in a slot of albedo 1.
+A path leaves the point that a pixel shows and meets surfaces that count by their equivalent albedos. Lambertian ones
+scatter by the cosine, which cancels, so the path carries 1 until a light is seen; others by their BRDF as it is baked
+over its albedo (`as_baked`). Lights are sampled at every surface and met by the path as well, balanced (Veach 1997).
+Surfaces that are not edited scatter by their own BRDF, in a slot of albedo 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +21,11 @@ from lambent.bake.interreflection import directions
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.view_points import ViewPoints
+from lambent.core.arrays import Floats
 from lambent.store.tails import FIXED, Tails
 
 NONE = 255  # slot of a side that scatters nothing
+COSINE, BAKED, FIXED_BRDF = 0, 1, 2  # what a surface scatters by: 1/pi, its BRDF as baked over its albedo, its BRDF
 WAYS = 2  # in which a path gets its light: from a light that was sampled, and from one that it met
 
 
@@ -37,8 +40,10 @@ class Surfaces:
         Number of the object by that of Mitsuba's shape.
     slots : (objects, 2) int
         Slot of each object for light that is reflected and that is transmitted, or NONE.
-    fixed : bool
-        Whether some objects have the slot of materials that are not edited.
+    scatters : (objects,) uint32
+        COSINE, BAKED or FIXED_BRDF.
+    factors : (objects, 2 sides, 2, 3) float32
+        `as_baked.over_albedo` of each object; of one that is not edited, such that f stays.
     worn, material : tuple of str, (objects,) int
         Names of the materials, and which of them each object has.
     """
@@ -46,13 +51,16 @@ class Surfaces:
     scene: Any
     object_numbers: Any
     slots: np.ndarray
-    fixed: bool
+    scatters: np.ndarray
+    factors: np.ndarray
     worn: tuple[str, ...]
     material: np.ndarray
 
     @classmethod
-    def of(cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails) -> Surfaces:
-        """Of objects by their materials."""
+    def of(
+        cls, scene: Any, object_numbers: Any, worn: Sequence[str], tails: Tails, shapes: Mapping[str, Floats]
+    ) -> Surfaces:
+        """Of objects by their materials; `shapes` as of `as_baked.shapes_of`."""
         number = {slot: k for k, slot in enumerate(tails.slots)}
         edited = {material for material, side in tails.slots if side != FIXED}
         fixed = number.get(("", FIXED), NONE)
@@ -64,8 +72,15 @@ class Surfaces:
             for material in worn
         ]
         names, material = np.unique(worn, return_inverse=True)
-        some_fixed = any(row[0] == fixed != NONE for row in rows)
-        return cls(scene, object_numbers, np.array(rows, np.uint32), some_fixed, tuple(map(str, names)), material)
+        scatters = [
+            (BAKED if name in shapes else COSINE) if name in edited or fixed == NONE else FIXED_BRDF for name in worn
+        ]
+        as_it_is = np.broadcast_to(np.array([[1.0], [0.0]]), (2, 2, 3))
+        factors = [shapes[name] if how == BAKED else as_it_is for name, how in zip(worn, scatters, strict=True)]
+        return cls(
+            scene, object_numbers, np.array(rows, np.uint32), np.array(scatters, np.uint32),
+            np.array(factors, np.float32), tuple(map(str, names)), material,
+        )  # fmt: skip
 
 
 @dataclass
@@ -152,7 +167,8 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
         mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 0])), mi.UInt32(np.ascontiguousarray(surfaces.slots[:, 1])),
         mi.UInt32(np.concatenate(orders).astype(np.uint32)), mi.UInt32(begin.astype(np.uint32)),
         dr.opaque(mi.UInt32, len(tails.slots)), dr.opaque(mi.UInt32, tails.most_hits),
-        rays.has_holes(surfaces.scene), surfaces.fixed, bool((surfaces.slots[:, 1] != NONE).any()), slow,
+        rays.has_holes(surfaces.scene), bool(surfaces.scatters.any()), mi.UInt32(surfaces.scatters),
+        mi.Float(surfaces.factors.ravel()), bool((surfaces.slots[:, 1] != NONE).any()), slow,
         mi.UInt32(surfaces.material.astype(np.uint32)), material, at_second,
     )  # fmt: skip
     weight = dr.select((pdf > 0) & ~passes, dr.rcp(dr.maximum(pdf, 1e-20)), 0.0)
@@ -164,8 +180,8 @@ def trace(surfaces: Surfaces, points: ViewPoints, sides: np.ndarray, tails: Tail
 
 @dr.syntax
 def _follow(  # type: ignore[no-untyped-def]
-    scene, sampler, ray, active, light, objects, reflect, transmit, numbers, begins, members, most, holes, fixed,
-    sheets, slow, materials, material, at_second,
+    scene, sampler, ray, active, light, objects, reflect, transmit, numbers, begins, members, most, holes, shaped,
+    scatters, factors, sheets, slow, materials, material, at_second,
 ):  # fmt: skip
     """Write the light of all path lengths, entry WAYS (hits - 2) + way of each sample. Returns bits of what arrived."""
     width = dr.width(ray.o)
@@ -198,16 +214,17 @@ def _follow(  # type: ignore[no-untyped-def]
         up = dr.select(dr.dot(up, ray.d) > 0, -up, up)
         both = (slot != NONE) & (slot_through != NONE)
         through = (slot == NONE) | (both & (sampler.next_1d(active) < 0.5))
-        is_fixed = mi.Bool(False)
-        if dr.hint(fixed, mode="scalar"):
-            is_fixed = slot == members - 1
+        how = mi.UInt32(COSINE)
+        if dr.hint(shaped, mode="scalar"):
+            how = dr.gather(mi.UInt32, scatters, shape, active)
 
         by_bands = mi.Bool(False)
         frame = mi.Frame3f(up)
         if dr.hint(slow, mode="scalar"):
-            by_bands = (depth == 1) & ~is_fixed
+            by_bands = (depth == 1) & (how != FIXED_BRDF)
             frame = _brushed(si, up, active & by_bands)
             sides = directions.Sides(dr.select(both, 0.5, dr.select(slot == NONE, 1.0, 0.0)), mi.Float(0.0))
+        by_own = (how != COSINE) & ~by_bands
 
         # A light that is sampled.
         lit, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, active)
@@ -216,10 +233,10 @@ def _follow(  # type: ignore[no-untyped-def]
         slot_lit = dr.select(behind, slot_through, slot)
         f = mi.Color3f(dr.select(slot_lit != NONE, dr.abs(cosine) / dr.pi, 0.0))
         pdf_lit = dr.abs(cosine) / dr.pi * dr.select(both, 0.5, 1.0)
-        if dr.hint(fixed, mode="scalar"):
-            known, pdf_known = si.bsdf(ray).eval_pdf(ctx, si, si.to_local(lit.d), active & is_fixed)
-            f, pdf_lit = dr.select(is_fixed, known, f), dr.select(is_fixed, pdf_known, pdf_lit)
-            slot_lit = dr.select(is_fixed, slot, slot_lit)
+        if dr.hint(shaped, mode="scalar"):
+            known, pdf_known = si.bsdf(ray).eval_pdf(ctx, si, si.to_local(lit.d), active & by_own)
+            known = _over_albedo(known, factors, shape, behind, active & by_own & (slot_lit != NONE))
+            f, pdf_lit = dr.select(by_own, known, f), dr.select(by_own, pdf_known, pdf_lit)
         if dr.hint(slow, mode="scalar"):
             back = frame.to_local(-ray.d)
             seen = frame.to_local(lit.d)
@@ -230,7 +247,7 @@ def _follow(  # type: ignore[no-untyped-def]
                 dr.scatter(at_second[c], back[c], index, active & by_bands)
                 dr.scatter(at_second[3 + c], seen[c], index, active & by_bands)
         wrong = (dr.dot(si.n, lit.d) * dr.dot(si.n, ray.d) > 0) != behind
-        shines = active & (lit.pdf > 0) & (dr.max(f) > 0) & (is_fixed | ~wrong)
+        shines = active & (lit.pdf > 0) & (dr.max(f) > 0) & (by_own | ~wrong)
         value *= throughput * f * dr.select(lit.delta, 1.0, lit.pdf / (lit.pdf + pdf_lit))
         shines &= dr.max(value) > 0
         shines &= ~rays.hidden(scene, si.p, si.n, lit.p, shines, holes)
@@ -244,11 +261,11 @@ def _follow(  # type: ignore[no-untyped-def]
         pdf = local.z / dr.pi * dr.select(both, 0.5, 1.0)
         down = dr.select(through, -1.0, 1.0)
         d = frame.to_world(mi.Vector3f(local.x, local.y, local.z * down))
-        active &= is_fixed | ((slot != NONE) | (slot_through != NONE))
-        active &= is_fixed | by_bands | (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * down < 0)
+        active &= (slot != NONE) | (slot_through != NONE)
+        active &= by_own | by_bands | (dr.dot(si.n, d) * dr.dot(si.n, ray.d) * down < 0)
         direct = mi.Bool(False)
-        throughput *= dr.select(both & ~is_fixed, 2.0, 1.0)
-        order = _and(order, dr.select(through & ~is_fixed, slot_through, slot), members, depth, slow)
+        throughput *= dr.select(both & ~by_own, 2.0, 1.0)
+        slot_on = dr.select(through, slot_through, slot)
         if dr.hint(slow, mode="scalar"):
             wi, density = directions.sampled(
                 back, sides, sampler.next_1d(active), sampler.next_1d(active), sampler.next_2d(active)
@@ -260,13 +277,18 @@ def _follow(  # type: ignore[no-untyped-def]
             active &= ~by_bands | goes
             for c in range(3):
                 dr.scatter(at_second[6 + c], wi[c], index, active & by_bands)
-        if dr.hint(fixed, mode="scalar"):
-            bs, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(), sampler.next_2d(), active & is_fixed)
-            d = dr.select(is_fixed, si.to_world(bs.wo), d)
-            pdf = dr.select(is_fixed, bs.pdf, pdf)
-            direct = is_fixed & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            throughput *= dr.select(is_fixed, weight, mi.Color3f(1.0))
-            active &= ~is_fixed | ((bs.pdf > 0) & (dr.max(weight) > 0))
+        if dr.hint(shaped, mode="scalar"):
+            bs, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(), sampler.next_2d(), active & by_own)
+            d = dr.select(by_own, si.to_world(bs.wo), d)
+            below = dr.dot(d, up) < 0
+            slot_on = dr.select(by_own, dr.select(below, slot_through, slot), slot_on)
+            active &= ~by_own | ((bs.pdf > 0) & (slot_on != NONE))
+            weight = _over_albedo(weight, factors, shape, below, active & by_own)
+            pdf = dr.select(by_own, bs.pdf, pdf)
+            direct = by_own & mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            throughput *= dr.select(by_own, weight, mi.Color3f(1.0))
+            active &= ~by_own | (dr.max(weight) > 0)
+        order = _and(order, slot_on, members, depth, slow)
         origin = mi.SurfaceInteraction3f(at)
         ray = rays.leaving(scene, si.p, si.n, d)
         depth += 1
@@ -277,6 +299,13 @@ def _and(order: Any, slot: Any, members: Any, depth: Any, slow: bool) -> Any:
     """The order with one slot more; a second surface that counts by bands has none."""
     longer = order * members + slot
     return dr.select(depth == 1, order, longer) if slow else longer
+
+
+def _over_albedo(value: Any, factors: Any, shape: Any, below: Any, active: Any) -> Any:
+    """f / d of f, or 0 where it is not `active`: `as_baked.over_albedo`."""
+    at = 4 * shape + dr.select(below, mi.UInt32(2), mi.UInt32(0))
+    own, brightest = (dr.gather(mi.Color3f, factors, at + k, active) for k in (0, 1))
+    return dr.select(own > 0, value * own, dr.sum(value * brightest))
 
 
 def _brushed(si: Any, up: Any, active: Any) -> Any:

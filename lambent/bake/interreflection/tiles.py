@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
+from lambent.bake.interreflection.as_baked import shapes_of
 from lambent.bake.interreflection.series import Bins
 from lambent.bake.tiles import seed_of, slices
 from lambent.core.shared_exponent import LARGEST, packed_rgb, unpacked_rgb
@@ -92,15 +93,25 @@ class Job:
 
 
 class TileTracer:
-    """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first."""
+    """Traces jobs, in this process or, pickled, in another: Mitsuba's scene is made where it is called first.
+
+    A `tracer` that is given has the materials of `bins`; `diffuse_seen` is that of `Bounces`.
+    """
 
     def __init__(
-        self, scene: Scene, tails: Tails, bins: Mapping[str, Bins], seed: int, tracer: ViewTracer | None = None
+        self,
+        scene: Scene,
+        tails: Tails,
+        bins: Mapping[str, Bins],
+        seed: int,
+        tracer: ViewTracer | None = None,
+        diffuse_seen: bool = False,
     ) -> None:
         self.scene, self.tails, self.bins, self.seed, self._tracer = scene, tails, bins, seed, tracer
+        self._diffuse_seen = diffuse_seen
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TileTracer, (self.scene, self.tails, self.bins, self.seed)
+        return TileTracer, (self.scene, self.tails, self.bins, self.seed, None, self._diffuse_seen)
 
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
@@ -147,9 +158,11 @@ class TileTracer:
         from lambent.bake.interreflection.paths import Surfaces
         from lambent.bake.transport.view_tracer import ViewTracer
 
-        tracer = self._tracer = self._tracer or ViewTracer(self.scene)  # which its scene needs
+        editables = {name: bins.editable for name, bins in self.bins.items()}
+        tracer = self._tracer = self._tracer or ViewTracer(self.scene, editables)  # which its scene needs
         worn = [o.material for o in self.scene.objects]
-        return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails)
+        shapes = {} if self._diffuse_seen else shapes_of(self.scene, editables)
+        return Surfaces.of(tracer.scene, tracer.object_numbers, worn, self.tails, shapes)
 
     @cached_property
     def _seconds(self) -> list[SecondTerm]:

@@ -44,7 +44,7 @@ class Trial:
     """Measures a view. `shown` are the points of each material."""
 
     def __init__(self, scene: Scene, view: View, editables: Mapping[str, Editable]) -> None:
-        self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene)
+        self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene, editables)
         self._points = self._tracer.points(view)
         worn = np.array([o.material for o in scene.objects])[self._points.object]
         self._at = {name: np.random.default_rng(0).permutation(np.flatnonzero(worn == name)) for name in editables}
@@ -120,7 +120,7 @@ class Trial:
 
     def _work(self, bounces: Bounces) -> TileTracer:
         tails, bins = tails_of(self.editables, bounces), bins_of(self.editables, bounces)
-        return TileTracer(self.scene, tails, bins, 0, self._tracer)
+        return TileTracer(self.scene, tails, bins, 0, self._tracer, bounces.diffuse_seen)
 
 
 def _repeated(tile: Tile, points: int) -> Tile:

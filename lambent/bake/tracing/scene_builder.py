@@ -77,9 +77,9 @@ class SceneBuilder:
         edited: Mapping[str, Editable] | None = None,
     ) -> None:
         register_material_plugin()
-        self.scene, self.measured = scene, measured or {}
+        self.scene, self.measured, self.edited = scene, measured or {}, edited or {}
         tables = {name: mi.load_dict(table_dict(grid)) for name, grid in self.measured.items()}
-        for name, made in (edited or {}).items():
+        for name, made in self.edited.items():
             tables[name] = mi.load_dict(edited_dict(scene.materials[name], made, scene.textures.get(name)))
         # Equal materials share a BSDF: each one costs every kernel a function of its own.
         bsdfs: dict[object, Any] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any
@@ -11,22 +12,28 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.interreflection.as_baked import unlike_documents
 from lambent.bake.tracing.rays import array_of, has_holes, intersect, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.bake.transport.lights import Samples, environment_rows, environment_samples, scene_lights
 from lambent.bake.transport.view_points import ViewPoints, view_points
 from lambent.bake.view import View
 from lambent.core.camera import pixel_rays
+from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
 from lambent.scenes.triangle_lights import TriangleLights
 
 
 class ViewTracer:
-    """A scene for Mitsuba, whose views are taken apart into points."""
+    """A scene for Mitsuba, whose views are taken apart into points.
 
-    def __init__(self, scene: Scene) -> None:
-        self._builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)))
+    Surfaces scatter by their materials' terms and curves in `editables` where those are not of the scene's documents.
+    """
+
+    def __init__(self, scene: Scene, editables: Mapping[str, Editable] | None = None) -> None:
+        edited = unlike_documents(scene, editables or {})
+        self._builder = SceneBuilder(replace(scene, textures=prepared(scene.textures)), edited=edited)
         self.scene: Any = self._builder.build()
         self.points = cache(self._points)
         self.lights = cache(self._lights)
@@ -57,7 +64,7 @@ class ViewTracer:
         scene = self._builder.scene
         if not scene.lights and not any(any(o.emission) for o in scene.objects):
             return None
-        return SceneBuilder(replace(scene, environment=None)).build()
+        return SceneBuilder(replace(scene, environment=None), edited=self._builder.edited).build()
 
     def environment_rows(self, rows: int) -> NDArray[np.float32]:
         """(rows, 2 rows, 3) lat-long picture of the environment, black where there is none."""

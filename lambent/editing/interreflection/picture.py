@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from lambent.editing.canvas import Canvas, Layer, viewed
 from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
 from lambent.editing.interreflection.folding import pixels, rows
-from lambent.editing.interreflection.powers import Powers, bands_of, powers
+from lambent.editing.interreflection.powers import Powers, bands_of, means_of, powers
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
 from lambent.editing.products import Pixels
-from lambent.editing.rows import Rows, coefficients_of
+from lambent.editing.rows import Rows, wavelets_of
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
@@ -153,7 +153,7 @@ class _TermPicture:
         idle = np.ones((1, 3))
         row = np.zeros(1, np.int64)
         for k, (factor, count) in enumerate(zip(term.factors, light.counts, strict=True)):
-            means = np.ones((count, 3)) if k == self._at else material.curves[factor.curve].band_means(count)
+            means = np.ones((count, 3)) if k == self._at else means_of(factor, material.curves[factor.curve], count)
             idle = (idle[:, None] * means[None]).reshape(-1, 3)
             row = (row[:, None] + (np.arange(count) if k == self._at else np.zeros(count, np.int64))).reshape(-1)
         count = light.counts[self._at] if light.counts else 1
@@ -180,7 +180,8 @@ class _TermPicture:
             for layer in self.layers:
                 layer.view(viewer)
         if self._factors:
-            wanted = coefficients_of(material.curves[self._factors[self._at].curve], self._counts[self._at])
+            factor = self._factors[self._at]
+            wanted = wavelets_of(means_of(factor, material.curves[factor.curve], self._counts[self._at]))
         else:
             wanted = np.ones((1, 3))
         if not np.array_equal(wanted, self._pictures[0].wanted):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.terms import Editable, Factor
 from lambent.store.tails import FIXED, Tails
 
-# Few bands at second surfaces are wider than peaks, which shine as brightly only if bands keep their light.
+# Bands may be wider than a peak, which shines as brightly only if they keep its light.
 POLAR = ("theta_h", "theta_r")
 
 
@@ -91,17 +92,19 @@ def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floa
             continue
         material = materials[one.material]
         term = material.terms[one.term]
-        parts.append(np.asarray(term.scale) * bands_of(term.factors, one.counts, material, POLAR))
+        parts.append(np.asarray(term.scale) * bands_of(term.factors, one.counts, material))
     return np.concatenate(parts) if parts else np.ones((1, 3))
 
 
-def bands_of(
-    factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable, polar: Collection[str] = ()
-) -> Floats:
-    """(J, 3) coefficients of products of bands, first curve first; those over angles of `polar` are `polar_means`."""
+def bands_of(factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable) -> Floats:
+    """(J, 3) coefficients of products of bands, first curve first."""
     found = np.ones((1, 3))
     for factor, count in zip(factors, counts, strict=True):
-        curve = material.curves[factor.curve]
-        means = curve.polar_means(count) if factor.over in polar else curve.band_means(count)
+        means = means_of(factor, material.curves[factor.curve], count)
         found = (found[:, None] * means[None]).reshape(-1, 3)
     return found
+
+
+def means_of(factor: Factor, curve: Curve, count: int) -> Floats:
+    """(count, 3) coefficients of the bands of a curve."""
+    return curve.polar_means(count) if factor.over in POLAR else curve.band_means(count)
