@@ -96,12 +96,19 @@ def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floa
 
 
 def bands_of(
-    factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable, polar: Collection[str] = ()
+    factors: tuple[Factor, ...],
+    counts: tuple[int, ...],
+    material: Editable,
+    polar: Collection[str] = (),
+    but: int | None = None,
 ) -> Floats:
-    """(J, 3) coefficients of products of bands, first curve first; those over angles of `polar` are `polar_means`."""
+    """(J, 3) coefficients of products of bands, first curve first.
+
+    Curves over angles of `polar` count by `polar_means`; that of the factor `but` counts as 1.
+    """
     found = np.ones((1, 3))
-    for factor, count in zip(factors, counts, strict=True):
+    for k, (factor, count) in enumerate(zip(factors, counts, strict=True)):
         curve = material.curves[factor.curve]
         means = curve.polar_means(count) if factor.over in polar else curve.band_means(count)
-        found = (found[:, None] * means[None]).reshape(-1, 3)
+        found = (found[:, None] * (np.ones_like(means) if k == but else means)[None]).reshape(-1, 3)
     return found

@@ -16,13 +16,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range
+from lambent.core.false_colour import Range, SignedRange
 from lambent.editing.interreflection.stored import Interreflections
 from lambent.editing.interreflection.whole import ALL_HITS, WholePicture
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
-from lambent.viewer.modes.edit.tone import Bytes, displayed
+from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
 
 FADE_S = 0.5
 FRAME_S = 1 / 60
@@ -31,10 +31,15 @@ Materials = Mapping[str, Editable]
 
 @dataclass(frozen=True)
 class Wish:
-    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any."""
+    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any.
+
+    A are other materials, or those of B in `direct` light. With a `difference`, B shows by how much it is above A.
+    """
 
     now: Materials = field(default_factory=dict)
     compared: Materials | None = None
+    direct: bool = False
+    difference: SignedRange | None = None
     view: str = "filmic"
     exposure_ev: float = 0.0
     scale: Range = field(default_factory=Range)
@@ -168,11 +173,14 @@ class Painter:
             self._fade_over(self.frame.radiance)
         radiance = self._image()
         compared = self._image_of(wish.compared, wish.now) if wish.compared is not None else None
+        compared = self._picture.direct_image() if wish.direct else compared
         settled = self._picture.is_settled and self._fade is None and not self._tasks
         how = wish.view, wish.exposure_ev, wish.scale
+        shown, other = displayed(radiance, *how), displayed(compared, *how) if compared is not None else None
+        if compared is not None and wish.difference is not None:
+            shown, other = difference(radiance, compared, wish.difference), None
         self.frame = Frame(
-            self.frame.number + 1 if self.frame else 1, wish, displayed(radiance, *how), radiance,
-            displayed(compared, *how) if compared is not None else None, compared, needed, settled,
+            self.frame.number + 1 if self.frame else 1, wish, shown, radiance, other, compared, needed, settled,
             self._clock() - began_s,
         )  # fmt: skip
 
