@@ -95,19 +95,18 @@ def command(
     edited, changed = _edited(what, output, view or [], edit)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
-    _check_named(what, fixed or [], editable or [])
+    bounced = propose or INTERREFLECTION in (only or ())
+    _check_choice(what, fixed or [], editable or [], merge, bounced)
     bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()))
-    if propose or INTERREFLECTION in (only or ()):
-        with progress_bar() as progress:
+    with progress_bar() as progress, _workers(workers, cluster, unused=propose) as shared:
+        if bounced:
             what, bounces, said = _proposed(
                 what, None if propose else output, bounces, changed, editable or [], merge, edited, progress
             )
-        if propose:
+        if propose or output is None:
             facts: dict[str, Any] = {"proposals": [one.said() for one in said]}
             show(facts, "\n\n".join("\n".join(one.lines()) for one in said), json)
             return
-    assert output is not None
-    with progress_bar() as progress, _workers(workers, cluster) as shared:
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
             light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
@@ -119,7 +118,10 @@ def command(
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
 
 
-def _check_named(scene: Scene, fixed: list[str], editable: list[str]) -> None:
+def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:
+    options = {"--fixed": fixed, "--editable": editable, "--merge": merge}
+    if not bounced and (given := [option for option, value in options.items() if value]):
+        raise UserError("is for interreflections", field=given[0], hint="add --only interreflection")
     for option, names in (("--fixed", fixed), ("--editable", editable)):
         for name in names:
             known("material", name, scene.materials, field=option)
@@ -162,14 +164,14 @@ def _proposed(
     return found[0].merged(scene), found[0].bounces, found
 
 
-def _workers(count: int | None, address: str | None) -> AbstractContextManager[Workers | None]:
+def _workers(count: int | None, address: str | None, unused: bool) -> AbstractContextManager[Workers | None]:
     """Who does the work of interreflections; None: this process."""
-    if count is None and address is None:
+    if count is not None and address is not None:
+        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
+    if unused or (count is None and address is None):
         return nullcontext()
     from lambent.bake.cluster import opened
 
-    if count is not None and address is not None:
-        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
     return opened(count, address)
 
 

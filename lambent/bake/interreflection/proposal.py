@@ -24,6 +24,7 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
+from lambent.scenes.textures import prepared
 from lambent.store.store import MANIFEST, Store
 from lambent.store.tails import FIXED, Tails
 
@@ -204,6 +205,7 @@ def propose(
     """
     engine()  # before Mitsuba is imported
     bounces, given = bounces or Bounces(), editables or {}
+    scene = replace(scene, textures=prepared(scene.textures))  # as in the bake
     alike = same_materials(scene, keep={*bounces.fixed, *given, *kept})
     found = _proposal(scene, view, bounces, given, kept, most_bytes, progress)
     if not (merging and found.reasons and alike):
