@@ -142,7 +142,7 @@ def _proposed(
     """The scene and the bounces as proposed, which stderr says before the bake; or as the store has them."""
     from dataclasses import replace
 
-    from lambent.bake.interreflection.proposal import kept_by, propose_all
+    from lambent.bake.interreflection.proposal import held_by, propose_all
     from lambent.bake.interreflection.series import worn
 
     views, light = edited["views"], edited.get("environment")
@@ -150,10 +150,11 @@ def _proposed(
         raise UserError("no view", field="--view", hint="name a camera, or a session with --edit")
     chosen = bool(bounces.fixed or editable or merge)
     if store is not None and not chosen:
-        held = [kept_by(store, view, bounces.series) for view in views]
-        if held[0] is not None and all(one == held[0] for one in held):
-            say(f"goes on with the materials that the store edits: {', '.join(sorted(held[0]))}")
-            return scene, replace(bounces, fixed=frozenset(worn(scene)) - held[0]), []
+        held = [held_by(store, scene, view, bounces.series) for view in views]
+        if (first := held[0]) is not None and all(one == first for one in held):
+            say(f"goes on with the materials that the store edits: {', '.join(sorted(first.edited))}")
+            scene = first.merged(scene)
+            return scene, replace(bounces, fixed=frozenset(worn(scene)) - first.edited), []
     found = propose_all(
         scene if light is None else replace(scene, environment=light), views, bounces, merging=merge,
         kept=changed.union(editable) - bounces.fixed, editables=edited.get("editables"), progress=progress,

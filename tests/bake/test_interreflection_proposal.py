@@ -15,7 +15,7 @@ from lambent.bake.artefacts import interreflection
 from lambent.bake.bake import bake
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection import paths, trial
-from lambent.bake.interreflection.proposal import Proposal, propose, propose_all, same_materials
+from lambent.bake.interreflection.proposal import Proposal, held_by, propose, propose_all, same_materials
 from lambent.bake.interreflection.trial import Cost, passes
 from lambent.bake.view import View
 from lambent.core.camera import Camera
@@ -23,6 +23,8 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
+from lambent.store.source import worn_in_views
+from lambent.store.store import Store
 from tests.bake.test_interreflection import FROM_ABOVE, corner
 
 VIEW = View(FROM_ABOVE, 48, 48)
@@ -124,6 +126,23 @@ def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(m
     assert tight.same == {"side": "back"} and tight.reasons
     assert tight.edit_bytes <= most or [row.role for row in tight.rows].count("edited") == 1
     assert {o.material for o in tight.merged(twins).objects} == {"floor", "back", "ball", "black"}
+
+
+def test_a_store_goes_on_with_what_was_merged_for_it(tmp_path: Path) -> None:
+    twins = corner({**KINDS, "side": KINDS["back"]})
+    merged = replace(
+        twins, objects=tuple(replace(o, material="back" if o.material == "side" else o.material) for o in twins.objects)
+    )
+    folder, bounces = tmp_path / "s", Bounces((4, 1), 2, frozenset({"ball", "black", "floor"}))
+    assert held_by(folder, twins, VIEW, bounces.series) is None
+    bake(merged, folder, only={"interreflection"}, views=[VIEW], bounces=bounces).close()
+    held = held_by(folder, twins, VIEW, bounces.series)
+    assert held is not None and (held.edited, held.same) == ({"back"}, {"side": "back"})
+    assert held.merged(twins).objects == merged.objects and worn_in_views(Store.open(folder))["side"] == "back"
+    repainted = replace(twins, materials={**twins.materials, "side": KINDS["floor"]})
+    changed = held_by(folder, repainted, VIEW, bounces.series)
+    assert changed is not None and not changed.same, "they no longer look the same"
+    assert held_by(folder, twins, VIEW, (8, 1)) is None
 
 
 def test_the_table_names_every_material_and_the_sums(found: Proposal) -> None:

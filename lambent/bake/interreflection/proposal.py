@@ -25,6 +25,7 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.scenes.textures import prepared
+from lambent.store.source import worn_in_views
 from lambent.store.store import MANIFEST, Store
 from lambent.store.tails import FIXED, Tails
 
@@ -235,15 +236,30 @@ def propose_all(
     return [propose(scene, view, same, kept=edited, merging=False, **more) for view in views]
 
 
-def kept_by(store: Path, view: View, series: Sequence[int]) -> frozenset[str] | None:
-    """Materials that a store's interreflections of a view edit; None where it has none of this series."""
+@dataclass(frozen=True)
+class Held:
+    """What a store's interreflections edit, and which materials were merged for them."""
+
+    edited: frozenset[str]
+    same: Mapping[str, str]
+
+    def merged(self, scene: Scene) -> Scene:
+        """The scene with the materials that are merged."""
+        return _merged(scene, self.same)
+
+
+def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> Held | None:
+    """What a store has of a view; None where it has no interreflections of this series."""
     name = view.name("interreflection", "tails")
-    if not (store / MANIFEST).exists():
+    if not (folder / MANIFEST).exists():
         return None
-    opened = Store.open(store)
-    if name not in opened or opened.artefact(name).meta["series"] != list(series):
+    store = Store.open(folder)
+    if name not in store or store.artefact(name).meta["series"] != list(series):
         return None
-    return frozenset(one for one, side in Tails.of(opened.artefact(name).meta["tails"]).slots if side != FIXED)
+    edited = frozenset(one for one, side in Tails.of(store.artefact(name).meta["tails"]).slots if side != FIXED)
+    worn_then, alike = worn_in_views(store), same_materials(scene)
+    pairs = {(o.material, worn_then.get(o.name, o.material)) for o in scene.objects}
+    return Held(edited, {one: other for one, other in pairs if one != other and alike.get(one) == other})
 
 
 def _proposal(
