@@ -67,7 +67,7 @@ class Range:
         else:
             step = _round_up((self.high - self.low) / 8, slack=0.0)
             found = [step * k for k in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
-        inside = [x for x in found if self.low * (1 - 1e-9) <= x <= self.high * (1 + 1e-9)]
+        inside = [x for x in found if self.low - 1e-9 * abs(self.low) <= x <= self.high * (1 + 1e-9)]
         return inside or [self.low, self.high]
 
 

@@ -72,6 +72,7 @@ def test_differences_have_a_scale_with_black_in_the_middle():
     assert (scale.low, scale.high) == (-50.0, 50.0) and SignedRange.fitting(np.zeros(3)).high > 0
     dark, same, bright = false_colour(np.array([-80.0, 0.0, 80.0]), scale)
     assert same.max() < 0.1 and dark[2] > 0.9 > dark[0] and bright[0] > 0.9 > bright[2]
-    assert 0.0 in scale.marks() and [number(value) for value in (-20, -0.5)] == ["-20", "-0.5"]
+    assert scale.marks() == [-40.0, -20.0, 0.0, 20.0, 40.0] and SignedRange(10.0).marks()[0] == -10.0
+    assert [number(value) for value in (-20, -0.5)] == ["-20", "-0.5"]
     picture = with_scale(np.zeros((300, 200, 3), np.uint8), scale)
     assert picture[40:, 100:, 2].max() > 200 and picture[40:, 100:, 0].max() > 200

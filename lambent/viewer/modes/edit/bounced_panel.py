@@ -22,14 +22,14 @@ def draw_interreflections(bounced: Bounced) -> None:
     if bounced.proposal is not None and bounced.fixed is not None:
         _draw_materials(bounced, bounced.proposal, bounced.fixed)
     imgui.end_disabled()
-    if bounced.baking is None:
-        _draw_costs(bounced)
     wanted = bounced.samples < bounced.wanted
     buttons([
         ("continue" if bounced.samples else "bake", not bounced.on and wanted, bounced.start,
          "in the background; the picture is shown after every pass, with less noise each time"),
         ("stop", bounced.on, bounced.stop, "finished passes stay"),
     ])  # fmt: skip
+    if bounced.baking is None:  # below the buttons, which stay where they are
+        _draw_costs(bounced)
     lines = [bounced.line] if bounced.line else []
     if bounced.samples:
         noise = f", noise {bounced.noise:.1%} of the mean" if bounced.noise is not None else ""
