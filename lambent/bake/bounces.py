@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from lambent.core.errors import UserError
 
@@ -44,6 +46,14 @@ class Bounces:
             )
         if self.samples < 1:
             raise UserError("no samples", field="samples", got=self.samples, expected="at least 1")
+
+    def said(self) -> dict[str, Any]:
+        """For JSON; `Bounces.of` is the inverse."""
+        return {"series": list(self.series), "samples": self.samples, "fixed": sorted(self.fixed)}
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any]) -> Bounces:
+        return cls(tuple(said["series"]), said["samples"], frozenset(said["fixed"]))
 
     @classmethod
     def of_text(cls, text: str) -> tuple[int, ...]:

@@ -13,22 +13,26 @@ from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.methods import LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
-from lambent.cli.console import Json, progress_bar, show, table
+from lambent.cli.console import Json, progress_bar, say, show, table
 from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
+    from lambent.bake.interreflection.proposal import Proposal
     from lambent.bake.workers import Workers
+    from lambent.core.progress import Progress
     from lambent.scenes.scene import Scene
 
     Kind = str
 else:
     Kind = StrEnum("Kind", {name: name for name in names_in(artefacts)})
 
+INTERREFLECTION = "interreflection"
+
 
 def command(
     scene: Annotated[str, typer.Argument(help="scene.toml, glTF, OBJ, Mitsuba XML, or builtin:room.")],
-    output: Annotated[Path, typer.Option("-o", help="Folder of the store.")],
+    output: Annotated[Path | None, typer.Option("-o", help="Folder of the store.")] = None,
     only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and what it needs. Repeatable.")] = None,
     quality: Annotated[QualityName, typer.Option(help="How much work to put in.")] = QualityName.preview,
     resume: Annotated[bool, typer.Option("--resume/--anew", help="Keep what is up to date, or bake it all.")] = True,
@@ -55,10 +59,22 @@ def command(
         int, typer.Option(min=1, help="Of interreflections: paths per pixel, added to those there.")
     ] = 1024,
     fixed: Annotated[
-        list[str] | None, typer.Option(help="Of interreflections: a material that is not edited. Repeatable.")
+        list[str] | None,
+        typer.Option(help="Of interreflections: a material that is not edited, beside those proposed. Repeatable."),
     ] = None,
     diffuse_seen: Annotated[
         bool, typer.Option("--diffuse-seen", help="Of interreflections: surfaces seen in others are diffuse.")
+    ] = False,
+    editable: Annotated[
+        list[str] | None,
+        typer.Option(help="Of interreflections: a material that is edited, whatever is proposed. Repeatable."),
+    ] = None,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Of interreflections: merge materials that look the same, to need less.")
+    ] = False,
+    propose: Annotated[
+        bool,
+        typer.Option("--propose", help="Say what would be edited in interreflections and what it takes; bake nothing."),
     ] = False,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
@@ -71,18 +87,29 @@ def command(
     Example: lambent bake builtin:room -o room.store --quality preview
     Example: lambent bake builtin:teatray -o tray.store --only transport --view front:512x512
     Example: lambent bake builtin:cornell -o box.store --only transport --only interreflection --view front:450x450
+    Example: lambent bake builtin:cornell --view front:450x450 --samples 4096 --propose
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
 
+    if output is None and not propose:
+        raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
     what = load_scene(scene)
-    edited = _edited(what, output, view or [], edit)
+    edited, changed = _edited(what, output, view or [], edit)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
-    for name in fixed or ():
-        known("material", name, what.materials, field="--fixed")
+    bounced = propose or INTERREFLECTION in (only or ())
+    _check_choice(what, fixed or [], editable or [], merge, bounced)
     bounces = Bounces(Bounces.of_text(series), samples, frozenset(fixed or ()), diffuse_seen)
-    with progress_bar() as progress, _workers(workers, cluster) as shared:
+    with progress_bar() as progress, _workers(workers, cluster, unused=propose) as shared:
+        if bounced:
+            what, bounces, said = _proposed(
+                what, None if propose else output, bounces, changed, editable or [], merge, edited, progress
+            )
+        if propose or output is None:
+            facts: dict[str, Any] = {"proposals": [one.said() for one in said]}
+            show(facts, "\n\n".join("\n".join(one.lines()) for one in said), json)
+            return
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
             light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
@@ -94,32 +121,83 @@ def command(
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
 
 
-def _workers(count: int | None, address: str | None) -> AbstractContextManager[Workers | None]:
+def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:
+    options = {"--fixed": fixed, "--editable": editable, "--merge": merge}
+    if not bounced and (given := [option for option, value in options.items() if value]):
+        raise UserError("is for interreflections", field=given[0], hint="add --only interreflection")
+    for option, names in (("--fixed", fixed), ("--editable", editable)):
+        for name in names:
+            known("material", name, scene.materials, field=option)
+    if both := sorted({*fixed} & {*editable}):
+        raise UserError("a material is fixed or edited", field="--editable", got=both[0], hint="leave out --fixed")
+
+
+def _proposed(
+    scene: Scene,
+    store: Path | None,
+    bounces: Bounces,
+    changed: frozenset[str],
+    editable: list[str],
+    merge: bool,
+    edited: dict[str, Any],
+    progress: Progress,
+) -> tuple[Scene, Bounces, list[Proposal]]:
+    """The scene and the bounces as proposed, which stderr says before the bake; or as the store has them."""
+    from dataclasses import replace
+
+    from lambent.bake.interreflection.proposal import held_by, propose_all
+    from lambent.bake.interreflection.series import worn
+
+    views, light = edited["views"], edited.get("environment")
+    if not views:
+        raise UserError("no view", field="--view", hint="name a camera, or a session with --edit")
+    chosen = bool(bounces.fixed or editable or merge)
+    if store is not None and not chosen:
+        held = [held_by(store, scene, view, bounces.series) for view in views]
+        if (first := held[0]) is not None and all(one == first for one in held):
+            say(f"goes on with the materials that the store edits: {', '.join(sorted(first.edited))}")
+            scene = first.merged(scene)
+            return scene, replace(bounces, fixed=frozenset(worn(scene)) - first.edited), []
+    found = propose_all(
+        scene if light is None else replace(scene, environment=light), views, bounces, merging=merge,
+        kept=changed.union(editable) - bounces.fixed, editables=edited.get("editables"), progress=progress,
+    )  # fmt: skip
+    if store is not None:
+        for one in found:
+            say("\n".join(one.lines()))
+    return found[0].merged(scene), found[0].bounces, found
+
+
+def _workers(count: int | None, address: str | None, unused: bool) -> AbstractContextManager[Workers | None]:
     """Who does the work of interreflections; None: this process."""
-    if count is None and address is None:
+    if count is not None and address is not None:
+        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
+    if unused or (count is None and address is None):
         return nullcontext()
     from lambent.bake.cluster import opened
 
-    if count is not None and address is not None:
-        raise UserError("workers are counted or have an address", field="--cluster", hint="leave out --workers")
     return opened(count, address)
 
 
-def _edited(scene: Scene, store: Path, names: list[str], session: Path | None) -> dict[str, Any]:
-    """What `bake` gets for the views of these names, cameras or saved views, and for that of a session."""
+def _edited(
+    scene: Scene, store: Path | None, names: list[str], session: Path | None
+) -> tuple[dict[str, Any], frozenset[str]]:
+    """What `bake` gets for views of these names, cameras or saved views, or of a session, and what it edits."""
     from lambent.bake.view import View, view_named
     from lambent.editing.session import Session
     from lambent.store.views import read_views
 
-    views = [view_named(name, (*read_views(store).cameras, *scene.cameras)) for name in names]
+    saved = read_views(store).cameras if store is not None else ()
+    views = [view_named(name, (*saved, *scene.cameras)) for name in names]
     if session is None:
-        return {"views": views}
+        return {"views": views}, frozenset()
     opened = Session.open(session)
     document = opened.document
     for name in document.materials:
         known("material", name, scene.materials, file=session, field="materials")
+    changed = frozenset(name for name, one in document.materials.items() if one.curves or one.tints)
     return {
         "views": [*views, View(document.camera, *document.size)],
         "editables": {name: opened.original(name) for name in document.materials},
         "environment": opened.environment,
-    }
+    }, changed

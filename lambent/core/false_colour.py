@@ -19,6 +19,12 @@ STOPS = np.array(
         (0.71, 0.80, 0.20), (0.96, 0.75, 0.13), (0.94, 0.45, 0.12), (0.78, 0.12, 0.12),
     ]
 )  # fmt: skip
+SIGNED = np.array(
+    [
+        (0.55, 0.85, 1.00), (0.20, 0.55, 0.95), (0.12, 0.27, 0.60), (0.07, 0.07, 0.07), (0.55, 0.20, 0.07),
+        (0.93, 0.50, 0.12), (1.00, 0.88, 0.50),
+    ]
+)  # fmt: skip
 BELOW, ABOVE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 LEAST, MOST = 1e-4, 1e9  # numbers that a range can hold
 DECADES = 3.0  # of a logarithmic range fitted to an image
@@ -32,6 +38,11 @@ class Range:
     low: float = 1.0
     high: float = 1000.0
     log: bool = True
+
+    @property
+    def stops(self) -> Floats:
+        """Colours at even steps."""
+        return STOPS
 
     def check(self) -> None:
         """`UserError` where no scale can be drawn."""
@@ -56,8 +67,28 @@ class Range:
         else:
             step = _round_up((self.high - self.low) / 8, slack=0.0)
             found = [step * k for k in range(math.ceil(self.low / step), math.floor(self.high / step) + 1)]
-        inside = [x for x in found if self.low * (1 - 1e-9) <= x <= self.high * (1 + 1e-9)]
+        inside = [x for x in found if self.low - 1e-9 * abs(self.low) <= x <= self.high * (1 + 1e-9)]
         return inside or [self.low, self.high]
+
+
+class SignedRange(Range):
+    """Of differences, evenly from -most (light blue) over 0 (black) to most (light orange), and these beyond."""
+
+    def __init__(self, most: float) -> None:
+        super().__init__(-most, most, log=False)
+
+    @property
+    def stops(self) -> Floats:
+        return SIGNED
+
+    def share(self, values: Floats) -> Floats:
+        return np.clip(super().share(values), 0.0, 1.0)
+
+    @classmethod
+    def fitting(cls, values: Floats) -> SignedRange:
+        """A range that holds nearly all differences of an image (but the largest half percent)."""
+        sizes = np.abs(values[np.isfinite(values)])
+        return cls(_round_up(min(max(float(np.percentile(sizes, 99.5)) if sizes.size else 0.0, LEAST), MOST)))
 
 
 def fitting_range(values: Floats, *, log: bool = True) -> Range:
@@ -81,7 +112,7 @@ def fitting_range(values: Floats, *, log: bool = True) -> Range:
 def false_colour(values: Floats, scale: Range) -> Floats:
     """Encoded colours (..., 3) of luminances (...)."""
     share = scale.share(values)
-    colours = np.where((share < 0)[..., None], BELOW, ramp(share))
+    colours = np.where((share < 0)[..., None], BELOW, ramp(share, scale.stops))
     return np.asarray(np.where((share > 1)[..., None], ABOVE, colours))
 
 
@@ -92,9 +123,11 @@ def ramp(share: Floats, stops: Floats = STOPS) -> Floats:
 
 
 def number(value: float) -> str:
-    """A number of the scale as people write it: three digits, no exponent; 0 and less as 0."""
+    """A number of the scale as people write it: three digits, no exponent."""
+    if value < 0:
+        return f"-{number(-value)}"
     digits = max(0, 2 - math.floor(math.log10(value))) if value > 0 else 0
-    text = f"{max(value, 0):.{digits}f}"
+    text = f"{value:.{digits}f}"
     return text.rstrip("0").rstrip(".") if digits else text
 
 

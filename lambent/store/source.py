@@ -69,7 +69,9 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         return scene
     record = scene_record(store)
     if not record.objects:  # a store of edited views alone
-        return replace(scene, materials={**scene.materials, **record.materials})
+        worn = worn_in_views(store)
+        objects = (replace(o, material=worn.get(o.name, o.material)) for o in scene.objects)
+        return replace(scene, objects=tuple(objects), materials={**scene.materials, **record.materials})
     baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
     if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
         _fits(parts, o.mesh.bounds, len(o.mesh.faces)) for parts, o in zip(baked.values(), scene.objects, strict=True)
@@ -81,6 +83,12 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     )
     materials = {**scene.materials, **record.materials}
     return replace(scene, objects=tuple(objects), materials=materials, textures=read_textures(store, record))
+
+
+def worn_in_views(store: Store) -> dict[str, str]:
+    """Materials of objects, by name, as edited views were baked with them: some may have been merged."""
+    found = (a for a in store.artefacts("view_points") if "objects" in a.meta)
+    return {str(name): str(material) for artefact in found for name, material in artefact.meta["objects"]}
 
 
 def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
+from lambent.bake.artefacts import interreflection
 from lambent.bake.bake import bake
 from lambent.bake.bounces import Bounces
-from lambent.bake.interreflection.proposal import Proposal, propose, same_materials
+from lambent.bake.interreflection import paths, trial
+from lambent.bake.interreflection.proposal import Proposal, held_by, propose, propose_all, same_materials
+from lambent.bake.interreflection.trial import Cost, passes
 from lambent.bake.view import View
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
+from lambent.store.source import worn_in_views
+from lambent.store.store import Store
 from tests.bake.test_interreflection import FROM_ABOVE, corner
 
 VIEW = View(FROM_ABOVE, 48, 48)
@@ -47,8 +56,20 @@ def found() -> Proposal:
     return propose(corner(KINDS), VIEW, BOUNCES)
 
 
-def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path) -> None:
-    scene = corner(KINDS)
+def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, counts = corner(KINDS), {"calls": 0, "tiles": 0}
+
+    def count(place: ModuleType, name: str, what: str) -> None:
+        work = getattr(place, name)
+
+        def counted(*args: object) -> Any:
+            counts[what] += 1
+            return work(*args)
+
+        monkeypatch.setattr(place, name, counted)
+
+    count(paths, "trace", "calls")
+    count(interreflection, "_write", "tiles")
     store = bake(scene, tmp_path / "s", only={"interreflection"}, views=[VIEW], bounces=found.bounces)
     tiles = [a for a in store.artefacts("interreflection") if "unit" in a.meta]
     for row in found.rows:
@@ -58,6 +79,9 @@ def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path) ->
         if points > 200:
             entries = sum((a.shape[0] - a.meta["points"]) // 2 for a in mine) / points
             assert entries == pytest.approx(row.entries, rel=0.1)
+    points = [row.points for row in found.rows]
+    assert counts["calls"] == sum(Cost(call_s=1.0).seconds(n, found.bounces) for n in points)
+    assert counts["tiles"] == sum(Cost(tile_s=1.0).seconds(n, found.bounces) for n in points)
     raw = sum(4 * a.shape[0] for a in tiles)
     assert raw == pytest.approx(found.edit_bytes, rel=0.1)
     on_disk = sum(f.stat().st_size for f in (tmp_path / "s").rglob("*") if f.is_file() and f.suffix != ".json")
@@ -65,9 +89,32 @@ def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path) ->
     assert 0 < found.seconds < 300
 
 
-def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bake.interreflection import trial
+def test_seconds_are_of_paths_calls_tiles_and_passes() -> None:
+    assert passes(16) == [16] and passes(100) == [16, 32, 64, 100] and passes(5) == [5]
+    fast = Bounces((16, 1, 1), 16384)
+    of_large_tile = 2 + sum(-(-(after - before) // 256) for before, after in pairwise(passes(16384)) if before > 16)
+    assert Cost(call_s=1.0).seconds(4096, fast) == of_large_tile
+    assert Cost(call_s=1.0).seconds(2 * 4096, fast) == 2 * of_large_tile
+    assert Cost(tile_s=1.0).seconds(4097, fast) == 2 * 11 and Cost(kept_s=1.0).seconds(7, fast) == 7 * 11
+    assert Cost(path_s=1.0).seconds(7, fast) == 7 * 16384
+    slow = replace(fast, series=(64, 16), samples=512)
+    assert Cost(call_s=1.0).seconds(4096, slow) > Cost(call_s=1.0).seconds(4096, replace(fast, samples=512))
 
+
+def test_what_the_user_wants_to_edit_is_kept_and_views_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trial, "TIMED", 64)
+    monkeypatch.setattr(trial, "MANY", 64)
+    scene, quick = with_small_things(), replace(BOUNCES, samples=16)
+    tight = propose(scene, VIEW, quick, kept={"bead", "ball"}, most_bytes=1)
+    assert tight.edited == {"bead", "ball"} and {"floor", "back"} <= tight.bounces.fixed
+    assert Proposal.of(json.loads(json.dumps(tight.said()))) == tight
+    close = View(Camera("close", (-0.3, 0.3, 0.3), (-0.3, 0.3, -0.3), fov_y_deg=3.0), 16, 16)
+    far, near = propose_all(scene, [VIEW, close], quick)
+    assert far.bounces == near.bounces and {"floor", "bead"} <= far.edited
+    assert far.same == near.same == {}
+
+
+def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trial, "TIMED", 64)
     monkeypatch.setattr(trial, "MANY", 64)
     twins = corner({**KINDS, "side": KINDS["back"]})
@@ -79,6 +126,23 @@ def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit(m
     assert tight.same == {"side": "back"} and tight.reasons
     assert tight.edit_bytes <= most or [row.role for row in tight.rows].count("edited") == 1
     assert {o.material for o in tight.merged(twins).objects} == {"floor", "back", "ball", "black"}
+
+
+def test_a_store_goes_on_with_what_was_merged_for_it(tmp_path: Path) -> None:
+    twins = corner({**KINDS, "side": KINDS["back"]})
+    merged = replace(
+        twins, objects=tuple(replace(o, material="back" if o.material == "side" else o.material) for o in twins.objects)
+    )
+    folder, bounces = tmp_path / "s", Bounces((4, 1), 2, frozenset({"ball", "black", "floor"}))
+    assert held_by(folder, twins, VIEW, bounces.series) is None
+    bake(merged, folder, only={"interreflection"}, views=[VIEW], bounces=bounces).close()
+    held = held_by(folder, twins, VIEW, bounces.series)
+    assert held is not None and (held.edited, held.same) == ({"back"}, {"side": "back"})
+    assert held.merged(twins).objects == merged.objects and worn_in_views(Store.open(folder))["side"] == "back"
+    repainted = replace(twins, materials={**twins.materials, "side": KINDS["floor"]})
+    changed = held_by(folder, repainted, VIEW, bounces.series)
+    assert changed is not None and not changed.same, "they no longer look the same"
+    assert held_by(folder, twins, VIEW, (8, 1)) is None
 
 
 def test_the_table_names_every_material_and_the_sums(found: Proposal) -> None:

@@ -154,3 +154,54 @@ def test_a_store_of_views_alone_is_no_walkthrough(lambent, refused, scene, tmp_p
     store = tmp_path / "s"
     assert lambent("bake", scene, "-o", store, "--only", "transport", "--view", "above:4x4").code == 0
     assert "bake it first" in refused("render", store, "-o", tmp_path / "a.png", "--size", "8x8")
+
+
+BOUNCED = "--only", "interreflection", "--view", "above:12x8", "--series", "4,1", "--samples", "4"
+
+
+def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, scene, tmp_path):
+    asked = lambent("bake", scene, "--view", "above:12x8", "--series", "4,1", "--samples", "4", "--propose")
+    assert asked.code == 0 and "paint " in asked.out and "on disk" in asked.out and not list(tmp_path.glob("*.store"))
+    said = lambent("bake", scene, *BOUNCED[2:], "--propose", "--fixed", "paint", "--json").json["proposals"][0]
+    assert said["bounces"] == {"series": [4, 1], "samples": 4, "fixed": ["paint"]} and said["seconds"] > 0
+    store = tmp_path / "a.store"
+    first = lambent("bake", scene, "-o", store, *BOUNCED, "--editable", "chrome")
+    assert first.code == 0 and re.search("chrome +edited", first.err) and "samples/s" in first.err, first.err
+
+    def edited() -> set[str]:
+        found = (a for a in Store.open(store).artefacts("interreflection") if a.name.endswith("/tails"))
+        return {name for a in found for name, _ in a.meta["tails"]["slots"]} - {""}
+
+    chosen = edited()
+    assert "chrome" in chosen
+    more = lambent("bake", scene, "-o", store, *BOUNCED[:-1], "8")
+    assert more.code == 0 and edited() == chosen and "that the store edits: chrome" in more.err, more.err
+    assert lambent("bake", scene, "-o", store, *BOUNCED, "--fixed", "chrome").code == 0 and edited() == {"paint"}
+
+
+@pytest.mark.parametrize(
+    ("fault", "options"),
+    [
+        ("-o: ", ()),
+        ("--view: no view", ("--propose",)),
+        ("--view: no view", ("-o", "s", "--only", "interreflection")),
+        ("expected 2 to 6 numbers", (*BOUNCED[2:], "--propose", "--series", "64")),
+        ("expected as in 64,1,1,1", (*BOUNCED[2:], "--propose", "--series", "a,b")),
+        ("expected powers of two", (*BOUNCED[2:], "--propose", "--series", "63,1")),
+        ("bands beyond the second surface", (*BOUNCED[2:], "--propose", "--series", "64,1,2")),
+        ("--samples", (*BOUNCED[2:], "--propose", "--samples", "0")),
+        ("--fixed: unknown material", (*BOUNCED[2:], "--propose", "--fixed", "carpet")),
+        ("--editable: unknown material", (*BOUNCED[2:], "--propose", "--editable", "carpet")),
+        ("fixed or edited; found paint", (*BOUNCED[2:], "--propose", "--fixed", "paint", "--editable", "paint")),
+        ("--only: views", (*BOUNCED[2:], "--propose", "--only", "light_map")),
+        ("--editable: is for interreflections", ("-o", "s", "--editable", "paint")),
+        ("--merge: is for interreflections", ("-o", "s", "--merge")),
+        ("--fixed: is for interreflections", ("-o", "s", "--only", "transport", "--view", "above", "--fixed", "paint")),
+        ("leave out --workers", ("-o", "s", *BOUNCED, "--workers", "2", "--cluster", "a:1")),
+        ("cannot be read", ("--propose", "--edit", "nothing.edits.json")),
+    ],
+)
+def test_proposals_that_cannot_be_made(refused, scene, tmp_path, monkeypatch, fault, options):
+    monkeypatch.chdir(tmp_path)
+    assert fault in refused("bake", scene, *options)
+    assert not (tmp_path / "s").exists()

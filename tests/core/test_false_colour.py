@@ -7,7 +7,7 @@ import pytest
 
 from lambent.core.colour import neutral, shown
 from lambent.core.errors import UserError
-from lambent.core.false_colour import STOPS, Range, false_colour, fitting_range, number, with_scale
+from lambent.core.false_colour import STOPS, Range, SignedRange, false_colour, fitting_range, number, with_scale
 from lambent.core.photometry import photometric
 
 
@@ -65,3 +65,14 @@ def test_neutral_keeps_colours_and_rolls_highlights_off():
     assert (bright <= 1).all() and bright[1].min() > 0.8, "highlights lose their saturation"
     assert bright[0, 0] == pytest.approx(1 - 0.24**2 / (0.96 + 0.24 - 0.76))
     np.testing.assert_allclose(shown(np.array([[1e9, 0, 0]]), "linear", -40), [[np.float64(0.0)] * 3], atol=0.05)
+
+
+def test_differences_have_a_scale_with_black_in_the_middle():
+    scale = SignedRange.fitting(np.array([-30.0, 2.0, np.nan, 41.0]))
+    assert (scale.low, scale.high) == (-50.0, 50.0) and SignedRange.fitting(np.zeros(3)).high > 0
+    dark, same, bright = false_colour(np.array([-80.0, 0.0, 80.0]), scale)
+    assert same.max() < 0.1 and dark[2] > 0.9 > dark[0] and bright[0] > 0.9 > bright[2]
+    assert scale.marks() == [-40.0, -20.0, 0.0, 20.0, 40.0] and SignedRange(10.0).marks()[0] == -10.0
+    assert [number(value) for value in (-20, -0.5)] == ["-20", "-0.5"]
+    picture = with_scale(np.zeros((300, 200, 3), np.uint8), scale)
+    assert picture[40:, 100:, 2].max() > 200 and picture[40:, 100:, 0].max() > 200

@@ -13,6 +13,7 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.editing.canvas import HostCanvas
+from lambent.editing.interreflection.noise import light_of, noise
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight, interreflections
@@ -119,6 +120,21 @@ def test_edits_by_frames(tails: Tails) -> None:
     paper = whole.parts["paper"].pixel
     change = np.abs(reference - before).reshape(-1, 3)[paper].max()
     assert change > 100 * np.abs(shown(frozen) - reference).reshape(-1, 3)[paper].max()
+
+
+@pytest.mark.parametrize("tails", [DIFFUSE, SLOW])
+def test_the_light_that_noise_is_measured_by_is_the_whole_sum(tails: Tails) -> None:
+    whole = light(tails)
+    pixel = np.concatenate([part.pixel for part in whole.parts.values()])
+    wanted = expected(whole, START).reshape(-1, 3)[pixel]
+    np.testing.assert_allclose(light_of(whole, START).T, wanted, rtol=1e-3, atol=1e-4)
+
+
+def test_noise_is_found_from_two_passes() -> None:
+    rng = np.random.default_rng(2)
+    each = 5 + rng.exponential(2.0, (96, 1, 4000)).repeat(3, axis=1) - 2
+    before, after = each[:16].mean(axis=0), each.mean(axis=0)
+    assert noise(before, after, (16, 96)) == pytest.approx(2 / 96**0.5 / 5, rel=0.05)
 
 
 def test_the_idle_curve_wants_to_be_frozen_anew() -> None:

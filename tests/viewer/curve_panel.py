@@ -2,69 +2,42 @@
 
 import time
 
-from imgui_bundle import imgui, implot
+from imgui_bundle import imgui
 
 from lambent.core.camera import Camera
 from lambent.editing.session import Session
 from lambent.viewer import layout
 from lambent.viewer.modes.edit.curves import CurveEditor
 from tests.viewer import panel_driver
-from tests.viewer.panel_driver import point_of, recording
+from tests.viewer.panel_driver import Frames, point_of
 
 NARROW, WIDE = (370, 1100), (1100, 700)
 
 
-class Panel:
-    """The editor in a window of its own; `rects` are the controls by label."""
+class Panel(Frames):
+    """The editor in a window of its own."""
 
     def __init__(self, monkeypatch, starts, material, size=NARROW):
         camera = Camera(name="front", position=(0, 1, 3), target=(0, 1, 0))
         self.session, self.material, self.size = Session.new("room", camera, starts), material, size
-        self.editor, self.rects, self.seconds = CurveEditor(), {}, []
-        self._context = imgui.create_context()
-        imgui.set_current_context(self._context)
-        self.io = imgui.get_io()
-        self.io.set_ini_filename("")
-        self.io.backend_flags |= imgui.BackendFlags_.renderer_has_textures
-        self.io.display_size = size
-        self.io.config_input_trickle_event_queue = False
-        layout.set_style()
+        self.editor, self.seconds = CurveEditor(), []
         monkeypatch.setattr(panel_driver, "RECORDED", (*panel_driver.RECORDED, "drag_float"))
-        recording(monkeypatch.setattr, self.rects)
-        self.frame(2)
+        super().__init__(monkeypatch, size)
+        self.io.config_input_trickle_event_queue = False
 
-    def close(self):
-        implot.destroy_context()
-        imgui.destroy_context(self._context)
-
-    def frame(self, count=1):
-        for _ in range(count):
-            self.rects.clear()
-            self.io.delta_time = 1 / 30
-            imgui.new_frame()
-            imgui.set_next_window_pos((0, 0))
-            imgui.set_next_window_size(self.size)
-            imgui.begin("window", None, layout.FIXED)
-            imgui.push_item_width(-layout.LABEL_PX)
-            begin = time.perf_counter()
-            self.editor.draw(self.session, self.material)
-            self.seconds.append(time.perf_counter() - begin)
-            imgui.pop_item_width()
-            imgui.end()
-            imgui.render()
-
-    def move(self, x, y):
-        self.io.add_mouse_pos_event(x, y)
-        self.frame()
-
-    def button(self, down, which=0):
-        self.io.add_mouse_button_event(which, down)
-        self.frame()
+    def draw(self):
+        imgui.set_next_window_pos((0, 0))
+        imgui.set_next_window_size(self.size)
+        imgui.begin("window", None, layout.FIXED)
+        imgui.push_item_width(-layout.LABEL_PX)
+        begin = time.perf_counter()
+        self.editor.draw(self.session, self.material)
+        self.seconds.append(time.perf_counter() - begin)
+        imgui.pop_item_width()
+        imgui.end()
 
     def click(self, label, along=0.5):
-        self.move(*point_of(self.rects[label], along))
-        self.button(True)
-        self.button(False)
+        super().click(label, along)
         self.io.add_mouse_pos_event(-1, -1)
         self.frame(20)  # the next press is no double click
 

@@ -73,14 +73,16 @@ def write_view(folder, session, lights, seed=0):
 
 
 class Bakes:
-    """Makes bakes, and keeps those that were begun."""
+    """Makes bakes, and keeps those that were begun; `asked` are those that are to make a proposal."""
 
     def __init__(self):
-        self.begun = []
+        self.begun, self.asked = [], []
 
-    def __call__(self, session, store, lights):
-        self.begun.append(HandBake(session, store))
-        return self.begun[-1]
+    def __call__(self, session, store, lights=(), bounces=None, proposing=None):
+        kept = self.begun if proposing is None else self.asked
+        kept.append(HandBake(session, store))
+        kept[-1].bounces, kept[-1].kept = bounces, proposing
+        return kept[-1]
 
 
 class HandBake:
@@ -88,6 +90,7 @@ class HandBake:
 
     def __init__(self, session, store):
         self.document, self.store, self.line, self.error = session.document, store, "baking by hand", ""
+        self.proposal, self.samples = None, 0
         self.session, self.arrived, self.has_view, self.running, self.closed = session, [], False, True, False
 
     def weigh(self, shares):

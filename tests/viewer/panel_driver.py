@@ -2,7 +2,7 @@
 
 import functools
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 
 from lambent.viewer import layout
 
@@ -13,11 +13,11 @@ RECORDED = (
 SIZE = (1400, 1600)
 
 
-class PanelDriver:
-    """`rects[label]` is where a control was drawn last."""
+class Frames:
+    """Dear ImGui frames of what `draw` draws. `rects[label]` is where a control was drawn last."""
 
-    def __init__(self, monkeypatch, mode, size=SIZE):
-        self.mode, self.state, self.rects = mode, mode.state, {}
+    def __init__(self, monkeypatch, size):
+        self.rects = {}
         self._context = imgui.create_context()
         imgui.set_current_context(self._context)
         self.io = imgui.get_io()
@@ -29,15 +29,18 @@ class PanelDriver:
         self.frame(2)
 
     def close(self):
+        implot.destroy_context()
         imgui.destroy_context(self._context)
+
+    def draw(self):
+        raise NotImplementedError
 
     def frame(self, count=1):
         for _ in range(count):
             self.rects.clear()
             self.io.delta_time = 1 / 30
             imgui.new_frame()
-            self.state.screen.picture = layout.regions(self.mode, *self.io.display_size).picture
-            self.popup_open = layout.draw(self.mode)
+            self.draw()
             imgui.render()
 
     def point(self, label, along=0.5):
@@ -47,8 +50,8 @@ class PanelDriver:
         self.io.add_mouse_pos_event(x, y)
         self.frame()
 
-    def button(self, down):
-        self.io.add_mouse_button_event(0, down)
+    def button(self, down, which=0):
+        self.io.add_mouse_button_event(which, down)
         self.frame()
 
     def click(self, label, along=0.5):
@@ -56,6 +59,18 @@ class PanelDriver:
         self.button(True)
         self.button(False)
         self.frame()
+
+
+class PanelDriver(Frames):
+    """The window of a mode."""
+
+    def __init__(self, monkeypatch, mode, size=SIZE):
+        self.mode, self.state = mode, mode.state
+        super().__init__(monkeypatch, size)
+
+    def draw(self):
+        self.state.screen.picture = layout.regions(self.mode, *self.io.display_size).picture
+        self.popup_open = layout.draw(self.mode)
 
     def drag(self, label, begin, end):
         self.move(*self.point(label, begin))

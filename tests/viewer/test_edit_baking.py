@@ -6,9 +6,11 @@ import time
 
 import pytest
 
+from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.proposal import Proposal, Row
 from lambent.editing.session import Session
 from lambent.viewer.modes.edit import baking
-from lambent.viewer.modes.edit.baking import Baking, Stage
+from lambent.viewer.modes.edit.baking import Baking, Passes, Stage
 from tests.viewer.edited_view import CAMERA, SIZE, TRAY
 
 TALKS = """
@@ -84,3 +86,26 @@ def test_the_time_left_counts_down_by_the_weights_of_steps():
     assert stage.left_s(14.0) == pytest.approx(4 * 4 / 6)
     stage.take("visibility of 3998 lights", 0.0, 3998, 20.0)
     assert stage.lights == 3998 and stage.left_s(20.0) is None
+
+
+def test_the_time_left_is_that_of_the_last_two_passes():
+    passes = Passes(64)
+    for before, samples in ((0, 16), (16, 32)):  # are there already
+        passes.take(before, samples, 1.0, 5.0)
+    assert passes.left_s(5.0) is None
+    passes.take(32, 64, 0.0, 10.0)
+    assert passes.left_s(11.0) is None
+    passes.take(32, 64, 0.25, 14.0)
+    assert passes.left_s(14.0) == pytest.approx(12.0) and passes.left_s(16.0) == pytest.approx(10.0)
+    slow = Passes(64)
+    for before, samples, now_s in ((0, 16, 0.0), (16, 32, 100.0), (32, 64, 108.0)):
+        slow.take(before, samples, 0.0, now_s)
+    assert slow.left_s(108.0) == pytest.approx(16.0), "the first pass, in which kernels are compiled, no longer counts"
+
+
+def test_a_proposal_is_told(tmp_path):
+    bake = Baking.__new__(Baking)
+    bake.proposal = None
+    found = Proposal(Bounces(fixed=frozenset({"wall"})), (Row("tray", "edited", 5, 0.5, 0.1),), {}, {}, 10, 20)
+    bake.take({"proposal": found.said()})
+    assert bake.proposal == found

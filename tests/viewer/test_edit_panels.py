@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from lambent.bake.interreflection.proposal import Proposal, Row
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.mode import EditMode
+from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.screen import Rect
 from tests.viewer.edited_view import LIGHTS, new_state, settled, until
 from tests.viewer.panel_driver import PanelDriver
@@ -103,3 +107,44 @@ def test_the_picture_keeps_its_shape(driver):
     assert drawing.within(Rect(10, 0, 160, 60)) == Rect(50, 0, 80, 60)
     driver.state.pixel_exact = True
     assert drawing.within(Rect(0, 0, 80, 80)) == Rect(38, 38, 4, 3), "two pixels of the screen are one of the window"
+
+
+def test_the_panel_of_interreflections(driver):
+    state, bounced = driver.state, driver.state.bounced
+    until(state, lambda: state.painter.frame is not None and bounced.is_measuring)
+    driver.click("Interreflections")
+    assert "bake" in driver.rects and "tray##edited" not in driver.rects
+    asked = state._bake.asked
+    rows = (Row("tray", "edited", 17, 0.4, 0.5), Row("wall", "fixed", 21, 0.6, 0.5))
+    asked[0].proposal = Proposal(replace(asked[0].bounces, fixed=frozenset({"wall"})), rows, {}, {}, 10, 20)
+    asked[0].running = False
+    until(state, lambda: bounced.is_measured)
+    driver.frame(2)
+    driver.click("wall##edited")
+    assert bounced.fixed == frozenset() and not bounced.is_measured
+    driver.click("tray##edited")
+    assert bounced.fixed == {"tray"}
+    driver.frame(2)
+    driver.click("bake")
+    until(state, lambda: bounced.baking is not None)
+    assert state._bake.begun[-1].bounces.fixed == {"tray"} and bounced.line
+    driver.frame()
+    driver.click("tray##edited")
+    assert bounced.fixed == {"tray"}, "not while it is baked"
+    driver.click("stop")
+    assert bounced.baking is None and state._bake.begun[-1].closed
+
+
+def test_the_panel_shows_the_difference_to_a(driver):
+    state = driver.state
+    driver.click("difference")
+    assert not state.is_difference, "there is no A"
+    state.compared.chosen = DIRECT
+    driver.frame()
+    driver.click("difference")
+    assert state.is_difference
+    until(state, lambda: state.scale is not None)
+    driver.frame()
+    driver.click("fit scale")
+    assert state.scale is None
+    until(state, lambda: state.scale is not None)

@@ -22,7 +22,7 @@ from lambent.materials.document import load_material
 from lambent.store.store import Store
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.painter import FADE_S
-from lambent.viewer.modes.edit.state import OFF, UNEDITED
+from lambent.viewer.modes.edit.state import DIRECT, OFF, UNEDITED
 from lambent.viewer.modes.edit.tone import _half_bits, _table, displayed
 from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, new_state, settled, until
 
@@ -179,12 +179,30 @@ def test_a_is_what_was_opened_or_a_snapshot(ready):
     state.compared.keep(state.now)
     state.session.tint("tray", "diffuse", (3.0, 1.0, 1.0))
     again = settled(state)
-    assert state.compared.choices == (OFF, UNEDITED, "snapshot 1")
+    assert state.compared.choices == (OFF, DIRECT, UNEDITED, "snapshot 1")
     assert np.allclose(again.compared_radiance, frame.radiance, atol=1e-4)
     assert not np.allclose(again.radiance, frame.radiance)
     state.session.become("tray", OTHER_TRAY)
     state.compared.chosen = OFF
     assert settled(state).compared is None
+
+
+def test_the_difference_to_a_is_in_false_colours_of_a_fitted_scale(ready):
+    state, _ = ready
+    state.compared.is_difference = True
+    assert state.scale is None and settled(state).compared is None, "there is no A"
+    state.compared.chosen = DIRECT
+    frame = settled(state)
+    assert np.array_equal(frame.compared_radiance, frame.radiance), "nothing else is baked"
+    state.compared.chosen, state.compared.scale = UNEDITED, None
+    state.session.tint("tray", "diffuse", (3.0, 0.2, 1.0))
+    state.session.tint("wall", "diffuse", 0.5)
+    until(state, lambda: state.compared.scale is not None and settled(state).wish.difference is state.compared.scale)
+    frame = state.painter.frame
+    above = photometric(frame.radiance - frame.compared_radiance)
+    assert above.min() < -1 and above.max() > 1 and frame.compared is None
+    assert np.percentile(np.abs(above), 99.5) <= state.scale.high <= 10 * np.abs(above).max()
+    assert np.abs(frame.shown[..., :3] - to_bytes(false_colour(above, state.scale)).astype(int)).max() <= 2
 
 
 def test_pointing_selecting_and_outlines(ready):

@@ -67,7 +67,8 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     session.tool("key", "ctrl+s")
     session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
     session.click(*session.point("Interreflections"))
-    session.click(*session.point("bake them in the background"))
+    session.wait_for(lambda state: "glaze##edited" in state["rects"])
+    session.click(*session.point("bake"))
     bounced = session.wait_for(lambda state: state["samples"] >= 64 and not state["busy"])
     assert 1.02 * edited["brightness"] < bounced["brightness"] < 3 * edited["brightness"]
     assert session.close() == 0, session.log()

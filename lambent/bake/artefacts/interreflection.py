@@ -66,16 +66,19 @@ def bake(context: BakeContext) -> None:
     work = TileTracer(scene, tails, bins, context.seed, context.view_tracer, bounces.diffuse_seen)
     for view in context.views:
         _put_tails(context, view)
-    samples = FIRST_PASS
-    while True:
-        samples = min(samples, bounces.samples)
+    for samples in passes(bounces.samples):
         for view in context.views:
             _bring(context, work, view, samples)
-        if samples == bounces.samples:
-            break
-        samples += min(samples, LONGEST_PASS)
     for view in context.views:
-        context.put(KIND, view.name(KIND, "samples"), np.array([samples], np.uint32), view.meta)
+        context.put(KIND, view.name(KIND, "samples"), np.array([bounces.samples], np.uint32), view.meta)
+
+
+def passes(samples: int) -> list[int]:
+    """Samples that all points have after each pass of a bake."""
+    found = [min(FIRST_PASS, samples)]
+    while found[-1] < samples:
+        found.append(min(found[-1] + min(found[-1], LONGEST_PASS), samples))
+    return found
 
 
 def _bring(context: BakeContext, work: TileTracer, view: View, samples: int) -> None:

@@ -9,8 +9,9 @@ Costs are measured: a few points of each material get all their samples, then on
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lambent.bake.bounces import Bounces
@@ -23,12 +24,17 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
+from lambent.scenes.textures import prepared
+from lambent.store.source import worn_in_views
+from lambent.store.store import MANIFEST, Store
+from lambent.store.tails import FIXED, Tails
 
 if TYPE_CHECKING:
     from lambent.bake.interreflection.trial import Cost
 
 SMALL = 0.01  # share of the view, and of the light that is passed on, below which a material is fixed
 MOST_BYTES = 2 << 30  # of a store, before compression
+LISTED = 10  # materials that are fixed, in a table
 MOST_CELLS = 1 << 22  # bands times tails of a point: each thread has a row of them
 
 
@@ -39,6 +45,8 @@ class Row:
     Attributes
     ----------
     role : {'edited', 'fixed'}
+    bands : int
+        Of all its terms.
     points : int
         Pixels that show it.
     in_view : float
@@ -56,6 +64,7 @@ class Row:
     points: int
     in_view: float
     passed_on: float
+    bands: int = 1
     cells: int = 0
     entries: float = 0.0
     disk_bytes: int = 0
@@ -81,6 +90,8 @@ class Proposal:
         Materials to merge with the one that looks the same, and those that might be.
     bake_bytes, edit_bytes : int
         Memory of the bake besides the scene's, and of the tiles while they are edited.
+    begin_s : float
+        Until the first path.
     reasons : tuple of str
         Why materials are fixed that are not small.
     """
@@ -91,7 +102,13 @@ class Proposal:
     alike: Mapping[str, str]
     bake_bytes: int
     edit_bytes: int
+    begin_s: float = 0.0
     reasons: tuple[str, ...] = field(default=())
+
+    @property
+    def edited(self) -> frozenset[str]:
+        """Names of the materials that are edited."""
+        return frozenset(row.material for row in self.rows if row.role == "edited")
 
     @property
     def disk_bytes(self) -> int:
@@ -100,7 +117,7 @@ class Proposal:
     @property
     def seconds(self) -> float:
         """Of the bake, on one machine."""
-        return sum(row.seconds for row in self.rows)
+        return self.begin_s + sum(row.seconds for row in self.rows)
 
     @property
     def samples_per_s(self) -> float:
@@ -110,28 +127,46 @@ class Proposal:
         """The scene with the materials that are merged."""
         return _merged(scene, self.same)
 
+    def said(self) -> dict[str, Any]:
+        """For JSON; `Proposal.of` is the inverse."""
+        said = asdict(replace(self, bounces=Bounces()))
+        return {**said, "bounces": self.bounces.said(), "disk_bytes": self.disk_bytes, "seconds": self.seconds}
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any]) -> Proposal:
+        own = {key: value for key, value in said.items() if key not in ("disk_bytes", "seconds")}
+        rows, reasons = tuple(Row(**row) for row in said["rows"]), tuple(said["reasons"])
+        return cls(**{**own, "bounces": Bounces.of(said["bounces"]), "rows": rows, "reasons": reasons})
+
     def lines(self) -> list[str]:
         """A table of the materials, and the sums."""
-        heads = ("material", "role", "in view", "passes on", "entries", "disk", "time")
+        heads = ("material", "role", "in view", "passes on", "bands", "entries", "disk", "time")
+        left_out = [row for row in self.rows if row.role == "fixed"][LISTED:]
         table = [
             (
-                row.material, row.role, f"{row.in_view:.1%}", f"{row.passed_on:.1%}",
-                f"{row.entries:.0f} of {row.cells}", _bytes(row.disk_bytes), f"{row.seconds:.0f} s",
+                row.material, row.role, f"{row.in_view:.1%}", f"{row.passed_on:.1%}", str(row.bands),
+                f"{row.entries:.0f} of {row.cells}", bytes_said(row.disk_bytes), time_said(row.seconds),
             )
-            for row in self.rows
+            for row in self.rows if row not in left_out
         ]  # fmt: skip
         widths = [max(len(line[k]) for line in (heads, *table)) for k in range(len(heads))]
         lines = ["  ".join(text.ljust(n) for text, n in zip(line, widths, strict=True)) for line in (heads, *table)]
+        if left_out:
+            sums = sum(row.in_view for row in left_out), sum(row.passed_on for row in left_out)
+            lines.append(f"and {len(left_out)} more are fixed: {sums[0]:.1%} in view, {sums[1]:.1%} passed on")
         lines += [f"{name} is merged with {other}: they look the same" for name, other in self.same.items()]
         lines += [f"{name} looks like {other}: merged, they need less" for name, other in self.alike.items()]
+        return [line.rstrip() for line in (*lines, *self.reasons, *self.sums())]
+
+    def sums(self) -> list[str]:
+        """Time and memory, in two lines."""
         series = ",".join(map(str, self.bounces.series))
-        lines += [
-            *self.reasons,
-            f"{series} with {self.bounces.samples} samples: {self.seconds:.0f} s at {self.samples_per_s:.2g} samples/s",
-            f"{_bytes(self.disk_bytes)} on disk, {_bytes(self.bake_bytes)} of memory to bake, "
-            f"{_bytes(self.edit_bytes)} to edit",
+        return [
+            f"{series} with {self.bounces.samples} samples: {time_said(self.seconds)} "
+            f"at {self.samples_per_s:.2g} samples/s",
+            f"{bytes_said(self.disk_bytes)} on disk, {bytes_said(self.bake_bytes)} of memory to bake, "
+            f"{bytes_said(self.edit_bytes)} to edit",
         ]
-        return [line.rstrip() for line in lines]
 
 
 def propose(
@@ -140,6 +175,8 @@ def propose(
     bounces: Bounces | None = None,
     *,
     editables: Mapping[str, Editable] | None = None,
+    kept: Collection[str] = (),
+    merging: bool = True,
     most_bytes: int = MOST_BYTES,
     progress: Progress = silent,
 ) -> Proposal:
@@ -149,6 +186,19 @@ def propose(
     the store would not fit into `most_bytes`, materials that look the same are merged, and then the least important are
     fixed until it fits.
 
+    Parameters
+    ----------
+    scene
+        Lit as in the bake.
+    editables
+        As of `bake`: materials that are edited as something else than their documents say. They are not merged.
+    kept
+        Materials that are edited whatever it costs.
+    merging
+        Whether materials may be merged.
+    most_bytes
+        Of a store before compression.
+
     Raises
     ------
     UserError
@@ -156,15 +206,70 @@ def propose(
     """
     engine()  # before Mitsuba is imported
     bounces, given = bounces or Bounces(), editables or {}
-    alike = same_materials(scene, keep={*bounces.fixed, *given})
-    found = _proposal(scene, view, bounces, given, most_bytes, progress)
-    if not (found.reasons and alike):
+    scene = replace(scene, textures=prepared(scene.textures))  # as in the bake
+    alike = same_materials(scene, keep={*bounces.fixed, *given, *kept})
+    found = _proposal(scene, view, bounces, given, kept, most_bytes, progress)
+    if not (merging and found.reasons and alike):
         return replace(found, alike=alike)
-    return replace(_proposal(_merged(scene, alike), view, bounces, given, most_bytes, progress), same=alike)
+    return replace(_proposal(_merged(scene, alike), view, bounces, given, kept, most_bytes, progress), same=alike)
+
+
+def propose_all(
+    scene: Scene,
+    views: Sequence[View],
+    bounces: Bounces,
+    *,
+    kept: Collection[str] = (),
+    merging: bool = True,
+    **more: Any,
+) -> list[Proposal]:
+    """A proposal for each view, in which the same materials are edited: those of any of them. See `propose`.
+
+    Materials are merged for a single view alone.
+    """
+    alone = len(views) == 1
+    found = [propose(scene, view, bounces, kept=kept, merging=merging and alone, **more) for view in views]
+    edited = frozenset[str]().union(*(one.edited for one in found))
+    if all(one.edited == edited for one in found):
+        return found
+    same = replace(bounces, fixed=frozenset(worn(scene)) - edited)
+    return [propose(scene, view, same, kept=edited, merging=False, **more) for view in views]
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a store's interreflections edit, and which materials were merged for them."""
+
+    edited: frozenset[str]
+    same: Mapping[str, str]
+
+    def merged(self, scene: Scene) -> Scene:
+        """The scene with the materials that are merged."""
+        return _merged(scene, self.same)
+
+
+def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> Held | None:
+    """What a store has of a view; None where it has no interreflections of this series."""
+    name = view.name("interreflection", "tails")
+    if not (folder / MANIFEST).exists():
+        return None
+    store = Store.open(folder)
+    if name not in store or store.artefact(name).meta["series"] != list(series):
+        return None
+    edited = frozenset(one for one, side in Tails.of(store.artefact(name).meta["tails"]).slots if side != FIXED)
+    worn_then, alike = worn_in_views(store), same_materials(scene)
+    pairs = {(o.material, worn_then.get(o.name, o.material)) for o in scene.objects}
+    return Held(edited, {one: other for one, other in pairs if one != other and alike.get(one) == other})
 
 
 def _proposal(
-    scene: Scene, view: View, bounces: Bounces, given: Mapping[str, Editable], most_bytes: int, progress: Progress
+    scene: Scene,
+    view: View,
+    bounces: Bounces,
+    given: Mapping[str, Editable],
+    kept: Collection[str],
+    most_bytes: int,
+    progress: Progress,
 ) -> Proposal:
     from lambent.bake.interreflection.trial import Trial
 
@@ -178,8 +283,10 @@ def _proposal(
     rows = [Row(name, "edited", trial.shown[name], trial.shown[name] / total, passed[name]) for name in known]
     rows.sort(key=lambda row: -row.weight)
     free = [row for row in rows if row.material not in bounces.fixed]
-    edited = [row.material for row in free if max(row.in_view, row.passed_on) >= SMALL]
+    free.sort(key=lambda row: row.material not in kept)  # the rest stays in its order
+    edited = [row.material for row in free if row.material in kept or max(row.in_view, row.passed_on) >= SMALL]
     edited = edited or [row.material for row in free[:1]]
+    least = max(1, len({row.material for row in free} & {*kept}))
     reasons: list[str] = []
 
     def fixing() -> Bounces:
@@ -189,29 +296,30 @@ def _proposal(
         tails = len(tails_of(known, fixing()))
         return {name: tails * sum(bins.bands) for name, bins in bins_of(known, fixing()).items()}
 
-    while len(edited) > 1 and max(cells().values()) > MOST_CELLS:
+    while len(edited) > least and max(cells().values()) > MOST_CELLS:
         reasons.append(f"{edited.pop()} is fixed: rows of more than {MOST_CELLS} numbers a point")
     progress(1, 3, "time and memory")
     costs = trial.costs(fixing())
-    while len(edited) > 1 and _raw(costs, trial.shown) > most_bytes:
+    while len(edited) > least and _raw(costs, trial.shown) > most_bytes:
         before, left = cells(), 1.0
-        while len(edited) > 1 and _raw(costs, trial.shown) * left > most_bytes:
-            reasons.append(f"{edited.pop()} is fixed: the store would have more than {_bytes(most_bytes)}")
+        while len(edited) > least and _raw(costs, trial.shown) * left > most_bytes:
+            reasons.append(f"{edited.pop()} is fixed: the store would have more than {bytes_said(most_bytes)}")
             left = sum(cells().values()) / sum(before.values())  # a guess: entries in proportion
         progress(2, 3, f"time and memory, {len(edited)} materials edited")
         costs = trial.costs(fixing())
     progress(3, 3, "time and memory")
-    size = cells()
+    size, bins = cells(), bins_of(known, fixing())
     rows = [
         replace(
             row, role="edited" if row.material in edited else "fixed", cells=size[row.material],
-            entries=costs[row.material].entries, disk_bytes=round(costs[row.material].disk_bytes * row.points),
-            seconds=costs[row.material].seconds * row.points,
+            bands=sum(bins[row.material].bands), entries=costs[row.material].entries,
+            disk_bytes=round(costs[row.material].disk_bytes * row.points),
+            seconds=costs[row.material].seconds(row.points, bounces),
         )
         for row in rows
     ]  # fmt: skip
     memory = trial.bake_bytes(fixing(), costs), round(_raw(costs, trial.shown))
-    return Proposal(fixing(), tuple(rows), {}, {}, *memory, tuple(reasons))
+    return Proposal(fixing(), tuple(rows), {}, {}, *memory, trial.begin_s, tuple(reasons))
 
 
 def _raw(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
@@ -237,5 +345,14 @@ def _merged(scene: Scene, same: Mapping[str, str]) -> Scene:
     return replace(scene, objects=tuple(replace(o, material=same.get(o.material, o.material)) for o in scene.objects))
 
 
-def _bytes(count: float) -> str:
-    return f"{count / 1e9:.2f} GB" if count >= 1e9 else f"{count / 1e6:.1f} MB"
+def bytes_said(count: float) -> str:
+    """Bytes in words."""
+    unit, size = next((one for one in (("GB", 1e9), ("MB", 1e6)) if count >= one[1]), ("kB", 1e3))
+    return f"{count / size:.{1 if count < 10 * size else 0}f} {unit}"
+
+
+def time_said(seconds: float) -> str:
+    """Seconds in words."""
+    if seconds < 100:
+        return f"{seconds:.0f} s" if seconds >= 1 else "< 1 s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lambent.bake.artefacts.interreflection import POINTS, passes
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.series import bins_of, tails_of
 from lambent.bake.interreflection.tiles import PATHS, Job, Tile, TileTracer, unpacked
@@ -23,29 +24,61 @@ from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
-TILE = 1 << 12  # points, as in a bake
-TIMED = 1 << 10  # of these, for a batch
+TIMED = 1 << 10  # points of a batch
 FEW, MANY = 8, 256  # points that get all samples
 PER_MATERIAL = 1 << 18  # paths of these
+MOST_OF_VIEW = 0.95  # that is traced to see which materials pass light on
+LEAST_SHARE = 0.01  # of a view: materials that are not edited and show less are all measured by one of them
 MOST_SAMPLES = 1 << 14  # of these; entries of more are extrapolated
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a point: entries, bytes before and after compression, and seconds for all samples."""
+    """Of a material.
 
-    entries: float
-    raw_bytes: float
-    disk_bytes: float
-    seconds: float
+    Attributes
+    ----------
+    entries, raw_bytes, disk_bytes : float
+        Of a point with all samples; bytes before and after compression.
+    path_s, call_s : float
+        Seconds of a path, and of a call that traces many, besides.
+    kept_s, tile_s : float
+        Seconds to read, pack and write a point in a pass, and a tile besides.
+    """
+
+    entries: float = 0.0
+    raw_bytes: float = 0.0
+    disk_bytes: float = 0.0
+    path_s: float = 0.0
+    call_s: float = 0.0
+    kept_s: float = 0.0
+    tile_s: float = 0.0
+
+    def seconds(self, points: int, bounces: Bounces) -> float:
+        """Of so many points, all passes."""
+        done = passes(bounces.samples)
+        added = [after - before for before, after in zip((0, *done), done, strict=False)]
+        found = points * (bounces.samples * self.path_s + len(done) * self.kept_s)
+        for first in range(0, points, POINTS):
+            paths = (min(POINTS, points - first) * more for more in added)
+            calls = sum(-(-count // paths_at_once(bounces)) for count in paths)
+            found += calls * self.call_s + len(done) * self.tile_s
+        return found
+
+
+def paths_at_once(bounces: Bounces) -> int:
+    """Of a call."""
+    return PATHS >> 2 if bounces.series[1] > 1 else PATHS
 
 
 class Trial:
-    """Measures a view. `shown` are the points of each material."""
+    """Measures a view. `shown` are the points of each material; the scene is read and seen in `begin_s` seconds."""
 
     def __init__(self, scene: Scene, view: View, editables: Mapping[str, Editable]) -> None:
+        start = time.perf_counter()
         self.scene, self.editables, self._tracer = scene, editables, ViewTracer(scene, editables)
         self._points = self._tracer.points(view)
+        self.begin_s = time.perf_counter() - start
         worn = np.array([o.material for o in scene.objects])[self._points.object]
         self._at = {name: np.random.default_rng(0).permutation(np.flatnonzero(worn == name)) for name in editables}
         self.shown = {name: len(at) for name, at in self._at.items()}
@@ -56,10 +89,9 @@ class Trial:
         work, tails = self._work(bounces), tails_of(self.editables, bounces)
         weights = tails.weights(np.array([albedo(self.editables[name], side) for name, side in tails.slots]))
         light = np.zeros((len(tails), 3))
-        for name, at in self._at.items():
+        for name in self._most_of_view():
+            at = self._at[name]
             points = self._some(name, max(FEW, 1024 * len(at) // len(self._points)))
-            if not len(points):
-                continue
             bins = work.bins[name]
             for (term, factors), tile in zip(bins.terms, work(Job(name, points, name, bounces.samples)), strict=True):
                 _, codes, values = unpacked(tile.array, tile.points)
@@ -74,21 +106,23 @@ class Trial:
 
     def costs(self, bounces: Bounces) -> dict[str, Cost]:
         """By material."""
-        work = self._work(bounces)
-        return {name: self._cost(work, name, bounces) for name in self.editables}
+        work, least = self._work(bounces), LEAST_SHARE * len(self._points)
+        alike = [name for name in bounces.fixed if name in self.shown and self.shown[name] < least]
+        found = {name: self._cost(work, name, bounces) for name in self.editables if name not in alike}
+        one = max(alike, key=lambda name: (self.shown[name], name), default="")
+        return {**found, **dict.fromkeys(alike, self._cost(work, one, bounces) if one else Cost())}
 
     def bake_bytes(self, bounces: Bounces, costs: Mapping[str, Cost]) -> int:
         """Memory of one process: paths on the device and as arrays, sums of the largest tile before and after."""
         ways = 2 * (len(bounces.series) - 1)
-        most = max(cost.entries * min(TILE, self.shown[name]) for name, cost in costs.items())
-        paths = PATHS >> 2 if bounces.series[1] > 1 else PATHS
-        return round(paths * (3 * 16 * ways + 64) + 3 * 16 * most)
+        most = max(cost.entries * min(POINTS, self.shown[name]) for name, cost in costs.items())
+        return round(paths_at_once(bounces) * (3 * 16 * ways + 64) + 3 * 16 * most)
 
     def _cost(self, work: TileTracer, name: str, bounces: Bounces) -> Cost:
         samples = min(bounces.samples, MOST_SAMPLES)
         points = self._some(name, min(MANY, max(FEW, PER_MATERIAL // samples)))
         if not len(points):
-            return Cost(0.0, 0.0, 0.0, 0.0)
+            return Cost()
         half = work(Job(name, points, name, max(1, samples // 2)))
         tiles = work(Job(name, points, name, samples, max(1, samples // 2), half)) if samples > 1 else half
         counts = [(len(tile.array) - tile.points) / 2 for tile in (*half, *tiles)]
@@ -97,22 +131,20 @@ class Trial:
         growth = (bounces.samples / samples) ** log2(max(after, 1) / max(before, 1))
         entries = min(after / len(points) * growth, cells)
 
-        # One batch for points that hold as many entries; unpacking and packing come once a pass.
-        whole = self._some(name, TIMED)
-        held = tuple(_repeated(tile, len(whole)) for tile in tiles)
-        batch = max(1, (PATHS >> 2 if bounces.series[1] > 1 else PATHS) // TILE)
-        start = time.perf_counter()
-        more = work(Job(name, whole, name, samples + batch, samples, held))
-        traced = time.perf_counter()
-        for tile in more:
-            Tile.of([tile.sums(samples)], samples)
-        packed = time.perf_counter() - traced
-        disk, writing = _written(more)
-        passes = 1 + max(0.0, log2(bounces.samples / 16))
-        seconds = max(traced - start - packed, 0.0) * bounces.samples / batch + (packed + writing) * passes
-        raw = 4 * len(tiles) + 8 * entries
-        smaller = disk / max(sum(tile.array.nbytes for tile in more), 1)
-        return Cost(entries, raw, raw * smaller, seconds / len(whole))
+        # Of few points and one sample, and of many: what a call and a tile take, and what is in proportion.
+        few, many = self._some(name, FEW), self._some(name, TIMED)
+        batch = max(2, paths_at_once(bounces) // len(many))
+        call_s, tile_s, _ = _timed(work, name, few, tiles, samples, 1)
+        batch_s, keep_s, smaller = _timed(work, name, many, tiles, samples, batch)
+        path_s = max(batch_s - call_s, 0.0) / (len(many) * batch)
+        raw, kept_s = 4 * len(tiles) + 8 * entries, max(keep_s - tile_s, 0.0) / len(many)
+        return Cost(entries, raw, raw * smaller, path_s, call_s, kept_s, tile_s)
+
+    def _most_of_view(self) -> list[str]:
+        """The materials that show most, so many that they have `MOST_OF_VIEW` of it."""
+        names = sorted(self.shown, key=lambda name: -self.shown[name])
+        before = np.cumsum([0, *(self.shown[name] for name in names)])[:-1]
+        return [name for name, points in zip(names, before, strict=True) if points < MOST_OF_VIEW * len(self._points)]
 
     def _some(self, name: str, count: int) -> ViewPoints:
         """So many points that show a material, or all."""
@@ -121,6 +153,22 @@ class Trial:
     def _work(self, bounces: Bounces) -> TileTracer:
         tails, bins = tails_of(self.editables, bounces), bins_of(self.editables, bounces)
         return TileTracer(self.scene, tails, bins, 0, self._tracer, bounces.diffuse_seen)
+
+
+def _timed(
+    work: TileTracer, name: str, points: ViewPoints, tiles: tuple[Tile, ...], samples: int, batch: int
+) -> tuple[float, float, float]:
+    """Seconds to trace a batch for points that hold as many entries, and to keep it; share of bytes when compressed."""
+    held = tuple(_repeated(tile, len(points)) for tile in tiles)
+    start = time.perf_counter()
+    more = work(Job(name, points, name, samples + batch, samples, held))
+    traced = time.perf_counter()
+    for tile in more:  # as the call did, too
+        Tile.of([tile.sums(samples)], samples)
+    packed_s = time.perf_counter() - traced
+    disk, writing_s = _written(more)
+    smaller = disk / max(sum(tile.array.nbytes for tile in more), 1)
+    return max(traced - start - packed_s, 0.0), packed_s + writing_s, smaller
 
 
 def _repeated(tile: Tile, points: int) -> Tile:

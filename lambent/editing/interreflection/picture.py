@@ -24,7 +24,7 @@ from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
 
-ALL_HITS = (2, 99)
+BEYOND_DIRECT = (2, 99)  # least and most surfaces on paths
 Shown = list[tuple[Layer, NDArray[np.float32]]]
 
 
@@ -57,7 +57,7 @@ class FrozenPicture:
         edited: str,
         canvas: Canvas,
         active: str | None = None,
-        hits: tuple[int, int] = ALL_HITS,
+        hits: tuple[int, int] = BEYOND_DIRECT,
     ) -> None:
         self.edited, self.hits, self.materials = edited, hits, materials
         self._powers = powers(light.tails, materials, edited, hits)
@@ -150,12 +150,8 @@ class _TermPicture:
         self._factors, self._counts = term.factors, light.counts
         self._at = names.index(active) if active in names else 0
         self._idle = {name: material.curves[name] for k, name in enumerate(names) if k != self._at}
-        idle = np.ones((1, 3))
-        row = np.zeros(1, np.int64)
-        for k, (factor, count) in enumerate(zip(term.factors, light.counts, strict=True)):
-            means = np.ones((count, 3)) if k == self._at else means_of(factor, material.curves[factor.curve], count)
-            idle = (idle[:, None] * means[None]).reshape(-1, 3)
-            row = (row[:, None] + (np.arange(count) if k == self._at else np.zeros(count, np.int64))).reshape(-1)
+        idle = bands_of(term.factors, light.counts, material, but=self._at)
+        row = np.indices(light.counts)[self._at].reshape(-1) if light.counts else np.zeros(1, np.int64)
         count = light.counts[self._at] if light.counts else 1
         found, self._unit = rows(light, idle, power.weight, power.power, len(power.exponents), row, count)
         self.layers = [canvas.layer(part.pixel, part.theta_o, None) for _ in found]

@@ -96,11 +96,13 @@ def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floa
     return np.concatenate(parts) if parts else np.ones((1, 3))
 
 
-def bands_of(factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable) -> Floats:
-    """(J, 3) coefficients of products of bands, first curve first."""
+def bands_of(
+    factors: tuple[Factor, ...], counts: tuple[int, ...], material: Editable, but: int | None = None
+) -> Floats:
+    """(J, 3) coefficients of products of bands, first curve first; that of the factor `but` counts as 1."""
     found = np.ones((1, 3))
-    for factor, count in zip(factors, counts, strict=True):
-        means = means_of(factor, material.curves[factor.curve], count)
+    for k, (factor, count) in enumerate(zip(factors, counts, strict=True)):
+        means = np.ones((count, 3)) if k == but else means_of(factor, material.curves[factor.curve], count)
         found = (found[:, None] * means[None]).reshape(-1, 3)
     return found
 

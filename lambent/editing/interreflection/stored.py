@@ -79,6 +79,12 @@ def samples_of(store: Store, session: Session) -> int:
     return max(tiles, default=0)
 
 
+def series_of(store: Store, session: Session) -> tuple[int, ...]:
+    """Of the interreflections that a store has of a session's view."""
+    view = session.document
+    return tuple(store.artefact(view_artefact_name(view.camera, *view.size, "interreflection", "tails")).meta["series"])
+
+
 def interreflections(
     store: Store, camera: Camera, size: tuple[int, int], materials: Mapping[str, Editable]
 ) -> Interreflections:

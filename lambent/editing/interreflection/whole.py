@@ -12,7 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from lambent.core.arrays import Image
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.incremental import TERMS
-from lambent.editing.interreflection.picture import FrozenPicture, Shown
+from lambent.editing.interreflection.picture import BEYOND_DIRECT, FrozenPicture, Shown
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of
 from lambent.editing.picture import EditedPicture
 from lambent.editing.session import Session
@@ -23,7 +23,7 @@ from lambent.materials.factored.terms import Editable
 from lambent.store.contract import scene_record
 from lambent.store.store import Store
 
-ALL_HITS = (1, 99)
+ALL_HITS = (1, BEYOND_DIRECT[1])
 
 
 def whole_picture(
@@ -161,6 +161,11 @@ class WholePicture:
     def image(self) -> Image:
         """(H, W, 3) float32, linear radiance."""
         self.compose()
+        return self.direct.canvas.image()
+
+    def direct_image(self) -> Image:
+        """(H, W, 3) float32, direct light alone, whatever is shown."""
+        self.direct.canvas.compose(self.direct.shown)
         return self.direct.canvas.image()
 
     def close(self) -> None:

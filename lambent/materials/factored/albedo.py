@@ -21,7 +21,6 @@ from lambent.materials.lobes import NUMPY, Vector
 
 BANDS, BANDS_OF_TWO, BANDS_OF_VIEWER = 1024, 256, 64
 VIEWERS, ELEVATIONS, AZIMUTHS, TURNS = 32, 1024, 32, 8  # nodes; turns of both directions for what is anisotropic
-FLAT = ("theta_i", "theta_o")  # angles that directions themselves have
 _made: dict[tuple[str, bool], Floats] = {}
 
 
@@ -51,11 +50,6 @@ def albedo(material: Editable, side: str) -> Floats:
     return np.asarray(sum((term_albedo(term, material.curves) for term in mine), np.zeros(3)))
 
 
-def _is_flat(term: Term) -> bool:
-    """Whether a term's curves are over angles of directions alone."""
-    return all(factor.over in FLAT for factor in term.factors)
-
-
 def term_albedo(term: Term, curves: Mapping[str, Curve]) -> Floats:
     """(3,) equivalent albedo of one term."""
     axes = _axes(term)
@@ -76,7 +70,7 @@ def _axes(term: Term) -> list[_Axis]:
 
 def _shares(term: Term, axes: list[_Axis]) -> Floats:
     """e (bands of each axis, 3)."""
-    wi, wo, weight = _nodes(not _is_flat(term), 1 if _is_isotropic(term, axes) else TURNS)
+    wi, wo, weight = _nodes(not term.is_diffuse, 1 if _is_isotropic(term, axes) else TURNS)
     quotient = term.quotient.evaluate(wi, wo, NUMPY)
     value = (
         np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from imgui_bundle import imgui
 
-from lambent.core.false_colour import STOPS, number, ramp
+from lambent.core.false_colour import Range, number, ramp
 from lambent.core.plain import triple
 from lambent.viewer.look import Look
 from lambent.viewer.screen import Rect, Screen
@@ -45,9 +45,13 @@ def draw(screen: Screen, first: Sequence[str] = (), *, refining: bool = True) ->
 def false_colour_bar(picture: Rect, look: Look) -> None:
     """The scale of a picture in false colours."""
     if look.is_false_coloured:
-        scale = look.shown_scale
-        marks = [(float(scale.share(np.array(value))), number(value)) for value in scale.marks()]
-        scale_bar(picture, marks, STOPS, look.quantity.unit)
+        scale_bar_of(picture, look.shown_scale, look.quantity.unit)
+
+
+def scale_bar_of(picture: Rect, scale: Range, unit: str) -> None:
+    """A scale with its round numbers."""
+    marks = [(float(scale.share(np.array(value))), number(value)) for value in scale.marks()]
+    scale_bar(picture, marks, scale.stops, unit)
 
 
 def scale_bar(picture: Rect, marks: Sequence[tuple[float, str]], stops: np.ndarray, unit: str) -> None:

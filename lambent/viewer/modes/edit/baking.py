@@ -1,4 +1,4 @@
-"""Transport that is baked beside the window: the process, how far it is, and when it will be done."""
+"""What is baked or measured beside the window: the process, how far it is, and when it will be done."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
+from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.proposal import Proposal, time_said
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.editing.document import SessionDocument
@@ -24,6 +27,7 @@ ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole vie
 LEAST_DONE = 0.02  # before it, nobody can say how long it takes
 LAST_CHARACTERS = 300  # of what a worker wrote before it died
 _NUMBER = re.compile(r"(\d+) lights$")
+PASS = re.compile(r"interreflections, (\d+) samples")
 
 
 @dataclass
@@ -59,17 +63,33 @@ class Stage:
         return self.weights.get(_NUMBER.sub("", step).rstrip(", "), 1.0)
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Interreflections that a worker bakes: series, samples, and materials that are not edited."""
+@dataclass
+class Passes:
+    """How far the interreflections are: passes double the samples until there are `wanted`."""
 
-    series: str
-    samples: int
-    fixed: tuple[str, ...] = ()
+    wanted: int
+    samples: int = 0  # of the pass under way
+    share: float = 0.0
+    reported_s: float = 0.0
+    begins: tuple[tuple[float, float], ...] = ()  # time and share at the begin of the last two passes
+
+    def take(self, before: int, samples: int, share: float, now_s: float) -> None:
+        """The pass from `before` to so many samples goes on."""
+        self.share, self.reported_s = (before + share * (samples - before)) / self.wanted, now_s
+        if samples != self.samples and share < 1:  # passes that are there already end at once
+            self.samples, self.begins = samples, (*self.begins[-1:], (now_s, self.share))
+
+    def left_s(self, now_s: float) -> float | None:
+        """Seconds until all are there, at the pace of the last passes; None while that is anybody's guess."""
+        began_s, before = self.begins[0] if self.begins else (0.0, 1.0)
+        if self.share - before < LEAST_DONE * (1 - before):
+            return None
+        pace = (self.share - before) / max(self.reported_s - began_s, 1e-9)
+        return max((1 - self.share) / max(pace, 1e-9) - (now_s - self.reported_s), 1.0)
 
 
 class Baking:
-    """One run of the worker: transport of so many lights, or interreflections.
+    """One run of the worker: transport of so many lights, interreflections, or a proposal of these.
 
     Attributes
     ----------
@@ -83,6 +103,8 @@ class Baking:
         Whether the points of the view are in the store.
     samples : int
         Of interreflections, that all points have now.
+    proposal : Proposal or None
+        What was asked for, once it is there.
     """
 
     def __init__(
@@ -91,7 +113,8 @@ class Baking:
         store: Path,
         lights: Sequence[int] = LIGHTS,
         clock: Callable[[], float] = time.monotonic,
-        bounces: Wanted | None = None,
+        bounces: Bounces | None = None,
+        proposing: Collection[str] | None = None,
     ) -> None:
         self.document: SessionDocument = session.document
         self.store, self.error, self.what = store, "", "starting"
@@ -99,8 +122,12 @@ class Baking:
         self.has_view = False
         self._share = 0.0
         self.samples = 0
-        self._clock, self._bounces = clock, bounces
-        self._lights = () if bounces is not None else lights
+        self.proposal: Proposal | None = None
+        self._clock, self._passes = clock, Passes(bounces.samples) if bounces is not None else None
+        self._words = list(map(str, lights))
+        if bounces is not None:
+            kept = [] if proposing is None else [json.dumps(sorted(proposing))]
+            self._words = [BOUNCES, json.dumps(bounces.said()), *kept]
         terms = [(name, t) for name in self.document.materials for t in session.original(name).terms]
         self._curves = {(name, t.name): len(t.factors) for name, t in terms}
         self._stage = Stage({}, clock())
@@ -120,8 +147,9 @@ class Baking:
     def line(self) -> str:
         """What it does now, and how much longer these lights take."""
         left_s, stage = self._stage.left_s(self._clock()), self._stage
-        if self._bounces is not None:
-            return f"{self.what} {100 * self._share:.0f} %"
+        if self._passes is not None:
+            left_s, step = self._passes.left_s(self._clock()), f"{self.what} {100 * self._share:.0f} %"
+            return step if left_s is None else f"{step}, about {time_said(left_s)} for {self._passes.wanted}"
         step = f"{self.what} {100 * stage.share:.0f} %"
         return step if left_s is None else f"{step}, about {left_s:.0f} s for {stage.lights} lights"
 
@@ -148,9 +176,7 @@ class Baking:
         with tempfile.TemporaryDirectory() as folder:
             job, words = Path(folder) / "job.edits.json", Path(folder) / "words.txt"
             session.save(job)
-            command = [sys.executable, "-m", WORKER, str(job), str(self.store), *map(str, self._lights)]
-            if self._bounces is not None:
-                command += [BOUNCES, json.dumps(asdict(self._bounces))]
+            command = [sys.executable, "-m", WORKER, str(job), str(self.store), *self._words]
             with words.open("w") as log:
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
                 try:
@@ -175,6 +201,9 @@ class Baking:
         """Take a line of the worker."""
         if "error" in said:
             raise UserError(str(said["error"]))
+        if "proposal" in said:
+            self.proposal = Proposal.of(cast(Mapping[str, Any], said["proposal"]))
+            return
         if "samples" in said:
             self.samples = int(str(said["samples"]))
             return
@@ -187,3 +216,6 @@ class Baking:
         if found:
             self.has_view = True
             self._stage.take(self.what, self._share, int(found[1]), self._clock())
+        found = PASS.search(self.what)
+        if found and self._passes is not None:
+            self._passes.take(self.samples, int(found[1]), self._share, self._clock())

@@ -105,8 +105,8 @@ class EditDrawing(Drawing):
         self._state.close()
 
     def _with_scale(self, shown: Bytes) -> Bytes:
-        look = self._state.look
-        return with_scale(shown, look.scale, LUMINANCE.unit) if look.is_false_coloured else shown
+        scale = self._state.scale
+        return with_scale(shown, scale, LUMINANCE.unit) if scale is not None else shown
 
     def _texture(self, width: int, height: int) -> Any:
         usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST

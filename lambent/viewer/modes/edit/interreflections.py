@@ -1,4 +1,4 @@
-"""Interreflections in the window: whether they are wanted, the bake beside the window, and what the store has."""
+"""Interreflections in the window: which materials are edited in them, the bake beside it, what the store has."""
 
 from __future__ import annotations
 
@@ -6,21 +6,29 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+from lambent.bake.bounces import Bounces
+from lambent.bake.interreflection.proposal import Proposal
 from lambent.core.errors import UserError
-from lambent.editing.interreflection.stored import interreflections, samples_of
+from lambent.editing.interreflection.noise import light_of, noise
+from lambent.editing.interreflection.picture import BEYOND_DIRECT
+from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of, series_of
+from lambent.editing.interreflection.whole import ALL_HITS
+from lambent.editing.products import Pixels
 from lambent.editing.session import Session
+from lambent.materials.factored.terms import Editable
 from lambent.store.store import MANIFEST, Store
-from lambent.viewer.modes.edit.baking import Baking, Wanted
+from lambent.store.tails import FIXED
+from lambent.viewer.modes.edit.baking import Baking
 from lambent.viewer.modes.edit.painter import Painter
 from lambent.viewer.work import Work
 
 SERIES = ("64,1,1,1", "64,1,1", "128,8,1", "64,16")
 SAMPLES = (256, 1024, 4096, 16384)
 SHOWN: Mapping[str, tuple[int, int]] = {
-    "all light": (1, 99), "direct light": (1, 1), "2 surfaces": (2, 2), "3 surfaces": (3, 3), "4 surfaces": (4, 4),
-    "all but direct light": (2, 99),
+    "all light": ALL_HITS, "direct light": (1, 1), "up to 2 surfaces": (1, 2), "up to 3 surfaces": (1, 3),
+    "2 surfaces alone": (2, 2), "3 surfaces alone": (3, 3), "4 surfaces alone": (4, 4),
+    "all but direct light": BEYOND_DIRECT,
 }  # fmt: skip
-MOST_EDITED = 6  # materials: tails grow with their third power
 
 
 class Bounced:
@@ -32,76 +40,152 @@ class Bounced:
         Whether more samples are baked until there are `wanted`.
     series, wanted
         Of the bake; see `bake.bounces`.
+    fixed : frozenset of str or None
+        Materials that are not edited in the light of others: as in the store, as proposed, as the user chose. None
+        until one of these is known.
+    proposal : Proposal or None
+        What a bake for these takes.
     shown : str
         A key of `SHOWN`.
     samples : int
         Paths per pixel of what is shown; 0 without interreflections.
+    noise : float or None
+        Of what is shown: standard error of a point's interreflections, as a share of their mean. None before a second
+        pass is there to compare with.
     """
 
     def __init__(self, painter: Painter, bake: Callable[..., Baking] = Baking) -> None:
         self.on, self.series, self.wanted, self.shown = False, SERIES[0], SAMPLES[1], "all light"
         self.samples = 0
+        self.noise: float | None = None
+        self.fixed: frozenset[str] | None = None
+        self.proposal: Proposal | None = None
         self.baking: Baking | None = None
         self.trouble = ""
         self._painter, self._bake = painter, bake
+        self._proposing: Baking | None = None
+        self._asked: Bounces | None = None  # what the proposal, or the one under way, is for
+        self._is_own = False  # whether the user chose what is fixed
         self._reading: Work | None = None
         self._folder: Path | None = None
         self._given: object = None  # the view and its light, that samples belong to
+        self._light: tuple[int, Pixels] | None = None  # samples and light of the last pass
 
     @property
     def busy(self) -> bool:
-        return self._reading is not None or self.baking is not None
+        return self._reading is not None or self.baking is not None or self.is_measuring
+
+    @property
+    def is_measuring(self) -> bool:
+        """Whether a proposal is being made."""
+        return self._proposing is not None
 
     @property
     def line(self) -> str:
-        """How far it is; empty at rest."""
+        """How far the bake is; empty at rest."""
         return self.baking.line if self.baking is not None else ""
 
-    def tick(self, session: Session, folder: Path, idle: bool, shares: Mapping[str, float]) -> None:
+    @property
+    def bounces(self) -> Bounces:
+        """What a bake would be for."""
+        return Bounces(Bounces.of_text(self.series), self.wanted, self.fixed or frozenset())
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the proposal says what a bake takes as things are chosen now."""
+        return self.proposal is not None and not self.is_measuring and self._asked == self.bounces
+
+    def tick(self, session: Session, folder: Path, idle: bool) -> None:
         """Take what arrived, and begin what is wanted; `idle`: direct light is there, and nobody writes the store."""
         if self._reading is not None and self._reading.poll():
             self._reading = None
         if self.baking is not None and self.baking.samples > self.samples and self._reading is None:
             self._read(session)
-        if self.baking is not None and not self.baking.running:
-            self.trouble = f"interreflections: {self.baking.error}" if self.baking.error else ""
-            self.on = self.on and not self.baking.error
+        if self.baking is not None and not self.baking.running and self._reading is None:
+            self._failed_of(self.baking)
             self.baking = None
+            self.on = self.on and self.samples < self.wanted
+        self._take_proposal()
         source = session.document.environment, folder
-        if not idle or self.busy:
+        if not idle or self._reading is not None or self.baking is not None:
             return
         if source != self._given:
-            self._given, self._folder, self.samples = source, folder, 0
+            self._given, self._folder = source, folder
+            self.begin_anew()
             if (folder / MANIFEST).exists():
                 self._read(session)
             return
-        if self.on and self.samples < self.wanted:
-            kept = sorted(session.document.materials, key=lambda name: -shares.get(name, 0.0))[:MOST_EDITED]
-            fixed = tuple(name for name in session.document.materials if name not in kept)
-            self.baking = self._bake(session, folder, bounces=Wanted(self.series, self.wanted, fixed))
+        if self.on and self.samples < self.wanted and self.fixed is not None:
+            self._stop_proposing()
+            self.baking = self._bake(session, folder, bounces=self.bounces)
+        elif self._asked != self.bounces:
+            self._propose(session, folder)
+
+    def start(self) -> None:
+        """Bake, or go on, as soon as a choice of materials is there."""
+        self.on, self.trouble = True, ""
 
     def stop(self) -> None:
         """End the bake; the passes that it has finished stay in the store."""
+        self.on = False
         if self.baking is not None:
             self.baking.close()
             self.baking = None
 
     def begin_anew(self) -> None:
-        """The store's samples no longer serve: of other terms, or of another series of bands."""
-        self.stop()
-        self.samples = 0
+        """The store's samples no longer serve: of other terms, materials or bands."""
+        if self.baking is not None:
+            self.baking.close()
+            self.baking = None
+        self._stop_proposing()
+        self.samples, self.noise, self._light, self._asked = 0, None, None, None
 
     def change(self, series: str) -> None:
         """Bake another series of bands from now on."""
         if series != self.series:
             self.begin_anew()
             self.series = series
+            if not self._is_own:
+                self.fixed = None
+
+    def choose(self, material: str, edited: bool) -> None:
+        """Edit a material in the light of others, or fix it, from the next bake on."""
+        assert self.fixed is not None
+        self.begin_anew()
+        self._is_own = True
+        self.fixed = self.fixed - {material} if edited else self.fixed | {material}
 
     def close(self) -> None:
         self.stop()
+        self._stop_proposing()
         if self._reading is not None:
             self._reading.wait()
             self._reading = None
+
+    def _propose(self, session: Session, folder: Path) -> None:
+        """Measure what the choice takes; where nothing is chosen, propose one that keeps all that was edited."""
+        self._stop_proposing()
+        materials = session.document.materials
+        changed = {name for name, one in materials.items() if one.curves or one.tints}
+        kept = changed if self.fixed is None else materials.keys() - self.fixed
+        self._asked = self.bounces
+        self._proposing = self._bake(session, folder, bounces=self._asked, proposing=kept)
+
+    def _take_proposal(self) -> None:
+        if self._proposing is None or self._proposing.running:
+            return
+        self._failed_of(self._proposing)
+        found, self._proposing = self._proposing.proposal, None
+        if found is None:
+            return
+        self.proposal = found
+        if self.fixed is None:
+            self.fixed, self._asked = found.bounces.fixed, found.bounces
+
+    def _stop_proposing(self) -> None:
+        if self._proposing is not None:
+            self._proposing.close()
+            self._proposing, self._asked = None, None
 
     def _read(self, session: Session) -> None:
         assert self._folder is not None
@@ -111,12 +195,26 @@ class Bounced:
         def run(_: object) -> None:
             store, view = Store.open(folder), copy.document
             found = samples_of(store, copy)
-            if found > self.samples:
-                light = interreflections(store, view.camera, view.size, originals)
-                self._painter.run(partial(self._painter.give, light))
-                self.samples = found
+            if found <= self.samples:
+                return
+            light = interreflections(store, view.camera, view.size, originals)
+            self._painter.run(partial(self._painter.give, light))
+            if self.baking is None:  # what the store has is what goes on
+                self.series = ",".join(map(str, series_of(store, copy)))
+                self.fixed = frozenset(originals) - {name for name, side in light.tails.slots if side != FIXED}
+            self._see_noise(light, originals)
+            self.samples = found
 
         self._reading = Work(run, lambda _: None, self._failed)
 
+    def _see_noise(self, light: Interreflections, originals: Mapping[str, Editable]) -> None:
+        before, self._light = self._light, (light.samples, light_of(light, originals))
+        if before is not None and 0 < before[0] < light.samples:
+            self.noise = noise(before[1], self._light[1], (before[0], light.samples))
+
     def _failed(self, error: UserError) -> None:
-        self.trouble = f"interreflections: {error}"
+        self.trouble, self.on = f"interreflections: {error}", False
+
+    def _failed_of(self, work: Baking) -> None:
+        self.trouble = f"interreflections: {work.error}" if work.error else ""
+        self.on = self.on and not work.error

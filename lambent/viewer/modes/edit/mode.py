@@ -8,11 +8,13 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from lambent.core.photometry import LUMINANCE
 from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.input import Input
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.edit import panels
+from lambent.viewer.modes.edit.bounced_panel import draw_interreflections
 from lambent.viewer.modes.edit.state import OUTLINED_S, EditState
 from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels import overlay
@@ -101,7 +103,8 @@ class EditMode(Mode):
         if state.pointed is not None:
             x, y = imgui.get_mouse_pos()
             shadowed(imgui.get_background_draw_list(), (x + 14, y + 4), state.pointed[1], (1, 1, 1, 1))
-        overlay.false_colour_bar(place, state.look)
+        if state.scale is not None:
+            overlay.scale_bar_of(place, state.scale, LUMINANCE.unit)
         overlay.draw(self.screen, self._lines(), refining=False)
 
     def _lines(self) -> list[str]:
@@ -112,6 +115,8 @@ class EditMode(Mode):
             lines.append(state.baking.line)
         elif state.loading.busy:
             lines.append("reading transport")
+        if state.bounced.line:
+            lines.append(state.bounced.line)
         if state.files.busy:
             lines.append(state.files.doing)
         frame = state.painter.frame
@@ -134,7 +139,7 @@ def columns(state: EditState) -> tuple[Panel, ...]:
     """The column, each panel on the state."""
     return (
         Panel("Scene", partial(panels.draw_scene, state), opened=True),
-        Panel("Interreflections", partial(panels.draw_interreflections, state)),
+        Panel("Interreflections", partial(draw_interreflections, state.bounced)),
         Panel("Compare", partial(panels.draw_compare, state), opened=True),
         Panel("Save", partial(panels.draw_files, state), opened=True),
         Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range
+from lambent.core.false_colour import Range, SignedRange
 from lambent.editing.interreflection.stored import Interreflections
 from lambent.editing.interreflection.whole import ALL_HITS, WholePicture
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
@@ -32,10 +32,15 @@ Materials = Mapping[str, Editable]
 
 @dataclass(frozen=True)
 class Wish:
-    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any."""
+    """What frames are to show: B, the materials as they are edited now, and A to compare with, if any.
+
+    A are other materials, or those of B in `direct` light. With a `difference`, B shows by how much it is above A.
+    """
 
     now: Materials = field(default_factory=dict)
     compared: Materials | None = None
+    direct: bool = False
+    difference: SignedRange | None = None
     view: str = "filmic"
     exposure_ev: float = 0.0
     scale: Range = field(default_factory=Range)
@@ -44,7 +49,7 @@ class Wish:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame: the pictures B and A, and the wish that it shows.
+    """A frame: the picture B, A that it is compared `against`, and the wish that it shows.
 
     `needed` are materials whose transport does not serve the wish; they are shown as they were.
     """
@@ -52,7 +57,7 @@ class Frame:
     number: int
     wish: Wish
     shown: Shown
-    compared: Shown | None = None
+    against: Shown | None = None
     needed: frozenset[str] = frozenset()
     settled: bool = False
     seconds: float = 0.0
@@ -63,8 +68,13 @@ class Frame:
         return self.shown.radiance
 
     @property
+    def compared(self) -> Shown | None:
+        """A where it is shown beside B, not as the difference."""
+        return self.against if self.wish.difference is None else None
+
+    @property
     def compared_radiance(self) -> Image | None:
-        return self.compared.radiance if self.compared is not None else None
+        return self.against.radiance if self.against is not None else None
 
 
 class Painter:
@@ -197,14 +207,16 @@ class Painter:
         if self._picture.step() and self.frame is not None:
             self._fade_over(self.frame.radiance)
         look = wish.view, wish.exposure_ev, wish.scale
-        compared = None
-        if wish.compared is not None:
-            compared = self._backend.still(self._image_of(wish.compared, wish.now), look)
+        image = self._image_of(wish.compared, wish.now) if wish.compared is not None else None
+        image = self._picture.direct_image() if wish.direct else image
+        against = self._backend.still(image, look) if image is not None else None
         self._picture.compose()
         shown = self._backend.show(self._picture.direct.canvas, look, self._fading())
+        if against is not None and wish.difference is not None:
+            shown = self._backend.difference(shown, against, wish.difference)
         settled = self._picture.is_settled and self._fade is None and not self._tasks
         number, seconds = self.frame.number + 1 if self.frame else 1, self._clock() - began_s
-        self.frame = Frame(number, wish, shown, compared, needed, settled, seconds)
+        self.frame = Frame(number, wish, shown, against, needed, settled, seconds)
 
     def _show(self, name: str, made: Editable) -> bool:
         """Let the picture go to a material; False where it has no transport for that."""

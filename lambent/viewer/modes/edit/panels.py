@@ -8,8 +8,7 @@ from imgui_bundle import imgui
 
 from lambent.viewer.look import VIEW_TRANSFORMS
 from lambent.viewer.modes.edit.curves.editor import CurveEditor
-from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN
-from lambent.viewer.modes.edit.state import EditState
+from lambent.viewer.modes.edit.state import OFF, EditState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.widgets import (
     AMBER,
@@ -69,30 +68,27 @@ def draw_material(state: EditState, curves: Curves) -> None:
         state.files.open(text, state.material)
 
 
-def draw_interreflections(state: EditState) -> None:
-    """Whether there are any, of which series, with how many samples, and which of them are shown."""
-    bounced = state.bounced
-    before = bounced.on
-    bounced.on = check("bake them in the background", bounced.on)
-    explain("light that met other surfaces first; noise falls while samples are added")
-    if before and not bounced.on:
-        bounced.stop()
-    bounced.change(choice("series", bounced.series, SERIES))
-    explain("bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo")
-    bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES]))
-    bounced.shown = choice("shown", bounced.shown, list(SHOWN))
-    coloured(f"{bounced.samples} samples a pixel" if bounced.samples else "none yet", DIM)
-    if bounced.line:
-        coloured(bounced.line, DIM)
-    wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
-
-
 def draw_compare(state: EditState) -> None:
-    """What the picture A shows."""
+    """What the picture A shows, and whether B shows its difference to A."""
     compared = state.compared
+    before = compared.chosen
     compared.chosen = choice("A", compared.chosen, compared.choices)
     compared.divider.a_label, compared.divider.b_label = compared.chosen, "now"
     buttons([("snapshot", bool(state.now), lambda: compared.keep(state.now), "keep this state, to compare with")])
+    imgui.same_line()
+    imgui.begin_disabled(compared.chosen == OFF)
+    shown = check("difference", state.is_difference)
+    explain("by how much the picture is above A, in false colours: blue is darker, orange brighter, black the same")
+    if compared.chosen != OFF:
+        compared.is_difference = shown
+    imgui.end_disabled()
+    if compared.chosen != before:
+        compared.scale = None
+    if state.is_difference:
+        imgui.same_line()
+        if imgui.button("fit scale"):
+            compared.scale = None
+        explain("colours up to the largest difference but the outermost half percent")
 
 
 def draw_look(state: EditState) -> None:

@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from lambent.core.arrays import Image
-from lambent.core.false_colour import Range
+from lambent.core.false_colour import Range, SignedRange
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.realtime.edited.display import Display
 from lambent.realtime.targets import DISPLAY_FORMAT, pixels, target_texture
 from lambent.viewer.edited import ShadedCanvas, sums
-from lambent.viewer.modes.edit.tone import Bytes, displayed
+from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
 
 Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours
 Fading = tuple[Image, float]  # what is added to a picture, and the share of it that is left
@@ -46,6 +46,9 @@ class Backend(Protocol):
 
     def still(self, image: Image, look: Look) -> Shown:
         """A picture that stays: linear radiance."""
+
+    def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> Shown:
+        """By how much a picture is above another, in colours made on the processor."""
 
     def without_gpu(self) -> Backend:
         """The processor's cores, for the same window."""
@@ -82,6 +85,9 @@ class OnHost:
         if self._still is None or self._still[0] is not image or self._still[1] != look:
             self._still = image, look, self._made(image, look)
         return self._still[2]
+
+    def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> HostShown:
+        return HostShown(self._device, shown.radiance, difference(shown.radiance, against.radiance, scale))
 
     def _made(self, image: Image, look: Look) -> HostShown:
         return HostShown(self._device, image, displayed(image, *look))
@@ -135,6 +141,9 @@ class OnGpu:
         target = self._target("still", light)
         self._display.draw(light, target, *look)
         return GpuShown(self._device, light, target)
+
+    def difference(self, shown: Shown, against: Shown, scale: SignedRange) -> HostShown:
+        return self.without_gpu().difference(shown, against, scale)
 
     def without_gpu(self) -> OnHost:
         return OnHost(self._device)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.false_colour import Range, SignedRange
+from lambent.core.photometry import photometric
 from lambent.editing.document import SessionDocument
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import changed_inputs
@@ -18,27 +20,32 @@ from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files, Tables
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading
-from lambent.viewer.modes.edit.painter import Materials, Painter, Wish, checked
+from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
 from lambent.viewer.modes.edit.shown import Backend
 from lambent.viewer.modes.edit.subject import Subject
 from lambent.viewer.screen import Screen
 
 OUTLINED_S = 1.0  # after a selection
-OFF, UNEDITED = "off", "as opened"
+OFF, DIRECT, UNEDITED = "off", "direct light", "as opened"
 Fixed = tuple[object, ...]  # all that transport depends on
 
 
 @dataclass
 class Compared:
-    """What the picture A shows: nothing, the materials as they were opened, or a snapshot, by its name."""
+    """What the picture A shows: nothing, direct light alone, the materials as they were opened, or a snapshot.
+
+    Where `is_difference`, B shows by how much it is above A, on a `scale` that is fitted where it is None.
+    """
 
     chosen: str = OFF
+    is_difference: bool = False
+    scale: SignedRange | None = None
     kept: dict[str, Materials] = field(default_factory=dict)
     divider: Divider = field(default_factory=Divider)
 
     @property
     def choices(self) -> tuple[str, ...]:
-        return (OFF, *self.kept)
+        return (OFF, DIRECT, *self.kept)
 
     @property
     def materials(self) -> Materials | None:
@@ -48,6 +55,12 @@ class Compared:
         """Take a snapshot and compare with it."""
         self.chosen = f"snapshot {len(self.kept)}"
         self.kept[self.chosen] = materials
+
+    def fit(self, frame: Frame) -> None:
+        """Take a scale that suits a frame with this A, where none is there."""
+        shows_a = frame.wish.compared is self.materials and frame.wish.direct == (self.chosen == DIRECT)
+        if self.scale is None and self.is_difference and shows_a and frame.compared_radiance is not None:
+            self.scale = SignedRange.fitting(photometric(frame.radiance - frame.compared_radiance))
 
 
 class EditState:
@@ -89,6 +102,18 @@ class EditState:
     def busy(self) -> bool:
         """Whether work goes on in the background whose progress is to be seen."""
         return self.baking is not None or self.loading.busy or self.files.busy or self.bounced.busy
+
+    @property
+    def is_difference(self) -> bool:
+        """Whether the difference of B and A is shown."""
+        return self.compared.is_difference and self.compared.chosen != OFF
+
+    @property
+    def scale(self) -> Range | None:
+        """Of the colours of the picture, where they stand for numbers."""
+        if self.is_difference:
+            return self.compared.scale
+        return self.look.scale if self.look.is_false_coloured else None
 
     @property
     def now(self) -> Materials:
@@ -133,8 +158,7 @@ class EditState:
         if not self.loading.busy:
             self._have_transport()
         direct = bool(self.loading.lights) and self.baking is None and not self.loading.busy
-        shares = self.loading.view.shares if self.loading.view is not None else {}
-        self.bounced.tick(self.session, self.loading.folder, direct, shares)
+        self.bounced.tick(self.session, self.loading.folder, direct)
 
     def close(self) -> None:
         """End all work in the background; what was baked stays in the store."""
@@ -154,7 +178,13 @@ class EditState:
             }
             self._document = document
         surfaces = SHOWN[self.bounced.shown]
-        wish = Wish(self._now, self.compared.materials, look.view_transform, look.exposure_ev, look.scale, surfaces)
+        compared, frame = self.compared, self.painter.frame
+        if frame is not None and frame.wish is self._wish and frame.settled:
+            compared.fit(frame)
+        wish = Wish(
+            self._now, compared.materials, compared.chosen == DIRECT, compared.scale if self.is_difference else None,
+            look.view_transform, look.exposure_ev, look.scale, surfaces,
+        )  # fmt: skip
         if not same(wish, self._wish):
             self._wish = wish
             self.painter.want(wish)
@@ -228,5 +258,5 @@ class EditState:
 
 def same(one: Wish, other: Wish) -> bool:
     """Whether two wishes are of the same objects."""
-    parts: list[Any] = [(w.view, w.exposure_ev, w.scale, w.surfaces) for w in (one, other)]
+    parts: list[Any] = [(w.view, w.exposure_ev, w.scale, w.surfaces, w.direct, w.difference) for w in (one, other)]
     return one.now is other.now and one.compared is other.compared and parts[0] == parts[1]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
 from lambent.core.colour import HALF_MAX, luminance, neutral, shown
-from lambent.core.false_colour import Range, false_colour
+from lambent.core.false_colour import SIGNED, Range, SignedRange, false_colour, ramp
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE
 from lambent.editing.half_table import looked_up
@@ -40,6 +40,15 @@ def displayed(radiance: Image, view: str, exposure_ev: float, scale: Range) -> B
     return out
 
 
+def difference(radiance: Image, other: Image, scale: SignedRange) -> Bytes:
+    """(H, W, 4) false colours of by how much the luminance of one image is above another's."""
+    out = np.empty((*radiance.shape[:2], 4), np.uint8)
+    out[..., 3] = 255
+    share = scale.share(luminance(radiance - other) * np.float32(LUMINANCE.per_y))
+    out[..., :3] = _SIGNED[(np.nan_to_num(share, nan=0.5) * (len(_SIGNED) - 1) + 0.5).astype(np.int32)]
+    return out
+
+
 def _half_bits(values: Image) -> NDArray[np.uint16]:
     """Numbers of half floats: a step of one is 0.05 %, an eighth of a byte's step of a display."""
     return np.clip(values, 0, HALF_MAX).astype(np.float16).view(np.uint16) & np.uint16(0x7FFF)  # -0 is 0
@@ -59,3 +68,6 @@ def _table(view: str, exposure_ev: float) -> Bytes:
 @lru_cache(maxsize=8)
 def _false_colours(scale: Range) -> Bytes:
     return to_bytes(false_colour(_halves() * np.float32(LUMINANCE.per_y), scale))
+
+
+_SIGNED = to_bytes(ramp(np.linspace(0, 1, 2049), SIGNED))

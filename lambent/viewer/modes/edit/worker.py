@@ -2,30 +2,30 @@
 
 python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
 python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON
+python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON KEPT, to propose what to edit besides KEPT
 
 Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number for which all transport is there
-now; "samples", those that all interreflections have now; or "error", a line for the user.
+now; "samples", those that all interreflections have now; "proposal"; or "error", a line for the user.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+from lambent.bake.bounces import Bounces
 from lambent.core.errors import UserError
 from lambent.editing.session import Session
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
-from lambent.viewer.modes.edit.baking import BOUNCES
+from lambent.viewer.modes.edit.baking import BOUNCES, PASS
 from lambent.viewer.modes.edit.subject import scene_for
 
 NICENESS = 10  # the window comes first
-_PASS = re.compile(r"interreflections, (\d+) samples")
 
 
 def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
@@ -54,19 +54,24 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
         _say(lights=lights[end])
 
 
-def bounce(session: Path, folder: Path, wanted: Mapping[str, Any]) -> None:
-    """Bake interreflections."""
+def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] | None) -> None:
+    """Bake interreflections; or, where materials to edit are given, propose which others to edit."""
     from lambent.bake.bake import bake
-    from lambent.bake.bounces import Bounces
+    from lambent.bake.interreflection.proposal import propose
     from lambent.bake.view import View
 
     opened = Session.open(session)
-    document = opened.document
+    document, scene, light = opened.document, scene_for(opened), opened.environment
     editables = {name: opened.original(name) for name in document.materials}
-    bounces = Bounces(Bounces.of_text(wanted["series"]), wanted["samples"], frozenset(wanted["fixed"]))
+    view = View(document.camera, *document.size)
+    if kept is not None:
+        lit = scene if light is None else replace(scene, environment=light)
+        found = propose(lit, view, bounces, editables=editables, kept=kept, progress=_progress)
+        _say(proposal=found.said())
+        return
     bake(
-        scene_for(opened), folder, quality="normal", only={"interreflection"}, progress=_progress, bounces=bounces,
-        views=[View(document.camera, *document.size)], editables=editables, environment=opened.environment,
+        scene, folder, quality="normal", only={"interreflection"}, progress=_progress, bounces=bounces,
+        views=[view], editables=editables, environment=light,
     )  # fmt: skip
 
 
@@ -81,7 +86,7 @@ def _note_environment(store: Store, session: Session) -> None:
 
 def _progress(done: float, total: float, what: str) -> None:
     _say(what=what, done=done, total=total)
-    finished = _PASS.fullmatch(what)
+    finished = PASS.fullmatch(what)
     if finished and done == total:
         _say(samples=int(finished[1]))
 
@@ -96,7 +101,8 @@ if __name__ == "__main__":
         os.nice(NICENESS)
     try:
         if sys.argv[3:4] == [BOUNCES]:
-            bounce(Path(sys.argv[1]), Path(sys.argv[2]), json.loads(sys.argv[4]))
+            bounces, *kept = map(json.loads, sys.argv[4:])
+            bounce(Path(sys.argv[1]), Path(sys.argv[2]), Bounces.of(bounces), kept[0] if kept else None)
         else:
             main(Path(sys.argv[1]), Path(sys.argv[2]), [int(word) for word in sys.argv[3:]])
     except UserError as error:

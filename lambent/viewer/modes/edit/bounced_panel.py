@@ -1,0 +1,74 @@
+"""The panel of interreflections: what a bake would edit and take, the bake, what is shown of it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from lambent.bake.interreflection.proposal import Proposal
+from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN, Bounced
+from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, explain, wrapped
+
+SHARES = ("in view", "passes on")
+MOST_ROWS = 8  # of materials, before they scroll
+
+
+def draw_interreflections(bounced: Bounced) -> None:
+    """The choice and its costs, then the bake, then what is shown."""
+    imgui.begin_disabled(bounced.baking is not None)
+    series = SERIES if bounced.series in SERIES else (*SERIES, bounced.series)
+    bounced.change(choice("series", bounced.series, series))
+    explain("bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo")
+    bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES]))
+    if bounced.proposal is not None and bounced.fixed is not None:
+        _draw_materials(bounced, bounced.proposal, bounced.fixed)
+    imgui.end_disabled()
+    wanted = bounced.samples < bounced.wanted
+    buttons([
+        ("continue" if bounced.samples else "bake", not bounced.on and wanted, bounced.start,
+         "in the background; the picture is shown after every pass, with less noise each time"),
+        ("stop", bounced.on, bounced.stop, "finished passes stay"),
+    ])  # fmt: skip
+    if bounced.baking is None:  # below the buttons, which stay where they are
+        _draw_costs(bounced)
+    lines = [bounced.line] if bounced.line else []
+    if bounced.samples:
+        noise = f", noise {bounced.noise:.1%} of the mean" if bounced.noise is not None else ""
+        lines.append(f"{bounced.samples} samples a pixel{noise}")
+    wrapped(lines, DIM)
+    bounced.shown = choice("shown", bounced.shown, list(SHOWN))
+    explain("light that met so many surfaces; each is shown once it is baked")
+    wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
+
+
+def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str]) -> None:
+    """A check box for each material: whether it is edited in the light that it passes on."""
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y
+    line = imgui.get_frame_height() + 2 * imgui.get_style().cell_padding.y
+    height = (min(len(proposal.rows), MOST_ROWS) + 1) * line
+    if not imgui.begin_table("materials", 3, flags, (0, height)):
+        return
+    imgui.table_setup_column("edited", imgui.TableColumnFlags_.width_stretch)
+    for title in SHARES:
+        imgui.table_setup_column(title, imgui.TableColumnFlags_.width_fixed, imgui.calc_text_size(title).x)
+    imgui.table_setup_scroll_freeze(0, 1)
+    imgui.table_headers_row()
+    for row in proposal.rows:
+        imgui.table_next_column()
+        edited = check(f"{row.material}##edited", row.material not in fixed)
+        explain("edits of it change the light on other surfaces; else it scatters there as it is in the scene")
+        if edited != (row.material not in fixed):
+            bounced.choose(row.material, edited)
+        for share in (row.in_view, row.passed_on):
+            imgui.table_next_column()
+            imgui.text_unformatted(f"{share:.1%}")
+    imgui.end_table()
+
+
+def _draw_costs(bounced: Bounced) -> None:
+    """Time and memory of the choice; while they are measured, those of the choice before are gone."""
+    proposal = bounced.proposal
+    if bounced.is_measured and proposal is not None:
+        alike = [f"{one} and {other} look the same" for one, other in proposal.alike.items()]
+        wrapped([*proposal.sums(), *proposal.reasons[:3], *alike[:3]], DIM)
+    elif bounced.is_measuring:
+        wrapped(["time and memory are being measured"], DIM)
