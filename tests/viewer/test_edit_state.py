@@ -202,7 +202,7 @@ def test_the_difference_to_a_is_in_false_colours_of_a_fitted_scale(ready):
     above = photometric(frame.radiance - frame.compared_radiance)
     assert above.min() < -1 and above.max() > 1 and frame.compared is None
     assert np.percentile(np.abs(above), 99.5) <= state.scale.high <= 10 * np.abs(above).max()
-    assert np.abs(frame.shown[..., :3] - to_bytes(false_colour(above, state.scale)).astype(int)).max() <= 2
+    assert np.abs(frame.shown.bytes[..., :3] - to_bytes(false_colour(above, state.scale)).astype(int)).max() <= 2
 
 
 def test_pointing_selecting_and_outlines(ready):
