@@ -21,14 +21,20 @@ from numpy.typing import NDArray
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.device_lights import light_at, lights_on_device
-from lambent.bake.transport.overlaps import share_below
+from lambent.bake.transport.overlaps import below
 from lambent.bake.transport.pieces import (
-    cuts_of,
+    MOST_CUTS,
+    angles,
+    corners_of,
+    first_part,
     in_bands,
-    means,
-    orders,
-    orders_of_piece,
-    piece,
+    is_bent,
+    is_last_part,
+    next_part,
+    parent,
+    share_of,
+    spread_of,
+    whole,
 )
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.visibility import BITS
@@ -38,6 +44,7 @@ from lambent.materials.factored.roughness import narrowed, thinned, varies
 from lambent.materials.factored.terms import Factor, Term
 from lambent.scenes.triangle_lights import TriangleLights
 
+TINY = 1e-12  # of a light: less is nowhere
 BLOCK = 1 << 14  # threads that Dr.Jit gives to one core together
 PAIRS_AT_ONCE = 1 << 24  # of points and pairs of bands: 128 MB
 LONGEST = 255  # step from an entry to the next
@@ -238,50 +245,88 @@ class _Lit:
 def _accumulate(  # type: ignore[no-untyped-def]
     row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
 ):
-    m = mi.UInt32(0)
+    """Each thread goes from piece to piece at its own pace: those of a vector have their bent triangles elsewhere."""
+    m, where = _next_seen(mi.UInt32(0), seen, pixels, pixel, count), whole()
     while active & (m < count):
-        bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
         centre, a, b, c, power = light_at(lights, m, p)
-        if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
-            power *= weight(centre)
-            corners = [steps(a), steps(b), steps(c)]
-            middles = [steps(dr.normalize(a + b)), steps(dr.normalize(b + c)), steps(dr.normalize(c + a))]
-            n = cuts_of(corners, middles)
-            power /= mi.Float(n * n)
-            s = mi.UInt32(0)
-            while s < n * n:
-                found = orders(corners, means(middles), counts)
-                if n > 1:
-                    found = orders_of_piece(piece(a, b, c, n, s), steps, counts)
-                _add_piece(row, part, power, found, counts)
-                s += 1
-        m += 1
+        done = (height(centre) <= 0) | (dr.max(power) <= 0)
+        if ~done:
+            ends, between = corners_of(a, b, c, where)
+            corners, middles = list(map(steps, ends)), list(map(steps, between))
+            if is_bent(corners, middles) & (where[0] < MOST_CUTS):
+                where = first_part(where)
+            else:
+                _add_piece(row, part, power * weight(centre) * share_of(where), angles(corners, middles, counts), counts)
+                while (where[0] > 0) & is_last_part(where):
+                    where = parent(where)
+                done = where[0] == 0
+                if ~done:
+                    where = next_part(where)
+        if done:
+            m = _next_seen(m + 1, seen, pixels, pixel, count)
+            where = whole()
     return row
 
 
 @dr.syntax
-def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def]
-    """Add a piece of a light to the bands, or pairs of bands, that it meets; of the first curve those of a part."""
-    begin, end = part
-    low, high = orders[0][0], orders[0][2]
-    j = dr.maximum(dr.minimum(mi.UInt32(low), counts[0] - 1), begin)
-    below = share_below(mi.Float(j), orders[0], dr)
-    while (mi.Float(j) <= high) & (j < end):
-        up_to = share_below(mi.Float(j + 1), orders[0], dr)
-        share = power * (up_to - below)
-        below = up_to
-        if dr.hint(len(counts) == 1, mode="scalar"):
-            _add(row, 3 * (j - begin), share)
-        else:
-            low_2, high_2 = orders[1][0], orders[1][2]
-            k = dr.minimum(mi.UInt32(low_2), counts[1] - 1)
-            under = mi.Float(0)
-            while (mi.Float(k) <= high_2) & (k < counts[1]):
-                over = share_below(mi.Float(k + 1), orders[1], dr)
-                _add(row, 3 * ((j - begin) * counts[1] + k), share * (over - under))
-                under = over
-                k += 1
-        j += 1
+def _next_seen(m, seen, pixels, pixel, count):  # type: ignore[no-untyped-def]
+    """The first light from m that a point sees, or `count`."""
+    found = mi.Bool(False)
+    while (m < count) & ~found:
+        word = dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)
+        found = word != 0
+        m = dr.select(found, m + dr.tzcnt(word), (m // BITS + 1) * BITS)
+    return dr.minimum(m, count)
+
+
+@dr.syntax
+def _add_piece(row, part, power, found, counts):  # type: ignore[no-untyped-def]
+    """Add a piece of a light to the nodes, or pairs of nodes, that it meets; of the first curve those of a part.
+
+    Of two angles, it walks along the nodes of that which varies more; the other is at its mean around each of them.
+    """
+    outer, turned = spread_of(found)
+    low, high = outer[0][0] - 0.5, outer[0][2] - 0.5  # from the first node
+    sides = outer[1][1] - outer[1][0], outer[1][2] - outer[1][0]
+    lowest, highest = dr.minimum(dr.minimum(*sides), 0), dr.maximum(dr.maximum(*sides), 0)
+    begin, end = mi.Float(part[0]) - 1, mi.Float(part[1]) - 1
+    many, others, step, other_step = mi.Float(counts[0]), 1, 1, 1
+    if dr.hint(len(counts) == 2, mode="scalar"):
+        begin, end = dr.select(turned, -1, begin), dr.select(turned, mi.Float(counts[1]) - 1, end)
+        many, others = [dr.select(turned, *order) for order in (counts[::-1], counts)]
+        step, other_step = dr.select(turned, 1, counts[1]), dr.select(turned, counts[1], 1)
+        many = mi.Float(many)
+    y = dr.clip(dr.floor(low), -1, many - 1)  # the node before, or -1
+    before = mi.Float(0), mi.Float(0), mi.Float(0)
+    if y < begin:
+        before = below(begin + 0.5, outer, dr)
+        y = mi.Float(begin)
+    left, left_b = mi.Float(0), mi.Float(0)  # what is for this node from before it
+    end = dr.minimum(end, high + 1)
+    while y <= end:
+        now = below(dr.minimum(y + 1.5, many), outer, dr)
+        here = now[0] - before[0]
+        mean = dr.clip((now[2] - before[2]) / dr.maximum(here, TINY), lowest, highest)
+        beyond = dr.clip(now[1] - before[1] + here * (low - y), 0, here)  # what is for the next node
+        beyond = dr.select(y < 0, here, dr.select(y < many - 1, beyond, 0))
+        share = left + here - beyond
+        if (share > 0) & (y >= 0):
+            if dr.hint(len(counts) == 2, mode="scalar"):
+                x = dr.clip(outer[1][0] + (left_b + mean * (here - beyond)) / share - 0.5, 0, mi.Float(others - 1))
+                k = mi.UInt32(x)
+                at, to = mi.UInt32(y) * step - part[0] * counts[1], x - mi.Float(k)
+                _add_within(row, part, at + k * other_step, power * (share * (1 - to)), counts)
+                _add_within(row, part, at + dr.minimum(k + 1, others - 1) * other_step, power * (share * to), counts)
+            else:
+                _add(row, 3 * (mi.UInt32(y) - part[0]), power * share)
+        left, left_b, before = beyond, mean * beyond, now
+        y += 1
+
+
+@dr.syntax
+def _add_within(row, part, at, value, counts):  # type: ignore[no-untyped-def]
+    if at < (part[1] - part[0]) * counts[1]:
+        _add(row, 3 * at, value)
 
 
 def _add(row: Any, at: Any, value: Any) -> None:
