@@ -1,10 +1,11 @@
-"""Transport of the pixels of a view: how much light reaches the viewer by each band of a curve.
+"""Transport of the pixels of a view: how much light reaches the viewer by each node of a curve.
 
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
-Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights,
-touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, bands are
-pairs of bands (4.15).
+Delta_mj is the mean over triangle m of hat function j, which is 1 at the centre of band j and 0 at those beside it:
+curves are straight lines from node to node (`Curve.node_values`), where the thesis has steps. One thread is one pixel:
+it walks through the lights, touches only the nodes that each of them meets, in memory of its own, and writes them once.
+With two curves, nodes are pairs of nodes (4.15).
 """
 
 from __future__ import annotations
@@ -245,38 +246,27 @@ class _Lit:
 def _accumulate(  # type: ignore[no-untyped-def]
     row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
 ):
-    """Each thread goes from piece to piece at its own pace: those of a vector have their bent triangles elsewhere."""
-    m, where = _next_seen(mi.UInt32(0), seen, pixels, pixel, count), whole()
+    m = mi.UInt32(0)
     while active & (m < count):
+        bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
         centre, a, b, c, power = light_at(lights, m, p)
-        done = (height(centre) <= 0) | (dr.max(power) <= 0)
-        if ~done:
-            ends, between = corners_of(a, b, c, where)
-            corners, middles = list(map(steps, ends)), list(map(steps, between))
-            if is_bent(corners, middles) & (where[0] < MOST_CUTS):
-                where = first_part(where)
-            else:
-                _add_piece(row, part, power * weight(centre) * share_of(where), angles(corners, middles, counts), counts)
-                while (where[0] > 0) & is_last_part(where):
-                    where = parent(where)
-                done = where[0] == 0
-                if ~done:
-                    where = next_part(where)
-        if done:
-            m = _next_seen(m + 1, seen, pixels, pixel, count)
+        if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
+            power *= weight(centre)
             where = whole()
+            busy = mi.Bool(True)
+            while busy:
+                ends, between = corners_of(a, b, c, where)
+                corners, middles = list(map(steps, ends)), list(map(steps, between))
+                if is_bent(corners, middles) & (where[0] < MOST_CUTS):
+                    where = first_part(where)
+                else:
+                    _add_piece(row, part, power * share_of(where), angles(corners, middles, counts), counts)
+                    while (where[0] > 0) & is_last_part(where):
+                        where = parent(where)
+                    busy = where[0] > 0
+                    where = next_part(where)
+        m += 1
     return row
-
-
-@dr.syntax
-def _next_seen(m, seen, pixels, pixel, count):  # type: ignore[no-untyped-def]
-    """The first light from m that a point sees, or `count`."""
-    found = mi.Bool(False)
-    while (m < count) & ~found:
-        word = dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)
-        found = word != 0
-        m = dr.select(found, m + dr.tzcnt(word), (m // BITS + 1) * BITS)
-    return dr.minimum(m, count)
 
 
 @dr.syntax
@@ -310,9 +300,10 @@ def _add_piece(row, part, power, found, counts):  # type: ignore[no-untyped-def]
         beyond = dr.clip(now[1] - before[1] + here * (low - y), 0, here)  # what is for the next node
         beyond = dr.select(y < 0, here, dr.select(y < many - 1, beyond, 0))
         share = left + here - beyond
-        if (share > 0) & (y >= 0):
+        inner = outer[1][0] + (left_b + mean * (here - beyond)) / dr.maximum(share, TINY)
+        if (share > 0) & (y >= 0) & (inner <= mi.Float(others)):
             if dr.hint(len(counts) == 2, mode="scalar"):
-                x = dr.clip(outer[1][0] + (left_b + mean * (here - beyond)) / share - 0.5, 0, mi.Float(others - 1))
+                x = dr.clip(inner - 0.5, 0, mi.Float(others - 1))
                 k = mi.UInt32(x)
                 at, to = mi.UInt32(y) * step - part[0] * counts[1], x - mi.Float(k)
                 _add_within(row, part, at + k * other_step, power * (share * (1 - to)), counts)

@@ -1,8 +1,8 @@
 """How much of a triangle counts for each node of a curve, from the angles at its corners alone (Ben-Artzi 2007, 4.2.1).
 
-Curves run straight from node to node. An angle a that is linear over a triangle is cut where it passes a node; of each
-part, the area (4.10) and the means of a and of a second angle b say exactly what the hat functions of its two nodes get,
-and where that part is along b. Functions take `ops`, as `materials.lobes` does.
+Curves run straight from node to node. Where an angle a is linear over a triangle, nodes cut the triangle into parts;
+the area of each (4.10) and its mean of a say exactly what the hat functions of its two nodes get; its mean of a second
+angle b says where it is along b. Functions take `ops`, as `materials.lobes` does.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ def spread(a: Three, b: Three, ops: Any) -> Spread:
 
 
 def below(y: Any, of: Spread, ops: Any) -> Three:
-    """The part of a triangle where a is below y: its share of the area (4.10), and that times a and times b, on average.
+    """Where a is below y: the share of a triangle's area (4.10), and the integrals of a and b over that share.
 
-    All of it where all corners are at y. Both are less their values at the lowest corner, so that little cancels.
+    All of it where all corners are at y. a and b are from their values at the lowest corner, so that little cancels.
     """
     (low, middle, high), (b0, b1, b2), (to_1, to_2, from_1) = of
     rise, fall, width = y - low, high - y, high - low

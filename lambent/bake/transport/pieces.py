@@ -1,4 +1,4 @@
-"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners in order."""
+"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import mitsuba as mi
 from lambent.bake.transport.overlaps import spread
 from lambent.materials.factored.curve import END_RAD
 
-BEND, BEND_BY_ANGLE, MOST_BEND = 0.25, 1 / 16, 2.0  # bands that an angle may be from linear within a piece; more, in
+BEND, BEND_BY_ANGLE, MOST_BEND = 0.5, 1 / 8, 4.0  # bands that an angle may be from linear within a piece; more, in
 # proportion to the angle, where curves have no narrow peaks
-WIDEST = 2  # bands that a piece may span in both of two curves
+WIDEST = 3  # nodes that a piece may span along both of two curves
 MOST_CUTS = 5  # of a triangle into four, and of those
 
 
@@ -47,7 +47,8 @@ def _least(values: Sequence[Any]) -> Any:
 
 
 # A piece of a triangle a, b, c: how often it was cut into four, which part it is of each cut (2 bits, the last one
-# lowest), its first corner a + u (b - a) + v (c - a), and its edges as a share of the triangle's, negative where turned.
+# lowest), u and v of its first corner a + u (b - a) + v (c - a), and its edges as a share of the whole ones, negative
+# where turned.
 Where = tuple[Any, Any, Any, Any, Any]
 
 
@@ -59,7 +60,10 @@ def corners_of(a: Any, b: Any, c: Any, where: Where) -> tuple[list[Any], list[An
     """Unit directions of the corners of a piece of a flat triangle, and of the middles of its edges."""
     _, _, u, v, edge = where
     first, along, across = a + (b - a) * u + (c - a) * v, (b - a) * edge, (c - a) * edge
-    places = [[first, first + along, first + across], [first + along / 2, first + (along + across) / 2, first + across / 2]]
+    places = [
+        [first, first + along, first + across],
+        [first + along / 2, first + (along + across) / 2, first + across / 2],
+    ]
     ends, between = (list(map(dr.normalize, few)) for few in places)
     return ends, between
 
@@ -83,8 +87,7 @@ def next_part(where: Where) -> Where:
     cuts, path, u, v, edge = where
     part = path & 3
     turned = part == 2
-    u, v = u + dr.select(turned | (part == 0), edge, -edge), v + dr.select(part == 0, 0, edge)
-    v = dr.select(turned, v - edge, v)
+    u, v = u + dr.select(part == 1, -edge, edge), v + dr.select(part == 1, edge, 0)
     return cuts, path + 1, u, v, dr.select(turned, -edge, edge)
 
 
@@ -113,7 +116,9 @@ def spread_of(angles: list[Any]) -> tuple[Any, Any]:
         return spread(angles[0], (mi.Float(0),) * 3, dr), mi.Bool(False)
     spans = [dr.maximum(dr.maximum(*a[:2]), a[2]) - dr.minimum(dr.minimum(*a[:2]), a[2]) for a in angles]
     turned = spans[1] > spans[0]
-    outer, inner = (tuple(dr.select(turned, x, y) for x, y in zip(*order, strict=True)) for order in (angles[::-1], angles))
+    outer, inner = (
+        tuple(dr.select(turned, x, y) for x, y in zip(*order, strict=True)) for order in (angles[::-1], angles)
+    )
     return spread(outer, inner, dr), turned
 
 

@@ -19,7 +19,7 @@ from lambent.editing.interreflection.folding import pixels, rows
 from lambent.editing.interreflection.powers import Powers, bands_of, powers
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
 from lambent.editing.products import Pixels
-from lambent.editing.rows import Rows, coefficients_of
+from lambent.editing.rows import Rows, wavelets_of
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
@@ -180,7 +180,7 @@ class _TermPicture:
             for layer in self.layers:
                 layer.view(viewer)
         if self._factors:
-            wanted = coefficients_of(material.curves[self._factors[self._at].curve], self._counts[self._at])
+            wanted = wavelets_of(material.curves[self._factors[self._at].curve].band_means(self._counts[self._at]))
         else:
             wanted = np.ones((1, 3))
         if not np.array_equal(wanted, self._pictures[0].wanted):
