@@ -143,3 +143,12 @@ def test_the_documented_example_runs(store: Store, tmp_path: Path, monkeypatch: 
     image = read_image(tmp_path / "tray.exr").reshape(-1, 3)[SHOWN["tray"]]
     assert np.allclose(image, SHINES + expected("tray", session.editable("tray")), rtol=3e-3)
     assert session.document.materials["tray"].curves
+
+
+def test_transport_by_steps_of_earlier_versions_is_not_misread(store: Store) -> None:
+    name = view_artefact_name(CAMERA, *SIZE, "transport", "200/terms")
+    old = store.artefact(name)
+    terms = [{key: value for key, value in term.items() if key != "basis"} for term in old.meta["terms"]]
+    store.put(name, "transport", store.read(name), key="older", meta={**old.meta, "terms": terms})
+    with pytest.raises(UserError, match="earlier version"):
+        edited_picture(store, Session.new("room", CAMERA, {"tray": MATERIALS["tray"]}, size=SIZE))

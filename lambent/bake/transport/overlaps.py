@@ -51,4 +51,4 @@ def below(y: Any, of: Spread, ops: Any) -> Three:
     return tuple(
         ops.select(all_of_it, whole, ops.select(none, 0.0, part))
         for whole, part in ((1.0, share), (a_all, of_a), (b_all, of_b))
-    )  # type: ignore[return-value]
+    )
