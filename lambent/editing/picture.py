@@ -259,7 +259,9 @@ class _TermPicture:
         """Products over the active curve, with the idle one as it is shown, and the radiance of a value of 1."""
         assert self._pairs is not None
         idle = 1 - self._active
-        return self.layer.fold(self._pairs, idle, self._shown[self._factors[idle].curve].band_means(self._counts[idle]))
+        return self.layer.fold(
+            self._pairs, idle, self._shown[self._factors[idle].curve].node_values(self._counts[idle])
+        )
 
     def _coefficients(self, curves: Mapping[str, Curve], factor: int) -> Floats:
         return coefficients_of(curves[self._factors[factor].curve], self._counts[factor])

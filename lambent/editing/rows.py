@@ -48,24 +48,24 @@ class Rows:
 
     @classmethod
     def of_bands(cls, transport: Pixels, over: int = 0) -> Rows:
-        """Rows of transport (J, 3, P) by bands, in W/(sr m^2)."""
+        """Rows of transport (J, 3, P) by nodes, in W/(sr m^2)."""
         return cls.of_wavelets(np.asarray(transformed(transport), np.float32), over)
 
 
 class PairTransport(Protocol):
-    """Transport over both curves of a term."""
+    """Transport over both curves of a term, by the nodes of `Curve.node_values`."""
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Bands (J, K) of the first and of the second curve, powers of two."""
+        """Nodes (J, K) of the first and of the second curve, powers of two."""
 
-    def fold(self, curve_index: int, means: Floats) -> Rows:
-        """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its means (K, 3) over bands."""
+    def fold(self, curve_index: int, values: Floats) -> Rows:
+        """Rows over the other curve, with curve `curve_index`, 0 or 1, folded in by its values (K, 3) at nodes."""
 
 
 @dataclass(frozen=True)
 class DensePairs:
-    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over every pair of bands of two curves."""
+    """Transport `bands` (J, K, 3, P) float32, W/(sr m^2), over every pair of nodes of two curves."""
 
     bands: Pixels
 
@@ -73,20 +73,20 @@ class DensePairs:
     def counts(self) -> tuple[int, int]:
         return self.bands.shape[0], self.bands.shape[1]
 
-    def fold(self, curve_index: int, means: Floats) -> Rows:
+    def fold(self, curve_index: int, values: Floats) -> Rows:
         sums = "jkcp,jc->kcp" if curve_index == 0 else "jkcp,kc->jcp"
-        return Rows.of_bands(np.einsum(sums, self.bands, np.asarray(means, np.float32)), 1 - curve_index)
+        return Rows.of_bands(np.einsum(sums, self.bands, np.asarray(values, np.float32)), 1 - curve_index)
 
 
 @lru_cache(maxsize=256)
 def coefficients_of(curve: Curve, count: int) -> Floats:
-    """(count, 3) wavelets of a curve: what rows are multiplied by."""
-    return wavelets_of(curve.band_means(count))
+    """(count, 3) wavelets of a curve's values at nodes: what rows are multiplied by."""
+    return wavelets_of(curve.node_values(count))
 
 
-def wavelets_of(means: Floats) -> Floats:
-    """(count, 3) wavelets of coefficients of bands."""
-    wavelets = transformed(means)
+def wavelets_of(values: Floats) -> Floats:
+    """(J, 3) wavelets of coefficients (J, 3), without what no frame would ever draw."""
+    wavelets = transformed(values)
     wavelets[np.abs(wavelets) < NOTHING * np.abs(wavelets).max()] = 0.0
     wavelets.flags.writeable = False
     return wavelets

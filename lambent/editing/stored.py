@@ -19,7 +19,7 @@ from lambent.editing.rows import PairTransport, Rows
 from lambent.editing.session import Session
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.store.contract import scene_record, transport_lights, view_artefact_name
+from lambent.store.contract import TRANSPORT_BASIS, scene_record, transport_lights, view_artefact_name
 from lambent.store.source import environment_note
 from lambent.store.store import Store
 
@@ -30,7 +30,7 @@ class NotBaked(UserError):
 
 @dataclass(frozen=True)
 class StoredPairs:
-    """Transport of two curves by the pairs of bands that matter; arrays as in the contract of stores."""
+    """Transport of two curves by the pairs of nodes that matter; arrays as in the contract of stores."""
 
     spans: NDArray[np.uint32]
     steps: NDArray[np.uint8]
@@ -38,10 +38,10 @@ class StoredPairs:
     unit: float
     counts: tuple[int, int]
 
-    def fold(self, curve_index: int, means: Floats) -> Rows:
+    def fold(self, curve_index: int, node_values: Floats) -> Rows:
         """Rows over the other curve, see `rows.PairTransport`."""
         edited = 1 - curve_index
-        rows, scale = folded(self.spans, self.steps, self.values, means, edited, self.counts[edited])
+        rows, scale = folded(self.spans, self.steps, self.values, node_values, edited, self.counts[edited])
         return Rows(rows, self.unit * scale, edited)
 
 
@@ -115,6 +115,9 @@ def parts_of(store: Store, session: Session, materials: Mapping[str, Editable], 
     pixel, number, theta_o = (store.read(name("view_points", part)) for part in ("pixel", "object", "theta_o"))
     worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
     said = store.artefact(name("transport", f"{lights}/terms")).meta["terms"]
+    if any(one.get("basis") != TRANSPORT_BASIS for one in said):
+        what = "transport was baked by an earlier version, which counted curves by steps"
+        raise NotBaked(what, file=store.folder, hint="bake the view for editing again")
     parts = {}
     for material, start in materials.items():
         mine = worn == material

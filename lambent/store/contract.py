@@ -39,19 +39,21 @@ To edit the materials of a view, with the image's size in its key:
                                            (core.wavelets) of its curve, at the Q points of the material in their order.
                                            TERM is the term's number in its Editable
     .../steps, values, spans               of a term with two curves instead: (Q, 2) uint32 spans, first entry of each
-                                           point and the one past its last; (N,) uint32 light by pairs of bands j, k,
+                                           point and the one past its last; (N,) uint32 light by pairs of nodes j, k,
                                            RGB9E5 (core.shared_exponent); (N,) uint8 steps from one entry's pair to the
                                            next. Pairs are numbered j K + k; each point begins at -1. Black pairs are
                                            absent, except where a step would be longer than 255
     view/KEY/transport/LIGHTS/terms        (T,) uint32, Q of each term; written last. meta["terms"] has for each
                                            "material", "term", "fixed": its quotient and angles (Term.fixed), "curves":
-                                           names and numbers of bands, and "scale". meta["environment"] is None, or
-                                           has "sha256", "scale" and "rotation_deg" of the image that lights the view
-                                           instead of the scene's environment
+                                           names and numbers of nodes, "scale", and "basis": TRANSPORT_BASIS.
+                                           meta["environment"] is None, or has "sha256", "scale" and
+                                           "rotation_deg" of the image that lights the view instead of the scene's
+                                           environment
 
 Radiance of a term at a point, W/(sr m^2): scale f_q f_o(theta_o) times the sum over wavelets, or pairs, of the array
-times the curves' coefficients. Coefficients of pairs are means over equal bands from 0 to 90 degrees, those of rows the
-wavelets of such means; f_q and f_o are the term's. Textures are in the array. The first set of LIGHTS is small and soon
+times the curves' coefficients. Coefficients of pairs are the curves' values at nodes (Curve.node_values), the
+centres of equal bands from 0 to 90 degrees, with straight lines between; those of rows are their wavelets; f_q and f_o
+are the term's. Textures are in the array. The first set of LIGHTS is small and soon
 there; `transport_lights` lists those that are complete, the last being the best, and `forget_lights` drops one.
 
 To relight a view with its materials as they are, with the image's size in its key; N triangles of the icosahedron cut
@@ -107,6 +109,7 @@ from lambent.store.store import MANIFEST, Store
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
 TIMINGS = "timings"
+TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
 VIEW = "view"

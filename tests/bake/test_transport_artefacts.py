@@ -66,7 +66,7 @@ def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.nda
         editable = editables[term["material"]]
         of_term = editable.terms[term["term"]]
         start = name("transport", f"{lights}/{term['material']}/{term['term']}/")
-        means = [editable.curves[curve].band_means(count) for curve, count in term["curves"]]
+        means = [editable.curves[curve].node_values(count) for curve, count in term["curves"]]
         if len(means) == 1:
             light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
         else:

@@ -1,12 +1,14 @@
-"""Shares of triangles in bands: known areas, Monte Carlo, degenerate corners."""
+"""Shares of triangles below an angle, and integrals over them: known areas, Monte Carlo, degenerate corners."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from lambent.bake.transport.overlaps import share_below, spread
+from lambent.bake.transport.overlaps import below, spread
 from lambent.materials.lobes import NUMPY
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -18,25 +20,32 @@ from lambent.materials.lobes import NUMPY
     ],
 )  # fmt: skip
 def test_known_shares(corners: tuple[float, ...], y: float, expected: float) -> None:
-    assert share_below(y, spread(*map(np.float64, corners), NUMPY), NUMPY) == pytest.approx(expected)
+    assert below(y, spread(tuple(map(np.float64, corners)), ZERO, NUMPY), NUMPY)[0] == pytest.approx(expected)
 
 
-def test_shares_are_those_of_random_points() -> None:
+def test_shares_and_integrals_are_those_of_random_points() -> None:
+    """Of both angles, from their values at the corner where the first is lowest."""
     rng = np.random.default_rng(1)
     inside = rng.dirichlet((1, 1, 1), 100_000)
-    for corners in rng.normal(size=(20, 3)):
-        edges = np.linspace(corners.min() - 0.1, corners.max() + 0.1, 12)
-        found = share_below(edges, spread(*corners, NUMPY), NUMPY)
-        counted = (inside @ corners < edges[:, None]).mean(axis=1)
-        assert np.allclose(found, counted, atol=0.006)
-        assert (np.diff(found) >= 0).all()
+    for a, b in rng.normal(size=(20, 2, 3)):
+        edges = np.linspace(a.min() - 0.1, a.max() + 0.1, 12)
+        found = below(edges, spread(tuple(a), tuple(b), NUMPY), NUMPY)
+        here = inside @ a < edges[:, None]
+        counted = here.mean(axis=1), *((here * (inside @ x - x[a.argmin()])).mean(axis=1) for x in (a, b))
+        assert all(np.allclose(f, c, atol=0.02) for f, c in zip(found, counted, strict=True))
+        assert (np.diff(found[0]) >= 0).all() and (np.diff(found[1]) >= 0).all()
 
 
-def test_bands_add_up_to_one() -> None:
+def test_parts_add_up_to_the_whole() -> None:
     rng = np.random.default_rng(2)
-    corners = rng.uniform(0, 1, (3, 5000)).astype(np.float32)
-    corners[1, :1000] = corners[0, :1000]
+    a, b = rng.uniform(0, 1, (2, 3, 5000)).astype(np.float32)
+    a[1, :1000] = a[0, :1000]
+    a[:, :100] = a[0, :100]
     edges = np.linspace(0, 1, 129, dtype=np.float32)
-    shares = np.diff(share_below(edges[:, None], spread(*corners, NUMPY), NUMPY), axis=0)
-    assert shares.min() >= -1e-5
-    assert np.allclose(shares.sum(axis=0), 1, atol=1e-6)
+    share, of_a, of_b = (np.diff(x, axis=0) for x in below(edges[:, None], spread(tuple(a), tuple(b), NUMPY), NUMPY))
+    assert share.min() >= -1e-5
+    assert np.allclose(share.sum(axis=0), 1, atol=1e-6)
+    assert np.allclose(of_a.sum(axis=0) + a.min(axis=0), a.mean(axis=0), atol=1e-6)
+    lowest = np.take_along_axis(b, a.argmin(axis=0)[None], axis=0)[0]
+    varied = slice(100, None)  # where all of a is alike, any corner may be the lowest
+    assert np.allclose((of_b.sum(axis=0) + lowest)[varied], b.mean(axis=0)[varied], atol=1e-5)

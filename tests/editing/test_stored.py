@@ -20,7 +20,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.materials.models import model_named
-from lambent.store.contract import SceneRecord, view_artefact_name, view_meta, write_scene_record
+from lambent.store.contract import TRANSPORT_BASIS, SceneRecord, view_artefact_name, view_meta, write_scene_record
 from lambent.store.store import Store
 
 SHINES = 0.125  # of the backdrop everywhere: surfaces may emit
@@ -58,7 +58,16 @@ def store(tmp_path: Path) -> Store:
     for name, material in MATERIALS.items():
         for k, (term, light) in enumerate(zip(of_material(material).terms, bands_of(name), strict=True)):
             curves = [[f.curve, COUNTS[f.curve]] for f in term.factors]
-            said.append({"material": name, "term": k, "fixed": term.fixed, "scale": UNIT, "curves": curves})
+            said.append(
+                {
+                    "material": name,
+                    "term": k,
+                    "fixed": term.fixed,
+                    "scale": UNIT,
+                    "curves": curves,
+                    "basis": TRANSPORT_BASIS,
+                }
+            )
             if len(term.factors) == 1:
                 put("transport", f"200/{name}/{k}/rows", transformed(light[:, 0].astype(np.float32)).astype(np.float16))
                 continue
@@ -78,7 +87,7 @@ def expected(name: str, made: Editable) -> np.ndarray:
     """(P, 3) of a material."""
     total = np.zeros((len(SHOWN[name]), 3))
     for term, light in zip(made.terms, bands_of(name), strict=True):
-        means = [made.curves[f.curve].band_means(n) for f, n in zip(term.factors, light.shape, strict=False)]
+        means = [made.curves[f.curve].node_values(n) for f, n in zip(term.factors, light.shape, strict=False)]
         means += [np.ones((1, 3))] * (2 - len(means))
         total += UNIT * np.array(term.scale) * np.einsum("jkcp,jc,kc->pc", light.astype(float), *means)
     return total
@@ -134,3 +143,12 @@ def test_the_documented_example_runs(store: Store, tmp_path: Path, monkeypatch: 
     image = read_image(tmp_path / "tray.exr").reshape(-1, 3)[SHOWN["tray"]]
     assert np.allclose(image, SHINES + expected("tray", session.editable("tray")), rtol=3e-3)
     assert session.document.materials["tray"].curves
+
+
+def test_transport_by_steps_of_earlier_versions_is_not_misread(store: Store) -> None:
+    name = view_artefact_name(CAMERA, *SIZE, "transport", "200/terms")
+    old = store.artefact(name)
+    terms = [{key: value for key, value in term.items() if key != "basis"} for term in old.meta["terms"]]
+    store.put(name, "transport", store.read(name), key="older", meta={**old.meta, "terms": terms})
+    with pytest.raises(UserError, match="earlier version"):
+        edited_picture(store, Session.new("room", CAMERA, {"tray": MATERIALS["tray"]}, size=SIZE))

@@ -14,7 +14,7 @@ from lambent.editing.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.store.contract import view_artefact_name, view_meta
+from lambent.store.contract import TRANSPORT_BASIS, view_artefact_name, view_meta
 from lambent.store.store import Store
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.subject import Subject
@@ -57,7 +57,7 @@ def write_view(folder, session, lights, seed=0):
             for k, term in enumerate(session.original(name).terms):
                 counts = [8 for _ in term.factors]
                 said.append(
-                    {"material": name, "term": k, "fixed": term.fixed, "scale": 0.25,
+                    {"material": name, "term": k, "fixed": term.fixed, "scale": 0.25, "basis": TRANSPORT_BASIS,
                      "curves": [[f.curve, 8] for f in term.factors]}
                 )  # fmt: skip
                 light = rng.random((*counts, 3, len(pixels))).astype(np.float32)

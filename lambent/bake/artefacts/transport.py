@@ -19,6 +19,7 @@ from lambent.bake.view import View
 from lambent.core.progress import Progress
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Factor, Term
+from lambent.store.contract import TRANSPORT_BASIS
 from lambent.store.source import environment_note
 from lambent.store.store import Store, Writer
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 KIND = "transport"
 NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
-REVISION = 2
+REVISION = 3
 POINTS = 1 << 15  # a chunk
 LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
 ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk
@@ -75,7 +76,8 @@ class _Part:
     def said(self, scale: float) -> dict[str, Any]:
         curves = [[factor.curve, count] for factor, count in self.bands]
         fixed = self.term.fixed
-        return {"material": self.material, "term": self.number, "fixed": fixed, "curves": curves, "scale": scale}
+        said = {"material": self.material, "term": self.number, "fixed": fixed, "curves": curves, "scale": scale}
+        return {**said, "basis": TRANSPORT_BASIS}
 
 
 def keys(context: BakeContext) -> dict[str, str]:

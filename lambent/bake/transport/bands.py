@@ -1,10 +1,11 @@
-"""Transport of the pixels of a view: how much light reaches the viewer by each band of a curve.
+"""Transport of the pixels of a view: how much light reaches the viewer by each node of a curve.
 
     T_j = sum over lights m of  V rho_q |cos| L_m Delta_mj        (Ben-Artzi 2007, eqs 4.4, 4.11, 4.12)
 
-Delta_mj is the share of triangle m whose angle lies in band j. One thread is one pixel: it walks through the lights,
-touches only the bands that each of them meets, in memory of its own, and writes them once. With two curves, bands are
-pairs of bands (4.15).
+Delta_mj is the mean over triangle m of hat function j, which is 1 at the centre of band j and 0 at those beside it:
+curves are straight lines from node to node (`Curve.node_values`), where the thesis has steps. One thread is one pixel:
+it walks through the lights, touches only the nodes that each of them meets, in memory of its own, and writes them once.
+With two curves, nodes are pairs of nodes (4.15).
 """
 
 from __future__ import annotations
@@ -20,18 +21,10 @@ from numpy.typing import NDArray
 
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import vectors
-from lambent.bake.transport.device_lights import light_at, lights_on_device
-from lambent.bake.transport.overlaps import share_below
-from lambent.bake.transport.pieces import (
-    cuts_of,
-    in_bands,
-    means,
-    orders,
-    orders_of_piece,
-    piece,
-)
+from lambent.bake.transport.device_lights import lights_on_device
+from lambent.bake.transport.pieces import in_bands
+from lambent.bake.transport.sums import accumulate, add
 from lambent.bake.transport.view_points import ViewPoints
-from lambent.bake.transport.visibility import BITS
 from lambent.core.shared_exponent import LARGEST, ONES, packed
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.roughness import narrowed, thinned, varies
@@ -227,66 +220,11 @@ class _Lit:
 
         row = dr.alloc_local(mi.Float, 3 * count * int(np.prod(self.counts[1:])), value=mi.Float(0))
         part = dr.opaque(mi.UInt32, begin), dr.opaque(mi.UInt32, begin + count)
-        row = _accumulate(
+        row = accumulate(
             row, part, pixel, active, dr.opaque(mi.UInt32, self._many), p, self._lights, self._seen, self._number,
             steps, height, weight, self.counts,
         )  # fmt: skip
         return row, pixel, active
-
-
-@dr.syntax
-def _accumulate(  # type: ignore[no-untyped-def]
-    row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
-):
-    m = mi.UInt32(0)
-    while active & (m < count):
-        bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
-        centre, a, b, c, power = light_at(lights, m, p)
-        if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
-            power *= weight(centre)
-            corners = [steps(a), steps(b), steps(c)]
-            middles = [steps(dr.normalize(a + b)), steps(dr.normalize(b + c)), steps(dr.normalize(c + a))]
-            n = cuts_of(corners, middles)
-            power /= mi.Float(n * n)
-            s = mi.UInt32(0)
-            while s < n * n:
-                found = orders(corners, means(middles), counts)
-                if n > 1:
-                    found = orders_of_piece(piece(a, b, c, n, s), steps, counts)
-                _add_piece(row, part, power, found, counts)
-                s += 1
-        m += 1
-    return row
-
-
-@dr.syntax
-def _add_piece(row, part, power, orders, counts):  # type: ignore[no-untyped-def]
-    """Add a piece of a light to the bands, or pairs of bands, that it meets; of the first curve those of a part."""
-    begin, end = part
-    low, high = orders[0][0], orders[0][2]
-    j = dr.maximum(dr.minimum(mi.UInt32(low), counts[0] - 1), begin)
-    below = share_below(mi.Float(j), orders[0], dr)
-    while (mi.Float(j) <= high) & (j < end):
-        up_to = share_below(mi.Float(j + 1), orders[0], dr)
-        share = power * (up_to - below)
-        below = up_to
-        if dr.hint(len(counts) == 1, mode="scalar"):
-            _add(row, 3 * (j - begin), share)
-        else:
-            low_2, high_2 = orders[1][0], orders[1][2]
-            k = dr.minimum(mi.UInt32(low_2), counts[1] - 1)
-            under = mi.Float(0)
-            while (mi.Float(k) <= high_2) & (k < counts[1]):
-                over = share_below(mi.Float(k + 1), orders[1], dr)
-                _add(row, 3 * ((j - begin) * counts[1] + k), share * (over - under))
-                under = over
-                k += 1
-        j += 1
-
-
-def _add(row: Any, at: Any, value: Any) -> None:
-    for c in range(3):
-        row[at + c] += value[c]
 
 
 @dr.syntax
@@ -313,15 +251,15 @@ def _merge(row, active, share, second, size):  # type: ignore[no-untyped-def]
             at = begin + k
             if _sum(row, at) >= least:
                 to = mi.UInt32(at)
-                _add(row, 3 * at, before)
+                add(row, 3 * at, before)
                 before = mi.Vector3f(0)
             else:
                 value = mi.Vector3f(row[3 * at], row[3 * at + 1], row[3 * at + 2])
                 if to == 0xFFFFFFFF:
                     before += value
                 else:
-                    _add(row, 3 * to, value)
-                _add(row, 3 * at, -value)
+                    add(row, 3 * to, value)
+                add(row, 3 * at, -value)
             k += 1
         begin += second
 

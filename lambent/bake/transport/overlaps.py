@@ -1,6 +1,8 @@
-"""How much of a triangle lies in a band of an angle, from the angle at its corners alone (Ben-Artzi 2007, 4.2.1).
+"""How much of a triangle counts for each node of a curve, from the angles at its corners alone (Ben-Artzi 2007, 4.2.1).
 
-Functions take `ops`, as `materials.lobes` does.
+Curves run straight from node to node. Where an angle a is linear over a triangle, nodes cut the triangle into parts;
+the area of each (4.10) and its mean of a say exactly what the hat functions of its two nodes get; its mean of a second
+angle b says where it is along b. Functions take `ops`, as `materials.lobes` does.
 """
 
 from __future__ import annotations
@@ -9,25 +11,44 @@ from typing import Any
 
 LEAST = 1e-12  # of the difference of two corners: the area below such an edge is all or nothing
 
-
-Spread = tuple[Any, Any, Any, Any, Any]
-
-
-def spread(a: Any, b: Any, c: Any, ops: Any) -> Spread:
-    """The values at the corners in order, and shares of the area by square of the distance from first and last."""
-    low, high = ops.minimum(ops.minimum(a, b), c), ops.maximum(ops.maximum(a, b), c)
-    middle = ops.maximum(ops.minimum(a, b), ops.minimum(ops.maximum(a, b), c))
-    width = ops.maximum(high - low, LEAST)
-    below, above = (width * ops.maximum(difference, LEAST) for difference in (middle - low, high - middle))
-    return low, middle, high, 1 / below, 1 / above
+Three = tuple[Any, Any, Any]
+Spread = tuple[Three, Three, Three]
 
 
-def share_below(y: Any, of: Spread, ops: Any) -> Any:
-    """Share of a triangle's area where a linear function with this spread is below y (4.10).
+def spread(a: Three, b: Three, ops: Any) -> Spread:
+    """a at the corners in rising order, b at the same corners, and 1 over the differences of a: 01, 02, 12."""
+    corners = list(zip(a, b, strict=True))
+    for i, k in ((0, 1), (1, 2), (0, 1)):
+        (a0, b0), (a1, b1) = corners[i], corners[k]
+        turned = a1 < a0
+        corners[i] = ops.minimum(a0, a1), ops.select(turned, b1, b0)
+        corners[k] = ops.maximum(a0, a1), ops.select(turned, b0, b1)
+    (low, middle, high), at = zip(*corners, strict=True)
+    apart = [1 / ops.maximum(difference, LEAST) for difference in (middle - low, high - low, high - middle)]
+    return (low, middle, high), at, (apart[0], apart[1], apart[2])
 
-    All of it where all corners are at y.
+
+def below(y: Any, of: Spread, ops: Any) -> Three:
+    """Where a is below y: the share of a triangle's area (4.10), and the integrals of a and b over that share.
+
+    All of it where all corners are at y. a and b are from their values at the lowest corner, so that little cancels.
     """
-    low, middle, high, from_low, from_high = of
-    rise, fall = y - low, high - y
-    inside = ops.select(y < middle, rise * rise * from_low, 1 - fall * fall * from_high)
-    return ops.select(y >= high, 1.0, ops.select(y <= low, 0.0, inside))
+    (low, middle, high), (b0, b1, b2), (to_1, to_2, from_1) = of
+    rise, fall, width = y - low, high - y, high - low
+    side_1, side_2 = b1 - b0, b2 - b0
+    up_1, up_2, down_1, down_0 = rise * to_1, rise * to_2, fall * from_1, fall * to_2
+    under, over = up_1 * up_2, down_1 * down_0
+    a_all, b_all = (middle - low + width) / 3, (side_1 + side_2) / 3
+    first = y < middle
+    share = ops.select(first, under, 1 - over)
+    of_a = ops.select(first, under * (rise * (2 / 3)), a_all - over * (width - fall * (2 / 3)))
+    of_b = ops.select(
+        first,
+        under * (up_1 * side_1 + up_2 * side_2) / 3,
+        b_all - over * (side_2 + (down_1 * (side_1 - side_2) - down_0 * side_2) / 3),
+    )
+    all_of_it, none = y >= high, y <= low
+    return tuple(
+        ops.select(all_of_it, whole, ops.select(none, 0.0, part))
+        for whole, part in ((1.0, share), (a_all, of_a), (b_all, of_b))
+    )

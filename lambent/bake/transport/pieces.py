@@ -1,8 +1,9 @@
-"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners in order."""
+"""Pieces of triangles, so small that angles are nearly linear in each, and the angles at their corners."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -11,11 +12,10 @@ import mitsuba as mi
 from lambent.bake.transport.overlaps import spread
 from lambent.materials.factored.curve import END_RAD
 
-BEND, BEND_BY_ANGLE, MOST_BEND = 0.25, 1 / 16, 2.0  # bands that an angle may be from linear within a piece; more, in
+BEND, BEND_BY_ANGLE, MOST_BEND = 0.5, 1 / 8, 4.0  # bands that an angle may be from linear within a piece; more, in
 # proportion to the angle, where curves have no narrow peaks
-WIDEST = 2  # bands that a piece may span in both of two curves
-MOST_CUTS = 32  # an edge
-Steps = Callable[[Any], list[Any]]
+WIDEST = 3  # nodes that a piece may span along both of two curves
+MOST_CUTS = 5  # of a triangle into four, and of those
 
 
 def in_bands(angle: Any, count: int) -> Any:
@@ -24,63 +24,102 @@ def in_bands(angle: Any, count: int) -> Any:
     return dr.select(step < count * (1 + 1e-5), dr.minimum(step, count), step)
 
 
-def cuts_of(corners: list[Any], middles: list[Any]) -> Any:
-    """Cuts of an edge after which the angles are nearly linear in each piece: their error falls with the square.
+def is_bent(corners: list[Any], middles: list[Any]) -> Any:
+    """Whether a piece has to be cut, as its angles are not nearly linear: the error of a part is a quarter.
 
-    Two angles that vary together in a piece are counted as if they did not (4.15), so one must vary little.
+    Of two angles, one is taken at its mean along the other (4.15 takes them as independent), so one must vary little.
     """
-    cuts = mi.Float(1)
+    bent = mi.Bool(False)
     for at, between in zip(zip(*corners, strict=True), zip(*middles, strict=True), strict=True):
         bends = [dr.abs(m - (x + y) / 2) for m, x, y in zip(between, at, (*at[1:], at[0]), strict=True)]
-        least = dr.minimum(dr.minimum(*at[:2]), at[2])
-        allowed = dr.clip(least * BEND_BY_ANGLE, BEND, MOST_BEND)
-        cuts = dr.maximum(cuts, dr.sqrt(dr.maximum(dr.maximum(*bends[:2]), bends[2]) / allowed))
+        bent |= _most(bends) > dr.clip(_least([*at, *between]) * BEND_BY_ANGLE, BEND, MOST_BEND)
     if len(corners[0]) == 2:
-        spans = [
-            dr.maximum(dr.maximum(x, y), z) - dr.minimum(dr.minimum(x, y), z) for x, y, z in zip(*corners, strict=True)
-        ]
-        cuts = dr.maximum(cuts, dr.minimum(*spans) / WIDEST)
-    return dr.clip(mi.UInt32(dr.ceil(cuts)), 1, MOST_CUTS)
+        bent |= dr.minimum(*(_most(x) - _least(x) for x in zip(*corners, strict=True))) > WIDEST
+    return bent
 
 
-def piece(a: Any, b: Any, c: Any, n: Any, s: Any) -> list[Any]:
-    """Corners, unit, of piece s of the n^2 equal pieces of a flat triangle, counted in rows from a."""
-    row = mi.UInt32(dr.sqrt(mi.Float(s) + 0.5))
-    k = s - row * row
-    j, turned = k // 2, k % 2 == 1
-    u, v = (b - a) / mi.Float(n), (c - b) / mi.Float(n)
-
-    def at(i: Any, k: Any) -> Any:
-        return dr.normalize(a + u * mi.Float(i) + v * mi.Float(k))
-
-    second, third = at(row + 1, j), at(row + 1, j + 1)
-    return [at(row, j), dr.select(turned, third, second), dr.select(turned, at(row, j + 1), third)]
+def _most(values: Sequence[Any]) -> Any:
+    return reduce(dr.maximum, values)
 
 
-def means(middles: list[list[Any]]) -> list[Any]:
-    """Mean angles over a triangle, by curve: exact for angles that are quadratic in it."""
-    return [(a + b + c) / 3 for a, b, c in zip(*middles, strict=True)]
+def _least(values: Sequence[Any]) -> Any:
+    return reduce(dr.minimum, values)
 
 
-def orders_of_piece(corners: list[Any], steps: Steps, counts: list[int]) -> list[Any]:
-    """`orders` of a piece; for the mean the centre counts 3/4 (Simpson's rule on a triangle)."""
-    centre, found = steps(dr.normalize(corners[0] + corners[1] + corners[2])), list(map(steps, corners))
-    mean = [0.75 * at + (a + b + c) / 12 for at, a, b, c in zip(centre, *found, strict=True)]
-    return orders(found, mean, counts)
+# A piece of a triangle a, b, c: how often it was cut into four, which part it is of each cut (2 bits, the last one
+# lowest), u and v of its first corner a + u (b - a) + v (c - a), and its edges as a share of the whole ones, negative
+# where turned.
+Where = tuple[Any, Any, Any, Any, Any]
 
 
-def orders(corners: list[Any], means: list[Any], counts: list[int]) -> list[Any]:
-    """The angles at a piece's corners in order, by curve, moved so that their mean is that of the whole piece.
+def whole() -> Where:
+    return mi.UInt32(0), mi.UInt32(0), mi.Float(0), mi.Float(0), mi.Float(1)
 
-    Angles are convex along most edges: without the correction they would be too large in the mean, and highlights too
-    dark.
+
+def corners_of(a: Any, b: Any, c: Any, where: Where) -> tuple[list[Any], list[Any]]:
+    """Unit directions of the corners of a piece of a flat triangle, and of the middles of its edges."""
+    _, _, u, v, edge = where
+    first, along, across = a + (b - a) * u + (c - a) * v, (b - a) * edge, (c - a) * edge
+    places = [
+        [first, first + along, first + across],
+        [first + along / 2, first + (along + across) / 2, first + across / 2],
+    ]
+    ends, between = (list(map(dr.normalize, few)) for few in places)
+    return ends, between
+
+
+def share_of(where: Where) -> Any:
+    """Of the triangle's area."""
+    return where[4] * where[4]
+
+
+def first_part(where: Where) -> Where:
+    cuts, path, u, v, edge = where
+    return cuts + 1, path << 2, u, v, edge / 2
+
+
+def is_last_part(where: Where) -> Any:
+    return where[1] & 3 == 3
+
+
+def next_part(where: Where) -> Where:
+    """The parts at the second and third corner, and the one between, which is turned."""
+    cuts, path, u, v, edge = where
+    part = path & 3
+    turned = part == 2
+    u, v = u + dr.select(part == 1, -edge, edge), v + dr.select(part == 1, edge, 0)
+    return cuts, path + 1, u, v, dr.select(turned, -edge, edge)
+
+
+def parent(where: Where) -> Where:
+    """Of a last part."""
+    cuts, path, u, v, edge = where
+    return cuts - 1, path >> 2, u + edge, v + edge, -2 * edge
+
+
+def angles(corners: list[Any], middles: list[Any], counts: list[int]) -> list[Any]:
+    """The angles at a piece's corners, by curve, moved so that their mean is that of the whole piece.
+
+    That is the mean at the middles of its edges, for angles that are quadratic. Angles are convex along most edges:
+    without the correction they would be too large in the mean, and highlights too dark.
     """
     found = []
-    for at, mean, end in zip(zip(*corners, strict=True), means, counts, strict=True):
-        shift = mean - (at[0] + at[1] + at[2]) / 3
-        a, b, c = (dr.clip(angle + shift, 0.0, dr.maximum(angle, end)) for angle in at)
-        found.append(spread(a, b, c, dr))
+    for at, between, end in zip(zip(*corners, strict=True), zip(*middles, strict=True), counts, strict=True):
+        shift = (sum(between) - sum(at)) / 3
+        found.append(tuple(dr.clip(angle + shift, 0.0, dr.maximum(angle, end)) for angle in at))
     return found
+
+
+def spread_of(angles: list[Any]) -> tuple[Any, Any]:
+    """`overlaps.spread` of a piece by the curve whose angle varies more, and whether that is the second one."""
+    if len(angles) == 1:
+        return spread(angles[0], (mi.Float(0),) * 3, dr), mi.Bool(False)
+    spans = [dr.maximum(dr.maximum(*a[:2]), a[2]) - dr.minimum(dr.minimum(*a[:2]), a[2]) for a in angles]
+    turned = spans[1] > spans[0]
+    outer, inner = (
+        tuple(dr.select(turned, x, y) for x, y in zip(*order, strict=True)) for order in (angles[::-1], angles)
+    )
+    return spread(outer, inner, dr), turned
 
 
 def solid_angle(a: Any, b: Any, c: Any) -> Any:

@@ -59,6 +59,24 @@ class Curve:
             raise ValueError(f"{bands} bands do not divide {KNOTS} intervals")
         return np.asarray(self._interval_means.reshape(bands, per_band, 3).mean(axis=1))
 
+    def node_values(self, bands: int) -> Floats:
+        """Values (bands, 3) at the centres of equal bands, between which straight lines follow the curve.
+
+        Values of the curve there would make a narrow peak pop while it is dragged. Means over the bands flatten it, by
+        1/8 of their second difference; that much goes back up the slopes, but no further than half way to the curve's
+        least and largest value in these bands and those beside them, so that nothing overshoots or becomes negative.
+        """
+        means, per_band = self.band_means(bands), KNOTS // bands
+        within = np.ascontiguousarray(self.values[:-1].T).reshape(3, bands, per_band)  # as numpy is fast along the end
+        least, most = (f(f.reduce(within, axis=2).T, self.values[per_band::per_band]) for f in (np.minimum, np.maximum))
+        least, most = (np.pad(of, ((1, 1), (0, 0)), mode="edge") for of in (least, most))
+        below = means - np.minimum(np.minimum(least[:-2], least[1:-1]), least[2:])
+        above = np.maximum(np.maximum(most[:-2], most[1:-1]), most[2:]) - means
+        rise = np.diff(means, axis=0)
+        room = np.where(rise > 0, np.minimum(below[:-1], above[1:]), np.minimum(above[:-1], below[1:]))
+        moved = np.sign(rise) * np.minimum(np.abs(rise) / 8, room / 2)
+        return np.asarray(means - np.diff(np.pad(moved, ((1, 1), (0, 0))), axis=0))
+
     def polar_means(self, bands: int) -> Floats:
         """As `band_means`, but over the rings of a sphere that the bands are: a peak keeps its light in any band."""
         weight = -np.diff(np.cos(angles_rad())).reshape(bands, -1, 1)

@@ -41,3 +41,27 @@ def test_values_are_checked_and_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         Curve.constant().values[0] = 2
     assert len(angles_rad()) == KNOTS + 1
+
+
+@pytest.mark.parametrize("width", [0.03, 0.06, 0.3])
+def test_lines_between_nodes_follow_smooth_curves_better_than_steps(width: float) -> None:
+    curve, nodes = Curve.of(lambda x: np.exp(-((np.tan(x) / width) ** 2))), 128
+    lines = Curve.through((np.arange(nodes) + 0.5) * END_RAD / nodes, curve.node_values(nodes)).values
+    steps = curve.band_means(nodes)[np.minimum(np.arange(KNOTS + 1) * nodes // KNOTS, nodes - 1)]
+    errors = [np.abs(found - curve.values).mean() for found in (lines, steps)]
+    assert errors[0] < 0.2 * errors[1]
+
+
+def test_node_values_keep_the_sum_and_never_overshoot() -> None:
+    """Of steps and of peaks narrower than a band, too, wherever these are."""
+    rng = np.random.default_rng(0)
+    for curve in (
+        Curve.of(lambda x: (x > 0.7).astype(float)),
+        Curve.of(lambda x: np.exp(-(((x - 0.5) / 0.004) ** 2))),
+        Curve(rng.random((KNOTS + 1, 3))),
+    ):
+        for nodes in (1, 2, 16, 128, KNOTS):
+            values = curve.node_values(nodes)
+            assert np.allclose(values.sum(axis=0), curve.band_means(nodes).sum(axis=0))
+            assert (values >= curve.values.min(axis=0) - 1e-12).all()
+            assert (values <= curve.values.max(axis=0) + 1e-12).all()

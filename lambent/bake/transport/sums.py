@@ -1,0 +1,111 @@
+"""Sums of a thread: lights cut into pieces, whose shares go to the hat functions, or pairs of them, that they meet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lambent.bake.transport.device_lights import light_at
+from lambent.bake.transport.overlaps import below
+from lambent.bake.transport.pieces import (
+    MOST_CUTS,
+    angles,
+    corners_of,
+    first_part,
+    is_bent,
+    is_last_part,
+    next_part,
+    parent,
+    share_of,
+    spread_of,
+    whole,
+)
+from lambent.bake.transport.visibility import BITS
+
+TINY = 1e-12  # of a light: less is nowhere
+
+
+@dr.syntax
+def accumulate(  # type: ignore[no-untyped-def]
+    row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
+):
+    """Add all lights that a point sees to its row. Pieces are cut where the angles bend, depth first."""
+    m = mi.UInt32(0)
+    while active & (m < count):
+        bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
+        centre, a, b, c, power = light_at(lights, m, p)
+        if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
+            power *= weight(centre)
+            where = whole()
+            busy = mi.Bool(True)
+            while busy:
+                ends, between = corners_of(a, b, c, where)
+                corners, middles = list(map(steps, ends)), list(map(steps, between))
+                if is_bent(corners, middles) & (where[0] < MOST_CUTS):
+                    where = first_part(where)
+                else:
+                    _add_piece(row, part, power * share_of(where), angles(corners, middles, counts), counts)
+                    while (where[0] > 0) & is_last_part(where):
+                        where = parent(where)
+                    busy = where[0] > 0
+                    where = next_part(where)
+        m += 1
+    return row
+
+
+@dr.syntax
+def _add_piece(row, part, power, found, counts):  # type: ignore[no-untyped-def]
+    """Add a piece of a light to the nodes, or pairs of nodes, that it meets; of the first curve those of a part.
+
+    Of two angles, it walks along the nodes of that which varies more; the other is at its mean around each of them.
+    """
+    outer, turned = spread_of(found)
+    low, high = outer[0][0] - 0.5, outer[0][2] - 0.5  # from the first node
+    sides = outer[1][1] - outer[1][0], outer[1][2] - outer[1][0]
+    lowest, highest = dr.minimum(dr.minimum(*sides), 0), dr.maximum(dr.maximum(*sides), 0)
+    begin, end = mi.Float(part[0]) - 1, mi.Float(part[1]) - 1
+    many, others, step, other_step = mi.Float(counts[0]), 1, 1, 1
+    if dr.hint(len(counts) == 2, mode="scalar"):
+        begin, end = dr.select(turned, -1, begin), dr.select(turned, mi.Float(counts[1]) - 1, end)
+        many, others = [dr.select(turned, *order) for order in (counts[::-1], counts)]
+        step, other_step = dr.select(turned, 1, counts[1]), dr.select(turned, counts[1], 1)
+        many = mi.Float(many)
+    y = dr.clip(dr.floor(low), -1, many - 1)  # the node before, or -1
+    before = mi.Float(0), mi.Float(0), mi.Float(0)
+    if y < begin:
+        before = below(begin + 0.5, outer, dr)
+        y = mi.Float(begin)
+    left, left_b = mi.Float(0), mi.Float(0)  # what is for this node from before it
+    end = dr.minimum(end, high + 1)
+    while y <= end:
+        now = below(dr.minimum(y + 1.5, many), outer, dr)
+        here = now[0] - before[0]
+        mean = dr.clip((now[2] - before[2]) / dr.maximum(here, TINY), lowest, highest)
+        beyond = dr.clip(now[1] - before[1] + here * (low - y), 0, here)  # what is for the next node
+        beyond = dr.select(y < 0, here, dr.select(y < many - 1, beyond, 0))
+        share = left + here - beyond
+        inner = outer[1][0] + (left_b + mean * (here - beyond)) / dr.maximum(share, TINY)
+        if (share > 0) & (y >= 0) & (inner <= mi.Float(others)):
+            if dr.hint(len(counts) == 2, mode="scalar"):
+                x = dr.clip(inner - 0.5, 0, mi.Float(others - 1))
+                k = mi.UInt32(x)
+                at, to = mi.UInt32(y) * step - part[0] * counts[1], x - mi.Float(k)
+                _add_within(row, part, at + k * other_step, power * (share * (1 - to)), counts)
+                _add_within(row, part, at + dr.minimum(k + 1, others - 1) * other_step, power * (share * to), counts)
+            else:
+                add(row, 3 * (mi.UInt32(y) - part[0]), power * share)
+        left, left_b, before = beyond, mean * beyond, now
+        y += 1
+
+
+@dr.syntax
+def _add_within(row, part, at, value, counts):  # type: ignore[no-untyped-def]
+    if at < (part[1] - part[0]) * counts[1]:
+        add(row, 3 * at, value)
+
+
+def add(row: Any, at: Any, value: Any) -> None:
+    for c in range(3):
+        row[at + c] += value[c]
