@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 KIND = "transport"
 NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
-REVISION = 2
+REVISION = 3
 POINTS = 1 << 15  # a chunk
 LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
 ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk
@@ -101,10 +101,11 @@ def bake(context: BakeContext) -> None:
 
 
 def _bake_view(context: BakeContext, view: View, count: int) -> None:
+    from lambent.bake.transport.device_lights import brightest
     from lambent.bake.transport.stored import scale_of
 
     lights, points = context.view_tracer.lights(count), context.view_tracer.points(view)
-    scale, sizes = scale_of(lights), []
+    scale, sizes = scale_of(brightest(points.p, lights)), []
     seen = context.store.read(view.name("visibility", str(count)))
     worn = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))
