@@ -106,7 +106,7 @@ def test_a_quarter_is_mirrored_with_and_without_its_ends(begin: float) -> None:
         nodes = np.radians(begin + np.array(nodes_deg, float))
         azimuths = Azimuths.of(nodes)
         assert azimuths.parts == 4
-        brought, wo, phi = azimuths.brought(wi, wi)
+        brought, _, phi = azimuths.brought(wi, wi)
         np.testing.assert_allclose(direction(np.full(721, 0.7), phi), brought, atol=1e-12)
         np.testing.assert_allclose(np.abs(brought), np.abs(wi))
         value, (flip, there, share) = np.interp(phi, nodes, np.cos(nodes) ** 2), azimuths.beyond(phi)
