@@ -238,6 +238,6 @@ def test_small_bright_lamps_are_stored_as_exactly_as_large_ones(scene: Scene, tm
 
 
 def test_a_scene_without_light_has_transport_without_light(scene: Scene, tmp_path: Path) -> None:
-    dark = replace(scene, objects=scene.objects[:-1], environment=ConstantEnvironment((0.0, 0.0, 0.0)))
+    dark = replace(scene, objects=scene.objects[:-1], environment=None)
     store = bake_view(dark, tmp_path / "s")
     assert not picture(store, 200, {name: of_material(m) for name, m in dark.materials.items()}).any()
