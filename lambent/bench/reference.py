@@ -15,7 +15,7 @@ from lambent.core.arrays import Flags, Floats
 
 @dataclass(frozen=True)
 class Reference:
-    """Radiance (H, W, 3), the pixels (H, W) that are compared, and the exposure that gives the reference a mean of .3.
+    """Radiance (H, W, 3), the pixels (H, W) that are compared, and the exposure of `metrics.display_exposure`.
 
     Images are compared as clip(2^exposure_ev L)^(1/2.2), black where they are not compared.
     """

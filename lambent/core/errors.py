@@ -54,12 +54,14 @@ class UserError(Exception):
 def invalid(error: Any, file: str | Path, known: Iterable[str] = ()) -> UserError:
     """The first fault of a pydantic `ValidationError`; `known` are the keys that an unknown one may have meant."""
     first = error.errors()[0]
-    field = ".".join(str(part) for part in first["loc"])
+    field = ".".join(str(part) for part in first["loc"]) or None
     if first["type"] == "extra_forbidden":
         return UserError("unknown key", file=file, field=field, hint=did_you_mean(str(first["loc"][-1]), known))
     if first["type"] == "missing":
         return UserError("is missing", file=file, field=field)
-    return UserError(first["msg"].removeprefix("Value error, "), file=file, field=field, got=first["input"])
+    whole = isinstance(first["input"], dict)  # too long to be shown
+    message = first["msg"].removeprefix("Value error, ")
+    return UserError(message, file=file, field=field, got=None if whole else first["input"])
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:

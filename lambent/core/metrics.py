@@ -14,6 +14,7 @@ from lambent.core.arrays import Floats
 from lambent.core.colour import rgb_to_lab, srgb_encode
 
 TILE = 16  # pixels
+MOST_LIT = 2 / 3  # mean of what is not black, as it is displayed
 
 
 @dataclass(frozen=True)
@@ -108,12 +109,14 @@ def display_pair(reference: Floats, test: Floats, mean: float = 0.3) -> tuple[Fl
 def display_exposure(reference: Floats, mean: float = 0.3) -> float:
     """log2 of the e at which `displayed` of an image of radiance has mean `mean`.
 
+    Values above 0 have a mean of at most `MOST_LIT`: little light before black would else be clipped, whatever it is.
     Found by bisection because clipping makes the mean a monotone, not linear, function of e.
     """
+    mean = min(mean, MOST_LIT * float(np.mean(np.asarray(reference) > 0)))
     low, high = -40.0, 40.0  # stops
     for _ in range(60):
         middle = (low + high) / 2
-        low, high = (middle, high) if displayed(reference, middle).mean() < mean else (low, middle)
+        low, high = (middle, high) if displayed(reference, middle).mean() <= mean else (low, middle)
     return low
 
 

@@ -22,7 +22,7 @@ from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
 from lambent.scenes.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
 
-LIMIT_BYTES = 256 << 20
+LIMIT_BYTES, VERSION = 256 << 20, 1
 MOST_MATERIALS, MOST_LAYERS, MOST_PARAMETERS = 1000, 4096, 100
 MOST_PIXELS = 1 << 26
 LARGEST = 1e9  # of a curve or a colour: its square still fits float32
@@ -166,6 +166,11 @@ def load_document(path: Path) -> SessionDocument:
         raise UserError(f"not a JSON document ({error})", file=path) from error
     if not isinstance(data, dict) or "format" not in data:
         raise UserError("not a session of edits", file=path, expected="an object with a format")
+    if (version := data.get("version", VERSION)) != VERSION:
+        hint = "use the Lambent that wrote it, or a later one"
+        raise UserError(
+            "session of another version", file=path, field="version", got=version, expected=VERSION, hint=hint
+        )
     try:
         return SessionDocument.model_validate(data)
     except ValidationError as error:

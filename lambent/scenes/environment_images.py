@@ -30,12 +30,14 @@ _TURNS: dict[Axis, Floats] = {
 def read_lat_long(file: Path, layout: Layout | None = None) -> Image:
     """(H, W, 3) float32 lat-long picture of a file in any layout; it is recognised where `layout` is None.
 
+    Negative values, which filters leave beside bright lamps, are black.
+
     Raises
     ------
     UserError
         The file is no picture, or not of that layout, or its layout is not clear.
     """
-    picture = np.asarray(read_image(file)[..., :3], np.float32)
+    picture = np.maximum(read_image(file)[..., :3], np.float32(0))
     return as_lat_long(picture, layout or layout_of(picture, file), file)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -12,7 +13,8 @@ from lambent.bake.reference.path_traced import render_reference
 from lambent.bake.tracing.emitters import FLOOR, balance_emitters
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
-from lambent.scenes.scene import PointLight, Scene
+from lambent.core.images import write_image
+from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, PointLight, Scene
 from tests.bake.small_scenes import GREY, plane
 
 
@@ -41,3 +43,23 @@ def test_the_picture_keeps_its_mean() -> None:
     assert both.mean() == pytest.approx(
         (alone[0] + alone[1]).mean(), abs=5 * float(variance.mean() / variance.size) ** 0.5
     )
+
+
+def test_a_black_environment_takes_no_light_from_the_others(tmp_path: Path) -> None:
+    """Its densities are not finite: one in so many choices of an emitter was lost."""
+    lit, camera = lit_plane(10.0), Camera("c", (0, 2, 0.1), (0, 0, 0))
+    write_image(tmp_path / "black.exr", np.zeros((8, 16, 3), np.float32))
+    write_image(tmp_path / "grey.exr", np.ones((8, 16, 3), np.float32))
+    expected = render_reference(lit, camera, 8, 8, 16)[0]
+    assert expected.min() > 0
+    for black in (
+        ConstantEnvironment((0.0, 0.0, 0.0)),
+        ImageEnvironment(tmp_path / "black.exr"),
+        ImageEnvironment(tmp_path / "grey.exr", scale=0.0),
+    ):
+        np.testing.assert_array_equal(render_reference(replace(lit, environment=black), camera, 8, 8, 16)[0], expected)
+
+
+def test_a_scene_without_light_is_black() -> None:
+    dark = replace(plane(), environment=ConstantEnvironment((0.0, 0.0, 0.0)))
+    assert not render_reference(dark, Camera("c", (0, 2, 0.1), (0, 0, 0)), 8, 8, 4)[0].any()

@@ -232,3 +232,19 @@ def test_no_pixel_looks_through_a_surface() -> None:
     near = np.linalg.norm(left - right, axis=-1) < 0.004
     assert np.count_nonzero(near) > 10_000
     assert np.linalg.norm(middle - (left + right) / 2, axis=-1)[near].max() < 0.02
+
+
+@pytest.mark.parametrize("edge_m", [1e-4, 1e-3])
+def test_small_lamps_keep_their_light(edge_m: float) -> None:
+    """A lamp of a tenth of a millimetre in 200 pieces lights like a point of radiance times area times cosine."""
+    corners = edge_m * np.array([[[0, 0, 0], [1, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 0, 1], [0, 0, 1]]]) + [
+        0.0,
+        2.0,
+        0.0,
+    ]
+    floor = Scene("floor", (SceneObject("floor", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "grey"),), {"grey": GREY})
+    lit = view(floor, surface_triangles(corners, np.full((2, 3), 7.0), edge_m * np.sqrt(2) / 10 * 1.01))
+    found = lit.picture(of_material(Material(kd=0.5)), 32)
+    to = np.array([0.0, 2.0, 0.0]) - lit.points.p.astype(float)
+    square = (to**2).sum(axis=1)
+    assert np.allclose(found, (0.5 / np.pi * 7 * edge_m**2 * to[:, 1] ** 2 / square**2)[:, None], rtol=2e-3)

@@ -222,3 +222,22 @@ def test_a_set_of_lights_can_be_forgotten(scene: Scene, tmp_path: Path) -> None:
 def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="transport: is baked for views alone"):
         bake(scene, tmp_path / "s", only={"transport"})
+
+
+def test_small_bright_lamps_are_stored_as_exactly_as_large_ones(scene: Scene, tmp_path: Path) -> None:
+    """Half floats are scaled by the light that arrives: a lamp that is 1000 times smaller may be a million brighter."""
+    found = []
+    for edge_m, radiance in ((1.0, 4.0), (1e-3, 4e6)):
+        mesh = patch((-edge_m / 2, 300.0, -edge_m / 2), (edge_m, 0, 0), (0, 0, edge_m))
+        lamp = SceneObject("lamp", mesh, "grey", (radiance * 1e4,) * 3)
+        lit = replace(scene, objects=(*scene.objects[:-1], lamp), environment=None)
+        store = bake_view(lit, tmp_path / str(edge_m))
+        found.append(picture(store, 200, {name: of_material(m) for name, m in lit.materials.items()}))
+    assert found[0].max() > 0.05
+    assert np.abs(found[1] - found[0]).max() < 2e-3 * found[0].max()
+
+
+def test_a_scene_without_light_has_transport_without_light(scene: Scene, tmp_path: Path) -> None:
+    dark = replace(scene, objects=scene.objects[:-1], environment=None)
+    store = bake_view(dark, tmp_path / "s")
+    assert not picture(store, 200, {name: of_material(m) for name, m in dark.materials.items()}).any()

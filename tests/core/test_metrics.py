@@ -105,3 +105,18 @@ def test_display_pair_brings_the_reference_to_the_mean() -> None:
     assert reference.mean() == pytest.approx(0.3, abs=1e-6)
     assert test.mean() > reference.mean()
     assert reference.max() <= 1
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.4])
+def test_little_light_before_black_is_not_clipped(share: float) -> None:
+    """Where too few values are lit for the mean, they get a mean of 2/3, and differences stay visible."""
+    radiance = np.zeros((40, 50, 3))
+    radiance.reshape(-1, 3)[: round(2000 * share)] = np.random.default_rng(3).uniform(1, 4, (round(2000 * share), 3))
+    reference, test = metrics.display_pair(radiance, radiance * 0.8)
+    assert reference[reference > 0].mean() == pytest.approx(2 / 3, abs=1e-6)
+    assert (test < reference)[radiance > 0].mean() > 0.9
+
+
+def test_nothing_lit_shows_every_light_as_a_difference() -> None:
+    reference, test = metrics.display_pair(np.zeros((4, 4, 3)), np.full((4, 4, 3), 1e-3))
+    assert not reference.any() and test.min() == 1

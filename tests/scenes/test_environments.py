@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
+from lambent.core.images import write_image
+from lambent.scenes.environment_images import read_lat_long
 from lambent.scenes.environments import daylight, from_lat_long
 
 N = 16
@@ -38,3 +42,10 @@ def test_the_ground_returns_three_tenths_of_the_daylight() -> None:
     np.testing.assert_allclose(ground[0], 0.3 / np.pi * e, rtol=1e-3)
     brightest = w.reshape(-1, 3)[np.argmax(sky[..., 1])]
     assert brightest @ normalize(np.array([0.3, 0.7, -0.2])) > np.cos(np.radians(2))
+
+
+def test_values_below_zero_are_black(tmp_path: Path) -> None:
+    """Sharpening filters leave them beside lamps; the path tracer and edited pictures took them for different light."""
+    picture = np.random.default_rng(0).normal(0.2, 1, (8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "sharpened.exr", picture)
+    np.testing.assert_array_equal(read_lat_long(tmp_path / "sharpened.exr"), np.maximum(picture, 0))

@@ -103,10 +103,11 @@ def bake(context: BakeContext) -> None:
 
 
 def _bake_view(context: BakeContext, view: View, count: int) -> None:
+    from lambent.bake.transport.device_lights import brightest
     from lambent.bake.transport.stored import scale_of
 
     lights, points = context.view_tracer.lights(count), context.view_tracer.points(view)
-    scale, sizes = scale_of(lights), []
+    scale, sizes = scale_of(brightest(points.p, lights)), []
     seen = context.store.read(view.name("visibility", str(count)))
     worn = np.array([o.material for o in context.in_views.objects])[points.object]
     parts = list(_parts(context, view, count))

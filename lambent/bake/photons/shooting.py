@@ -74,9 +74,9 @@ def learnt_sky(scene: Scene, whole: Any, over_area: Floats, max_bounces: int) ->
 
     over_area (H, W) is 1 over the area of a light map's texel in m^2, 0 where there is none.
     """
-    if scene.environment is None:
-        return None
     environment = whole.environment()
+    if environment is None:
+        return None
     emitter = getattr(environment, "sky", environment)  # of a guided one, the one that it holds
     guide = learn(scene, whole, emitter, keep_open=True)
     if guide is None:

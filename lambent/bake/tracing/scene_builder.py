@@ -94,7 +94,7 @@ class SceneBuilder:
                 bsdf = bsdfs[look]
             self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
         self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
-        self.environment: Any = scene.environment and mi.load_dict(environment_dict(scene.environment))
+        self.environment: Any = _emitter_of(scene.environment)
         if sampling is not None:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
@@ -110,7 +110,11 @@ class SceneBuilder:
         if self.environment is not None:
             parts["environment"] = self.environment
         if not self._lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
-            parts["darkness"] = {"type": "constant", "radiance": 0.0}  # Mitsuba warns about a scene without light
+            parts["darkness"] = {
+                "type": "point",
+                "position": [0.0, 0.0, 0.0],
+                "intensity": 0.0,
+            }  # Mitsuba warns about a scene without light
         if watertight and mi.variant().startswith("llvm"):
             parts["embree_use_robust_intersections"] = True
         return mi.load_dict({"type": "scene", **parts}, optimize=False)
@@ -193,6 +197,14 @@ def light_dict(light: Light) -> dict[str, Any]:
     frame = mi.ScalarTransform4f().look_at(origin.tolist(), (origin + light.direction).tolist(), aside)
     angles = {"cutoff_angle": light.outer_deg, "beam_width": min(light.inner_deg, light.outer_deg)}
     return {"type": "spot", "to_world": frame, "intensity": _rgb(light.intensity), **angles}
+
+
+def _emitter_of(environment: Environment | None) -> Any:
+    """mi.Emitter; None where no light comes from it: Mitsuba's densities of a black picture are not finite."""
+    if environment is None:
+        return None
+    found = environment_dict(environment)
+    return mi.load_dict(found) if found["scale"] > 0 and np.array(found["bitmap"]).any() else None
 
 
 def environment_dict(environment: Environment) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.pieces import solid_angle
@@ -44,11 +45,31 @@ def light_at(lights: dict[str, Any], m: Any, p: Any) -> tuple[Any, ...]:
     across = dr.cross(b - a, c - a)
     to = centre - here
     facing, is_point = dr.dot(across, to) < 0, dr.all(a == b)
+    share = dr.select(facing, solid_angle(a - here, b - here, c - here, across), 0.0)
     a, b, c, centre = [dr.select(near, dr.normalize(v - here), v) for v in (a, b, c, centre)]
-    share = dr.select(facing, solid_angle(a, b, c), 0.0)
     if "cone" in lights:
         angle = dr.acos(dr.clip(-dr.dot(centre, dr.gather(mi.Vector3f, lights["axes"], m)), -1, 1))
         outer, width = [dr.gather(mi.Float, one, m) for one in lights["cone"]]
         inside = dr.select(outer < np.float32(np.pi), dr.clip((outer - angle) / width, 0, 1), 1.0)
         share = dr.select(is_point, inside / dr.squared_norm(to), share)
     return centre, a, b, c, power * dr.select(near, share, 1.0)
+
+
+def brightest(p: NDArray[np.float32], lights: TriangleLights) -> float:
+    """Largest sum of light, W/m^2, that reaches one of the points (P, 3) where nothing shadows it."""
+    if not lights.near.any():
+        return float(lights.light.max(axis=1).sum())
+    here = vectors(mi.Vector3f, p)
+    total = _reaching(here, lights_on_device(lights), dr.opaque(mi.UInt32, len(lights)))
+    return float(np.array(total).max(initial=0.0))
+
+
+@dr.syntax
+def _reaching(here, lights, count):  # type: ignore[no-untyped-def]
+    m = mi.UInt32(0)
+    total = dr.zeros(mi.Float, dr.width(here))
+    while m < count:
+        most = 2 * dr.pi * dr.gather(mi.Vector3f, lights["light"], m)  # points come near to point lights
+        total += dr.max(dr.minimum(light_at(lights, m, here)[4], most))
+        m += 1
+    return total

@@ -12,7 +12,7 @@ from lambent.bake.sky.daylight import radiance_from
 from lambent.core.arrays import Floats
 from lambent.core.geometry import triangle_areas
 from lambent.core.latlong import lat_long_directions
-from lambent.scenes.scene import Scene
+from lambent.scenes.scene import DirectionalLight, Scene
 from lambent.scenes.triangle_lights import (
     TriangleLights,
     environment_triangles,
@@ -25,6 +25,7 @@ ROWS = 256  # of the environment's samples; the bright ones are replaced by the 
 LEAST_FINE, MOST_FINE = 4, 32  # rows of these in one of those: as many as the environment's picture has
 BRIGHT = 1 / 4000  # of all light: samples with more are bright
 Samples = tuple[Floats, Floats, Floats]
+DARK = DirectionalLight((0.0, -1.0, 0.0), (0.0, 0.0, 0.0))  # kernels need a light
 LAMPS = 0.5  # of all lights, where there are an environment and glowing surfaces
 
 
@@ -42,7 +43,8 @@ def scene_lights(scene: Scene, samples: Samples | None, count: int) -> TriangleL
         corners = np.concatenate([o.mesh.corners for o in glowing])
         radiance = np.concatenate([np.broadcast_to(o.emission, (len(o.mesh.faces), 3)) for o in glowing])
         parts.append(lamp_triangles(corners, radiance, max(1, round(count * share))))
-    return joined([*parts, small_lights(scene.lights)] if scene.lights else parts)
+    found = joined([*parts, small_lights(scene.lights)] if scene.lights else parts)
+    return found if len(found) else small_lights([DARK])
 
 
 def environment_samples(environment: Any) -> Samples:

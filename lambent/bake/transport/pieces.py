@@ -122,7 +122,10 @@ def spread_of(angles: list[Any]) -> tuple[Any, Any]:
     return spread(outer, inner, dr), turned
 
 
-def solid_angle(a: Any, b: Any, c: Any) -> Any:
-    """Of unit directions (van Oosterom and Strackee 1983, eq. 8)."""
-    volume = dr.abs(dr.dot(a, dr.cross(b, c)))
-    return 2 * dr.atan2(volume, 1 + dr.dot(a, b) + dr.dot(b, c) + dr.dot(c, a))
+def solid_angle(a: Any, b: Any, c: Any, across: Any) -> Any:
+    """Of a triangle seen from the origin: corners, and (b - a) x (c - a) (van Oosterom and Strackee 1983, eq. 8).
+
+    Computed from directions alone, the volume of a small lamp would be lost in rounding.
+    """
+    volume, x, y, z = dr.abs(dr.dot(a, across)), dr.norm(a), dr.norm(b), dr.norm(c)
+    return 2 * dr.atan2(volume, x * y * z + dr.dot(a, b) * z + dr.dot(b, c) * x + dr.dot(c, a) * y)

@@ -3,7 +3,7 @@
 The file gives f cos(theta_o) = spectra(u) D(u_m) / (4 sigma(u_i)), with u the point that the distribution of visible
 normals warps to the half vector's u_m. Mappings: u_theta = sqrt(2 theta / pi), u_phi = (phi + pi) / (2 pi). Isotropic
 files have at most two phi_i and measure phi_m from phi_i; anisotropic ones may cover half or a quarter of the circle of
-phi_i, and the rest follows by mirroring.
+phi_i, with or without a closing node (`azimuths`).
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import direction, elevation, half_vector, reflect
 from lambent.core.errors import UserError
+from lambent.materials.measured.azimuths import Azimuths
 from lambent.materials.measured.marginal import Corners, Warp, bilinear
 from lambent.materials.measured.protocol import MeasuredSamples, TableInfo, collect
 from lambent.materials.measured.spectral import rgb_of_spectra
 from lambent.materials.measured.table import (
     ReflectionTable,
     fill_holes,
-    mirrored_to_range,
     require_values,
     sensible,
     usable_values,
@@ -53,9 +53,9 @@ def read(path: Path) -> RglTable:
         _require(tensor.dtype == np.float32 and tensor.ndim == dimensions, path, name, "has the wrong shape or type")
         _require(bool(np.isfinite(tensor.astype(np.float32)).all()), path, name, "holds values that are not finite")
     phi, theta = (tensors[name].astype(np.float64) for name in ("phi_i", "theta_i"))
-    for name, nodes, low, high in (("phi_i", phi, -np.pi, np.pi), ("theta_i", theta, 0, np.pi / 2)):
+    for name, nodes, low, high in (("phi_i", phi, -np.pi, 2 * np.pi), ("theta_i", theta, 0, np.pi / 2)):
         ordered = len(nodes) > 0 and bool((np.diff(nodes) > 0).all())
-        inside = ordered and low - 1e-4 <= nodes[0] and nodes[-1] <= high + 1e-4
+        inside = ordered and low - 1e-4 <= nodes[0] and nodes[-1] <= min(high, nodes[0] + 2 * np.pi) + 1e-4
         _require(inside, path, name, "is not an increasing list of angles in radians")
     ndf, sigma, vndf = (tensors[name].astype(np.float32) for name in ("ndf", "sigma", "vndf"))
     for name, table in (("ndf", ndf), ("sigma", sigma), ("vndf", vndf)):
@@ -104,7 +104,7 @@ class RglTable(ReflectionTable):
     def __init__(self, tensors: Tensors, values: Floats, path: Path) -> None:
         self._phi, self._theta = (tensors[name].astype(np.float64) for name in ("phi_i", "theta_i"))
         self._isotropic = len(self._phi) <= 2
-        self._reduction = 1 if self._isotropic else round(2 * np.pi / (self._phi[-1] - self._phi[0]))
+        self._azimuths = None if self._isotropic else Azimuths.of(self._phi)
         self._with_jacobian = bool(np.any(tensors.get("jacobian", np.ones(1))))
         self._raw = values
         finite = sensible(values)
@@ -122,18 +122,28 @@ class RglTable(ReflectionTable):
 
     def _eval_above(self, wi: Floats, wo: Floats) -> Floats:
         """f (N, 3) in 1/sr; negative values become 0."""
-        cos_o = wo[:, 2:]
-        if self._reduction > 1:  # mirrored into the file's part of the circle
-            wi, wo = mirrored_to_range(wi, wo, -1.0, quadrant=self._reduction == 4)
-        theta_i, phi_i = elevation(wi), np.arctan2(wi[:, 1], wi[:, 0])
+        if self._azimuths is None:
+            return self._at(wi, wo, np.arctan2(wi[:, 1], wi[:, 0]))
+        wi, wo, phi_i = self._azimuths.brought(wi, wo)
+        value = self._at(wi, wo, phi_i)
+        flip, phi_there, share = self._azimuths.beyond(phi_i)
+        gap = share > 0
+        if gap.any():
+            there = self._at((wi * flip)[gap], (wo * flip)[gap], phi_there[gap])
+            value[gap] += share[gap, None] * (there - value[gap])
+        return value
+
+    def _at(self, wi: Floats, wo: Floats, phi_i: Floats) -> Floats:
+        """f (N, 3) between the nodes around phi_i (N,), or at the outermost."""
+        theta_i = elevation(wi)
         m = half_vector(wi, wo)
         phi_m = np.arctan2(m[:, 1], m[:, 0]) - (phi_i if self._isotropic else 0)
         u_m = _u_of(elevation(m), phi_m)
         u_m[:, 1] %= 1.0
         corners = Corners((self._phi, self._theta), (phi_i, theta_i))
         u, _ = self._warp.invert(corners, u_m)
-        value = bilinear(self._values, corners, u) * self._factor(u_m, theta_i, phi_i)
-        return np.maximum(value, 0) / cos_o
+        value = bilinear(self._values, corners, u) * self._factor(u_m, theta_i, np.arctan2(wi[:, 1], wi[:, 0]))
+        return np.asarray(np.maximum(value, 0) / wo[:, 2:])
 
     def _factor(self, u_m: Floats, theta_i: Floats, phi_i: Floats) -> Floats:
         """(N, 1) D / (4 sigma), or 1 for a file that stores f cos itself."""

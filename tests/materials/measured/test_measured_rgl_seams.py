@@ -9,6 +9,7 @@ import pytest
 
 from lambent.core.directions import direction, half_vector
 from lambent.materials.measured import load
+from lambent.materials.measured.azimuths import Azimuths
 from tests.materials.measured.measured_files import tensor_bytes
 
 OF_PHI_I = {  # nodes of phi_i, and the factor at each; the ends of a period are one direction
@@ -69,3 +70,48 @@ def test_no_step_where_phi_i_wraps_round(tmp_path: Path, kind: str, seam: float)
     np.testing.assert_allclose(half_vector(wi, wo), m, atol=1e-12)
     one, other = load(path).eval(wi, wo) * wo[:, 2:]
     np.testing.assert_allclose(one, other, rtol=1e-3)
+
+
+OPEN = {  # nodes without the closing one; factors at them and at their images
+    "whole": (np.radians(np.arange(-180, 180, 45.0)), 2 * np.pi),
+    "whole from 0": (np.radians(np.arange(0, 360, 30.0)), 2 * np.pi),
+    "half": (np.radians(np.arange(-180, 0, 30.0)), np.pi),
+    "half from 0": (np.radians(np.arange(0, 180, 22.5)), np.pi),
+    "half, uneven": (np.radians([-180.0, -150.0, -130.0, -100.0, -60.0, -30.0]), np.pi),
+}
+
+
+@pytest.mark.parametrize("kind", OPEN)
+def test_the_closing_node_may_be_left_out(tmp_path: Path, kind: str) -> None:
+    """f goes from the last node to the image of the first in a straight line, as with the node it does."""
+    nodes, period = OPEN[kind]
+    factors = np.linspace(0.2, 1.0, len(nodes))
+    path = tmp_path / "a.bsdf"
+    path.write_bytes(file_bytes(nodes, factors))
+    phi_i = np.linspace(-3.5, 6.5, 401)
+    wi, m = direction(np.full(401, 0.5), phi_i), direction(np.full(401, 0.2), np.full(401, 1.1))
+    wo = mirrored_at(m, wi)
+    closed = np.append(nodes, nodes[0] + period), np.append(factors, factors[0])
+    at_i = np.interp((phi_i - nodes[0]) % period + nodes[0], *closed)
+    at_m = np.interp(1.1 + np.pi, np.linspace(0, 2 * np.pi, 9), OF_PHI_M)
+    found = load(path).eval(wi, wo)[:, 0] * wo[:, 2] * 4
+    np.testing.assert_allclose(found, at_i * at_m, atol=1e-4)
+
+
+@pytest.mark.parametrize("begin", [-180, -90, 0, 90, 270])
+def test_a_quarter_is_mirrored_with_and_without_its_ends(begin: float) -> None:
+    """A function of |cos| is mirrored in x and y; between a node and its image it is that of the node."""
+    wi = direction(np.full(721, 0.7), np.linspace(-np.pi, np.pi, 721))
+    for nodes_deg in ([0, 30, 60, 90], [0, 30, 60], [15, 45, 75]):
+        nodes = np.radians(begin + np.array(nodes_deg, float))
+        azimuths = Azimuths.of(nodes)
+        assert azimuths.parts == 4
+        brought, _, phi = azimuths.brought(wi, wi)
+        np.testing.assert_allclose(direction(np.full(721, 0.7), phi), brought, atol=1e-12)
+        np.testing.assert_allclose(np.abs(brought), np.abs(wi))
+        value, (flip, there, share) = np.interp(phi, nodes, np.cos(nodes) ** 2), azimuths.beyond(phi)
+        np.testing.assert_allclose(
+            direction(np.full(721, 0.7), there)[share > 0], (brought * flip)[share > 0], atol=1e-12
+        )
+        found = value + share * (np.interp(there, nodes, np.cos(nodes) ** 2) - value)
+        assert share.max() <= 0.5 + 1e-9 and np.abs(np.diff(found)).max() < 0.02, "no step"
