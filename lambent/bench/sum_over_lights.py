@@ -76,16 +76,16 @@ def _sums(
             curves = np.ones(pieces.shape)
             for factor in term.factors:
                 angle = angle_of(factor.over, *pair, factor.stretch)
-                curves = curves * _at(editable.curves[factor.curve], angle, nodes.get(factor.curve))
+                curves = curves * _at(editable.curves[factor.curve], angle, nodes.get(factor.curve), factor.polar)
             quotient = without_curves.eval_term(term, wi, wo[here])
             total[here] += light * quotient * wi[:, 2:] * curves.mean(axis=1)
     return total
 
 
-def _at(curve: Curve, angle: Floats, nodes: int | None) -> Floats:
+def _at(curve: Curve, angle: Floats, nodes: int | None, polar: int) -> Floats:
     """(..., 3) of a curve, or of straight lines between so many nodes."""
     if nodes is not None:
-        curve = Curve.through((np.arange(nodes) + 0.5) * END_RAD / nodes, curve.node_values(nodes))
+        curve = Curve.through((np.arange(nodes) + 0.5) * END_RAD / nodes, curve.node_values(nodes, polar))
     return np.asarray(curve.at(angle))
 
 

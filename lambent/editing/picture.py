@@ -259,12 +259,13 @@ class _TermPicture:
         """Products over the active curve, with the idle one as it is shown, and the radiance of a value of 1."""
         assert self._pairs is not None
         idle = 1 - self._active
-        return self.layer.fold(
-            self._pairs, idle, self._shown[self._factors[idle].curve].node_values(self._counts[idle])
-        )
+        factor = self._factors[idle]
+        values = self._shown[factor.curve].node_values(self._counts[idle], factor.polar)
+        return self.layer.fold(self._pairs, idle, values)
 
     def _coefficients(self, curves: Mapping[str, Curve], factor: int) -> Floats:
-        return coefficients_of(curves[self._factors[factor].curve], self._counts[factor])
+        over = self._factors[factor]
+        return coefficients_of(curves[over.curve], self._counts[factor], over.polar)
 
     def _changed(self, before: Mapping[str, Curve], factor: int) -> bool:
         then, now = self._coefficients(before, factor), self._coefficients(self._shown, factor)

@@ -79,9 +79,9 @@ class DensePairs:
 
 
 @lru_cache(maxsize=256)
-def coefficients_of(curve: Curve, count: int) -> Floats:
+def coefficients_of(curve: Curve, count: int, polar: int) -> Floats:
     """(count, 3) wavelets of a curve's values at nodes: what rows are multiplied by."""
-    return wavelets_of(curve.node_values(count))
+    return wavelets_of(curve.node_values(count, polar))
 
 
 def wavelets_of(values: Floats) -> Floats:

@@ -82,9 +82,8 @@ Light that met other surfaces first, of the same points:
     view/KEY/interreflection/samples       (1,) uint32, paths that every tile has; written last
 
 Radiance of a term by interreflections: scale f_q f_o(theta_o) times the sum over entries of light, the coefficient of
-the band, and the factor of the tail. Coefficients of bands over theta_h and theta_r are means over the rings of a
-sphere (`Curve.polar_means`), others over the angle. Surfaces of a tail scattered as they did in the bake, over their
-albedos then.
+the band, and the factor of the tail. Coefficients of bands are `Curve.band_means`, with the angle's `polar`. Surfaces
+of a tail scattered as they did in the bake, over their albedos then.
 
 The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
 objects. Times are the document "timings". Every array is absent, partial or complete (`Store.availability`); of a

@@ -65,7 +65,7 @@ class View:
         total = np.zeros((len(self.points), 3))
         for term in editable.terms:
             bands = [Bands(f, c) for f, c in zip(term.factors, counts, strict=False)]
-            means = [editable.curves[b.factor.curve].node_values(b.count) for b in bands]
+            means = [editable.curves[b.factor.curve].node_values(b.count, b.factor.polar) for b in bands]
             if len(bands) == 1:
                 rows = transport(self.points, self.lights, self.seen, term, bands[0])
                 total += np.einsum("jc,jcp->pc", means[0], rows) * term.scale
@@ -96,13 +96,13 @@ class View:
                 value = np.ones((len(parts), len(p), 3))
                 for factor, count in zip_longest(term.factors, counts[: len(term.factors)]):
                     curve, angle = editable.curves[factor.curve], _angle(factor, wi, p.wo)
-                    value = value * (curve.at(angle) if count is None else _lines(curve, count, angle))
+                    value = value * (curve.at(angle) if count is None else _lines(curve, count, angle, factor.polar))
                 total += light * value.mean(axis=0) * term.scale
         return total
 
 
-def _lines(curve: Curve, count: int, angle: np.ndarray) -> np.ndarray:
-    return Curve.through((np.arange(count) + 0.5) * END_RAD / count, curve.node_values(count)).at(angle)
+def _lines(curve: Curve, count: int, angle: np.ndarray, polar: int) -> np.ndarray:
+    return Curve.through((np.arange(count) + 0.5) * END_RAD / count, curve.node_values(count, polar)).at(angle)
 
 
 def _angle(factor: Any, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:

@@ -66,7 +66,8 @@ def picture(store: Store, lights: int, editables: dict[str, Editable]) -> np.nda
         editable = editables[term["material"]]
         of_term = editable.terms[term["term"]]
         start = name("transport", f"{lights}/{term['material']}/{term['term']}/")
-        means = [editable.curves[curve].node_values(count) for curve, count in term["curves"]]
+        polar = [factor.polar for factor in of_term.factors]
+        means = [editable.curves[c].node_values(n, p) for (c, n), p in zip(term["curves"], polar, strict=True)]
         if len(means) == 1:
             light = np.einsum("jc,jcp->pc", transformed(means[0]), store.read(f"{start}rows").astype(float))
         else:

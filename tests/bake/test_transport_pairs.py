@@ -78,7 +78,7 @@ def test_small_entries_move_along_the_second_curve_alone(outdoors: View) -> None
     assert np.count_nonzero(merged.any(axis=-1)) < 0.97 * np.count_nonzero(exact.any(axis=-1))
     rows, after = exact.sum(axis=2), merged.sum(axis=2)
     assert np.allclose(after, rows, rtol=4e-3, atol=1e-3), "no light is lost but by rounding"
-    fresnel = of_material(GLOSSY).curves["fresnel"].node_values(16)
+    fresnel = of_material(GLOSSY).curves["fresnel"].node_values(16, 2)
     shown, moved = ((m * fresnel).sum(axis=(1, 2)) for m in (exact, merged))
     lit = shown > 1e-3 * shown.max()
     assert np.sqrt(np.mean((moved - shown)[lit] ** 2)) < 1e-3 * np.sqrt(np.mean(shown[lit] ** 2))

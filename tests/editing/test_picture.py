@@ -48,7 +48,8 @@ def direct(part: Part, bands: dict[str, np.ndarray], material: Editable) -> np.n
     total = np.zeros((len(part.pixel), 3))
     for term in material.terms:
         means = [
-            material.curves[f.curve].node_values(n) for f, n in zip(term.factors, bands[term.name].shape, strict=False)
+            material.curves[f.curve].node_values(n, f.polar)
+            for f, n in zip(term.factors, bands[term.name].shape, strict=False)
         ]
         means += [np.ones((1, 3))] * (2 - len(means))
         light = np.einsum("jkcp,jc,kc->pc", bands[term.name].astype(float), *means)
@@ -197,7 +198,7 @@ def test_what_the_transport_does_not_serve_is_said_and_changes_nothing() -> None
     model = model_named("ggx")
     start = editable(model(alpha_x=0.3, alpha_y=0.3))
     part, bands = part_of(start, np.arange(80), 5)
-    only = DensePairs(bands["specular"]).fold(1, start.curves["fresnel"].node_values(BANDS // 2))
+    only = DensePairs(bands["specular"]).fold(1, start.curves["fresnel"].node_values(BANDS // 2, 2))
     part = replace(part, transport=(only,))
     picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"it": part})
     before = picture.image()

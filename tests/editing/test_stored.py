@@ -87,7 +87,7 @@ def expected(name: str, made: Editable) -> np.ndarray:
     """(P, 3) of a material."""
     total = np.zeros((len(SHOWN[name]), 3))
     for term, light in zip(made.terms, bands_of(name), strict=True):
-        means = [made.curves[f.curve].node_values(n) for f, n in zip(term.factors, light.shape, strict=False)]
+        means = [made.curves[f.curve].node_values(n, f.polar) for f, n in zip(term.factors, light.shape, strict=False)]
         means += [np.ones((1, 3))] * (2 - len(means))
         total += UNIT * np.array(term.scale) * np.einsum("jkcp,jc,kc->pc", light.astype(float), *means)
     return total

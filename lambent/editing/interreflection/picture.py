@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lambent.editing.canvas import Canvas, Layer, viewed
 from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
 from lambent.editing.interreflection.folding import pixels, rows
-from lambent.editing.interreflection.powers import Powers, bands_of, means_of, powers
+from lambent.editing.interreflection.powers import Powers, bands_of, powers
 from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
 from lambent.editing.products import Pixels
 from lambent.editing.rows import Rows, wavelets_of
@@ -177,7 +177,7 @@ class _TermPicture:
                 layer.view(viewer)
         if self._factors:
             factor = self._factors[self._at]
-            wanted = wavelets_of(means_of(factor, material.curves[factor.curve], self._counts[self._at]))
+            wanted = wavelets_of(material.curves[factor.curve].band_means(self._counts[self._at], factor.polar))
         else:
             wanted = np.ones((1, 3))
         if not np.array_equal(wanted, self._pictures[0].wanted):

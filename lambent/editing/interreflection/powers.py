@@ -9,12 +9,10 @@ import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.materials.factored.albedo import albedo
-from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.terms import Editable, Factor
 from lambent.store.tails import FIXED, Tails
 
 # Bands may be wider than a peak, which shines as brightly only if they keep its light.
-POLAR = ("theta_h", "theta_r")
 
 
 @dataclass(frozen=True)
@@ -102,11 +100,6 @@ def bands_of(
     """(J, 3) coefficients of products of bands, first curve first; that of the factor `but` counts as 1."""
     found = np.ones((1, 3))
     for k, (factor, count) in enumerate(zip(factors, counts, strict=True)):
-        means = np.ones((count, 3)) if k == but else means_of(factor, material.curves[factor.curve], count)
+        means = np.ones((count, 3)) if k == but else material.curves[factor.curve].band_means(count, factor.polar)
         found = (found[:, None] * means[None]).reshape(-1, 3)
     return found
-
-
-def means_of(factor: Factor, curve: Curve, count: int) -> Floats:
-    """(count, 3) coefficients of the bands of a curve."""
-    return curve.polar_means(count) if factor.over in POLAR else curve.band_means(count)

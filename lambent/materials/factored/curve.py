@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -49,22 +49,29 @@ class Curve:
         columns = [np.interp(angle_rad, angles_rad(), self.values[:, c]) for c in range(3)]
         return np.where(inside[..., None], np.stack(columns, axis=-1), 0.0)
 
-    def band_means(self, bands: int) -> Floats:
+    def band_means(self, bands: int, polar: int = 0) -> Floats:
         """Coefficients (bands, 3): the mean over each of `bands` equal bands, which divide KNOTS, exactly.
 
-        Point samples instead would pop while a narrow peak is dragged (Ben-Artzi 2007, eq. 4.17).
+        Point samples instead would pop while a narrow peak is dragged (Ben-Artzi 2007, eq. 4.17). Where the angle times
+        `polar` is one from an axis, bands are rings of a sphere: a peak keeps its light in any band.
         """
         per_band, rest = divmod(KNOTS, bands)
         if rest:
             raise ValueError(f"{bands} bands do not divide {KNOTS} intervals")
-        return np.asarray(self._interval_means.reshape(bands, per_band, 3).mean(axis=1))
+        means = self._interval_means.reshape(bands, per_band, 3)
+        if not polar:
+            return np.asarray(means.mean(axis=1))
+        rings = _rings(polar).reshape(bands, per_band, 1)
+        return np.asarray((means * rings).sum(axis=1) / rings.sum(axis=1))
 
-    def node_values(self, bands: int) -> Floats:
+    def node_values(self, bands: int, polar: int = 0) -> Floats:
         """Values (bands, 3) at the centres of equal bands, between which straight lines follow the curve.
 
         Values of the curve there would make a narrow peak pop while it is dragged. Means over the bands flatten it, by
         1/8 of their second difference; that much goes back up the slopes, but no further than half way to the curve's
         least and largest value in these bands and those beside them, so that nothing overshoots or becomes negative.
+        With `polar`, see `band_means`, the first value is such that the first two bands keep their light: a mean would
+        make a peak about the axis as bright as its band is wide.
         """
         means, per_band = self.band_means(bands), KNOTS // bands
         within = np.ascontiguousarray(self.values[:-1].T).reshape(3, bands, per_band)  # as numpy is fast along the end
@@ -75,12 +82,12 @@ class Curve:
         rise = np.diff(means, axis=0)
         room = np.where(rise > 0, np.minimum(below[:-1], above[1:]), np.minimum(above[:-1], below[1:]))
         moved = np.sign(rise) * np.minimum(np.abs(rise) / 8, room / 2)
-        return np.asarray(means - np.diff(np.pad(moved, ((1, 1), (0, 0))), axis=0))
-
-    def polar_means(self, bands: int) -> Floats:
-        """As `band_means`, but over the rings of a sphere that the bands are: a peak keeps its light in any band."""
-        weight = -np.diff(np.cos(angles_rad())).reshape(bands, -1, 1)
-        return np.asarray((self._interval_means.reshape(bands, -1, 3) * weight).sum(axis=1) / weight.sum(axis=1))
+        found = means - np.diff(np.pad(moved, ((1, 1), (0, 0))), axis=0)
+        if polar and bands > 2:
+            rings, shares = _first_lines(bands, polar)
+            light = rings @ self._interval_means[: len(rings)] - shares[1:] @ found[1:3]
+            found[0] = np.clip(light / shares[0], least[1], most[1])
+        return np.asarray(found)
 
     @cached_property
     def _interval_means(self) -> Floats:
@@ -90,3 +97,19 @@ class Curve:
 def angles_rad() -> Floats:
     """(KNOTS + 1,) angles of a curve's values."""
     return np.linspace(0, END_RAD, KNOTS + 1)
+
+
+@lru_cache(maxsize=8)
+def _rings(polar: int) -> Floats:
+    """(KNOTS,) solid angles of intervals, over pi."""
+    return np.abs(np.diff(np.cos(polar * angles_rad())))
+
+
+@lru_cache(maxsize=32)
+def _first_lines(bands: int, polar: int) -> tuple[Floats, Floats]:
+    """Solid angles (2 KNOTS / bands,) of intervals in the first two bands, and the light (3,) there of a value of 1 at
+    the first, second and third node, with straight lines between."""
+    count = 2 * KNOTS // bands
+    nodes = np.arange(3) * (KNOTS // bands) + KNOTS / bands / 2
+    rings, middles = _rings(polar)[:count], np.arange(count) + 0.5
+    return rings, np.array([rings @ np.interp(middles, nodes, at) for at in np.eye(3)])

@@ -18,11 +18,15 @@ from lambent.materials.lobes import NUMPY, Vector, half_vector
 
 @dataclass(frozen=True)
 class Parametrisation:
-    """An angle of a pair of directions: `angle(wi, wo, stretch, ops)` in radians."""
+    """An angle of a pair of directions: `angle(wi, wo, stretch, ops)` in radians.
+
+    `polar` times it is an angle from an axis about which directions turn, see `Curve.band_means`; 0 where none is.
+    """
 
     title: str
     meaning: str
     angle: Callable[[Vector, Vector, float, Any], Any]
+    polar: int = 0
 
 
 def angle_of(name: str, wi: Vector, wo: Vector, stretch: float = 1.0, ops: Any = NUMPY) -> Any:
@@ -101,9 +105,9 @@ def _power_angle(h: Vector, axis: int, ops: Any) -> Any:
 PARAMETRISATIONS = {
     "theta_i": Parametrisation("θ of the light", "angle between the light and the normal", _theta_i),
     "theta_o": Parametrisation("θ of the viewer", "angle between the viewer and the normal", _theta_o),
-    "theta_h": Parametrisation("θ half", "angle between the half vector and the normal: the highlight", _theta_h),
-    "theta_d": Parametrisation("θ difference", "angle between the light and the half vector: Fresnel", _theta_d),
-    "theta_r": Parametrisation("θ mirror", "angle between the light and the mirrored viewer", _theta_r),
+    "theta_h": Parametrisation("θ half", "angle between the half vector and the normal: the highlight", _theta_h, 1),
+    "theta_d": Parametrisation("θ difference", "angle between the light and the half vector: Fresnel", _theta_d, 2),
+    "theta_r": Parametrisation("θ mirror", "angle between the light and the mirrored viewer", _theta_r, 1),
     "slope_t": Parametrisation("slope along t", "tilt of the half vector along the brushing direction", _slope_t),
     "slope_b": Parametrisation("slope across t", "tilt of the half vector across the brushing direction", _slope_b),
     "gamma_t": Parametrisation("γ along t", "Ashikhmin and Shirley's highlight along the brushing direction", _gamma_t),

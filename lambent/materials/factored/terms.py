@@ -18,7 +18,7 @@ from lambent.core.plain import Triple
 from lambent.materials.bsdf import components
 from lambent.materials.document import Kind
 from lambent.materials.factored.curve import Curve
-from lambent.materials.factored.parametrisations import angle_of
+from lambent.materials.factored.parametrisations import PARAMETRISATIONS, angle_of
 from lambent.materials.factored.quotients import DIFFUSE
 from lambent.materials.lobes import NUMPY, Vector
 
@@ -39,6 +39,11 @@ class Factor:
     curve: str
     over: str
     stretch: float = 1.0
+
+    @property
+    def polar(self) -> int:
+        """As `Curve.band_means` takes it."""
+        return PARAMETRISATIONS[self.over].polar
 
 
 @dataclass(frozen=True)
