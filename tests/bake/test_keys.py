@@ -51,7 +51,7 @@ CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
 REFLECTED = tuple(SEEN.name("relighting", part) for part in ("spans", "points", "values", "errors", "lamps"))
 LIT = (*BAKED, *REFLECTED)  # whatever light falls on
-BOUNCED = SEEN.name("interreflection", "samples")  # the tiles of a material that changes are traced again
+BOUNCED = SEEN.name("interreflection", "")  # of every material, where one that is not Lambertian scatters otherwise
 VISIBLE = (SEEN.name("visibility", ""), SEEN.name("transport", ""), SEEN.name("interreflection", ""))
 POINTS = (SEEN.name("view_points", ""), *VISIBLE)
 SHINING = (SEEN.name("view_points", "backdrop"), *VISIBLE)
@@ -86,30 +86,30 @@ OBJECT: Answers = {
 MATERIAL: Answers = {
     "name": ("renamed", NOTHING),
     "provenance": (Provenance(source="other.brdf"), NOTHING),
-    "kd": ((0.1, 0.2, 0.31), LIT),
+    "kd": ((0.1, 0.2, 0.31), (*LIT, BOUNCED)),
     "kd_coupled": (True, (*LIT, *of_terms("sheet/0/"), BOUNCED)),
-    "kt_d": ((0.1, 0.1, 0.2), LIT),
+    "kt_d": ((0.1, 0.1, 0.2), (*LIT, BOUNCED)),
     "lobes": (lambda lobes: lobes * 2, (*LIT, *of_terms("sheet/3/"), BOUNCED)),
 }
 LOBE: Answers = {
     "side": ("transmission", (*LIT, *of_terms("sheet/2/"), BOUNCED)),
-    "distribution": ("ggx", LIT),
-    "k": ((0.9, 1.0, 1.0), LIT),
+    "distribution": ("ggx", (*LIT, BOUNCED)),
+    "k": ((0.9, 1.0, 1.0), (*LIT, BOUNCED)),
     "mx": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
     "my": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
-    "r0": ((0.04, 0.04, 0.05), LIT),
+    "r0": ((0.04, 0.04, 0.05), (*LIT, BOUNCED)),
     "alpha": (0.5, (*LIT, *of_terms("sheet/2/"), BOUNCED)),
     "retro": (True, (*LIT, *of_terms("sheet/2/"), BOUNCED)),
 }
-IN_VIEWS = {part: POINTS if part in ("normal", "direction", "opacity") else () for part in CHANNELS}
+IN_VIEWS = {part: POINTS if part in ("normal", "direction", "opacity") else (BOUNCED,) for part in CHANNELS}
 IN_VIEWS["diffuse"] = IN_VIEWS["specular"] = (SEEN.name("transport", "400/worn/"), *of_terms(), BOUNCED)
 TEXTURES: Answers = {
     **{part: (lambda t: replace(t, texels=t.texels * np.float16(0.5)), (*LIT, *IN_VIEWS[part])) for part in CHANNELS},
     "cutoff": (0.25, LOOK),
 }
 TEXTURE: Answers = {
-    "texels": (lambda a: a * np.float16(0.75), LIT),
-    "uv_transform": (((2.0, 0.0, 0.0), (0.0, 1.0, 0.0)), LIT),
+    "texels": (lambda a: a * np.float16(0.75), (*LIT, BOUNCED)),
+    "uv_transform": (((2.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (*LIT, BOUNCED)),
 }
 SUN_SKY: Answers = {
     "sun_direction": ((0.6, 0.8, 0.0), SKY),
@@ -355,10 +355,9 @@ def test_a_setting(scene: Scene, keys: Callable[..., dict[str, str]], kind: str,
 def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
     before = keys(scene)
     assert not stale(before, keys(scene, TINY.changed("another name")))
-    everywhere = SEEN.name("interreflection", "")
-    assert stale(before, keys(scene, seed=1)) == starting(before, (*LIT, everywhere))
+    assert stale(before, keys(scene, seed=1)) == starting(before, (*LIT, BOUNCED))
     more = stale(before, keys(scene, bounces=Bounces(samples=4096)))
-    assert more == {BOUNCED}, "samples are added to those that are there"
+    assert more == {SEEN.name("interreflection", "samples")}, "samples are added to those that are there"
     for bounces in (Bounces((32, 1, 1, 1)), Bounces((64, 1, 1)), Bounces(fixed=frozenset({"sheet"}))):
         after = keys(scene, bounces=bounces)
         assert stale(before, after) == starting(before | after, (everywhere,))
@@ -370,11 +369,12 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
 
 
 def test_what_a_material_is_edited_as(scene: Scene, keys: Callable[..., dict[str, str]]) -> None:
-    """The quotient and the angles are inputs; curves and scales are not."""
+    """The quotient and the angles are inputs of direct light; curves and scales are not, but of interreflections."""
     phong = {"sheet": editable(Phong())}
     before, mine = keys(scene, editables=phong), of_terms("sheet/0/")
     assert starting(before, (SEEN.name("transport", "400/sheet/"),)) == starting(before, mine[1:])
-    assert not stale(before, keys(scene, editables={"sheet": editable(Phong(exponent=7.0))}))
+    other = keys(scene, editables={"sheet": editable(Phong(exponent=7.0))})
+    assert stale(before, other) == starting(before, (BOUNCED,))
     more = keys(scene, TINY.changed(transport={"sharp": 512}), editables=phong)
     assert stale(before, more) == starting(before, mine)
 
