@@ -29,7 +29,8 @@ class Azimuths:
         """Nodes and the parts that they stand for, with or without a closing node."""
         span, step = float(nodes[-1] - nodes[0]), float(np.median(np.diff(nodes)))
         whole = [parts for parts in (1, 2, 4) if abs(span - 2 * np.pi / parts) < CLOSED_RAD]
-        nearest = min((1, 2, 4), key=lambda parts: abs(np.log((span + step) * parts / (2 * np.pi))))
+        wide = [parts for parts in (1, 2, 4) if span <= 2 * np.pi / parts + CLOSED_RAD]
+        nearest = min(wide, key=lambda parts: abs(np.log((span + step) * parts / (2 * np.pi))))
         return cls(nodes, whole[0] if whole else nearest)
 
     def brought(self, wi: Floats, wo: Floats) -> tuple[Floats, Floats, Floats]:
@@ -54,13 +55,13 @@ class Azimuths:
         if self.parts < 4:
             period = 2 * np.pi / self.parts
             flip = np.broadcast_to([-1.0, -1.0, 1.0] if self.parts == 2 else 1.0, (len(phi), 3))
-            return flip, phi - period, over / max(first + period - last, SAME)
+            return flip, phi - period, np.minimum(over / max(first + period - last, SAME), 1)
         low, high = self._bounds
         across = np.where(over > 0, high, low)
         along_x = np.abs(np.sin(across)) < 0.5  # mirrored in y there, elsewhere in x
         flip = np.stack([np.where(along_x, 1.0, -1.0), np.where(along_x, -1.0, 1.0), np.ones(len(phi))], axis=-1)
         share = over / max(2 * (high - last), SAME) + under / max(2 * (first - low), SAME)
-        return flip, 2 * across - phi, share
+        return flip, 2 * across - phi, np.minimum(share, 1)  # a quarter's nodes may lie across its ends
 
     @property
     def _bounds(self) -> Floats:
