@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,7 @@ def test_many_samples_are_traced_for_few_points_at_once(monkeypatch: pytest.Monk
 def test_kernels_do_not_depend_on_the_number_of_paths(series: tuple[int, ...]) -> None:
     import drjit as dr
 
+    gc.collect()  # kernels hold the BSDFs of all scenes that are left, which would go in between
     scene = corner({**FIRST, "floor": GLOSSY, "ball": GLOSSY})
     work, points = traced_by(scene, series, View(FROM_ABOVE, 12, 12))
     mine = points.where(np.array([o.material == "floor" for o in scene.objects])[points.object])
