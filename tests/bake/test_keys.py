@@ -360,7 +360,7 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
     assert more == {SEEN.name("interreflection", "samples")}, "samples are added to those that are there"
     for bounces in (Bounces((32, 1, 1, 1)), Bounces((64, 1, 1)), Bounces(fixed=frozenset({"sheet"}))):
         after = keys(scene, bounces=bounces)
-        assert stale(before, after) == starting(before | after, (everywhere,))
+        assert stale(before, after) == starting(before | after, (BOUNCED,))
     assert stale(before, keys(scene, probes="traced")) == starting(before, PROBES)
     photons = keys(scene, light_map="photons")
     assert stale(before, photons) == starting(before | photons, BAKED)
