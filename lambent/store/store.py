@@ -15,7 +15,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ class Store:
         self.inputs: dict[str, str] = {}
         self.documents: dict[str, Any] = {}
         self._artefacts: dict[str, Artefact] = {}
+        self._entries: dict[str, _Entry] = {}  # as last written to the manifest; without those that writers changed
         self._lock: WriterLock | None = None
 
     @classmethod
@@ -285,16 +286,31 @@ class Store:
         self.inputs, self.documents, self._artefacts = inputs, documents, artefacts
 
     def _save(self) -> None:
-        rewritten = any(version.generation for a in self.artefacts() for version in a.done.values())
+        entries = {name: self._entry(artefact) for name, artefact in self._artefacts.items()}
+        self._entries = entries
         manifest = {
             "format": FORMAT,
-            "version": VERSIONS[rewritten],
+            "version": VERSIONS[any(entry.rewritten for entry in entries.values())],
             "inputs": self.inputs,
             "documents": self.documents,
         }
         parts = {key: json.dumps(value) for key, value in manifest.items()}
-        parts["artefacts"] = _object({name: json.dumps(a.entry()) for name, a in self._artefacts.items()})
+        parts["artefacts"] = _object({name: entry.text for name, entry in entries.items()})
         write_text(self.folder / MANIFEST, _object(parts))
+
+    def _entry(self, artefact: Artefact) -> _Entry:
+        """Of the manifest: a bake of thousands of arrays saves as often, and would spend its time on making texts."""
+        known = self._entries.get(artefact.name)
+        if known is not None and known.artefact is artefact:
+            return known
+        rewritten = any(version.generation for version in artefact.done.values())
+        return _Entry(artefact, json.dumps(artefact.entry()), rewritten)
+
+
+class _Entry(NamedTuple):
+    artefact: Artefact
+    text: str
+    rewritten: bool  # whether a chunk was
 
 
 class Writer:
@@ -340,7 +356,8 @@ class Writer:
         self._files.settle()
 
     def _check(self) -> None:
-        """`UserError` where the lock went to another `Store`, or the array was begun anew."""
+        """`UserError` where the lock went to another `Store`, or the array was begun anew; it is about to change."""
+        self._store._entries.pop(self.artefact.name, None)
         ours = self._lock is self._store._lock and self._store._writes
         if not ours or self._store._artefacts.get(self.artefact.name) is not self.artefact:
             raise self._store._error("writer was closed or replaced", self.artefact.name, "begin the array again")

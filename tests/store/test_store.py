@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lambent.core.errors import UserError
+from lambent.store.artefact import Artefact
 from lambent.store.chunk_files import ChunkFiles
 from lambent.store.store import Store
 
@@ -275,3 +276,17 @@ def test_any_order_any_interruption_same_array(tmp_path_factory: pytest.TempPath
         writer.write(chunk, array[writer.artefact.region(chunk)])
     writer.finish()
     np.testing.assert_array_equal(Store.open(folder).read("a"), array)
+
+
+def test_saving_one_more_array_does_not_write_all_entries_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of hundreds of arrays the manifest took longer than the arrays."""
+    made: list[str] = []
+    entry = Artefact.entry
+    monkeypatch.setattr(Artefact, "entry", lambda self: made.append(self.name) or entry(self))
+    with Store.create(tmp_path / "s", {}) as store:
+        for k in range(40):
+            store.put(f"probe/{k}", "probe", ARRAY, key="k")
+        assert len(made) <= 3 * 40
+        store.begin("probe/3", "probe", ARRAY.shape, ARRAY.shape, "float32", key="other")
+    again = Store.open(tmp_path / "s")
+    assert len(again.artefacts()) == 40 and not again.artefact("probe/3").complete
