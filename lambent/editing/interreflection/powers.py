@@ -12,8 +12,6 @@ from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable, Factor
 from lambent.store.tails import FIXED, Tails
 
-# Bands may be wider than a peak, which shines as brightly only if they keep its light.
-
 
 @dataclass(frozen=True)
 class Powers:
