@@ -28,6 +28,7 @@ from lambent.bake.view import View
 from lambent.bench.reference import Reference
 from lambent.bench.sum_over_lights import errors_of_sums
 from lambent.core.arrays import Flags, Floats
+from lambent.core.files import folder_bytes
 from lambent.core.metrics import display_exposure, displayed
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent, tracked
@@ -112,7 +113,7 @@ def _scene_rows(name: str, case: Case, effort: Effort) -> list[dict[str, Any]]:
             began = time.perf_counter()
             store = _baked(scene, path, lights, effort.size)
             seconds, timings = time.perf_counter() - began, store.documents["timings"]
-            stored = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+            stored = folder_bytes(path)
             began = time.perf_counter()
             picture = edited_picture(store, session)
             opening = time.perf_counter() - began

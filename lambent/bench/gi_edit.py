@@ -36,6 +36,7 @@ from lambent.bench.direct_edit import MIB, held_bytes
 from lambent.bench.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
+from lambent.core.files import folder_bytes
 from lambent.core.progress import Progress, silent, tracked
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.stored import Interreflections, interreflections
@@ -199,12 +200,7 @@ def _drawn(whole: WholePicture, materials: dict[str, Editable]) -> Floats:
 
 
 def _stored(store: Store) -> int:
-    return sum(
-        file.stat().st_size
-        for one in store.artefacts("interreflection")
-        for file in (store.folder / one.name).rglob("*")
-        if file.is_file()
-    )
+    return sum(folder_bytes(store.folder / one.name) for one in store.artefacts("interreflection"))
 
 
 def _row(case: Case, effort: Effort) -> dict[str, Any]:

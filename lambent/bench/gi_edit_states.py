@@ -61,8 +61,7 @@ def stepped(editable: Editable, rng: np.random.Generator) -> Editable:
 
 def _no_whiter(editable: Editable) -> Editable:
     """Terms scaled so that no albedo is above `WHITEST`."""
-    sides = {"transmission" if term.side == "transmission" else "reflection" for term in editable.terms}
-    most = max((float(albedo(editable, side).max()) for side in sides), default=0.0)
+    most = max((float(albedo(editable, side).max()) for side in editable.sides), default=0.0)
     factor = min(1.0, WHITEST / max(most, 1e-9))
     terms = tuple(replace(term, scale=triple(np.multiply(term.scale, factor))) for term in editable.terms)
     return replace(editable, terms=terms)

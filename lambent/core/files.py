@@ -144,3 +144,8 @@ def inside(folder: Path, name: str) -> Path:
     if not path.is_relative_to(folder):
         raise UserError("path leaves its folder", file=folder, got=name, expected="a path below it")
     return path
+
+
+def folder_bytes(folder: Path) -> int:
+    """Of all files below a folder."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

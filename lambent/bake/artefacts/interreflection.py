@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from lambent.bake.view import View
 from lambent.materials.factored.roughness import varies
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import environment_note
+
+if TYPE_CHECKING:
+    from lambent.bake.transport.view_points import ViewPoints
 
 KIND = "interreflection"
 NEEDS = ("view_points",)
@@ -83,20 +86,23 @@ def passes(samples: int) -> list[int]:
 
 def _bring(context: BakeContext, work: TileTracer, view: View, samples: int) -> None:
     """Bring every tile of a view to so many samples."""
-    tiles = [(part, tile) for part in parts(context, view) for tile in range(len(_tiles(context, part)))]
+    points = context.view_tracer.points(view)
+    materials = np.array([o.material for o in context.in_views.objects])[points.object]
+    found = list(parts(context, view))
+    mine = {part.material: np.flatnonzero(materials == part.material) for part in found}
+    shown = {material: [numbers[some] for some in slices(len(numbers), POINTS)] for material, numbers in mine.items()}
+    tiles = [(part, tile) for part in found for tile in range(len(shown[part.material]))]
     behind = [one for one in tiles if _samples(context, *one) < samples]
     place = {part.names(tile)[0]: (part, tile) for part, tile in behind}
     what = f"interreflections, {samples} samples"
     context.progress(len(tiles) - len(behind), len(tiles), what)
-    jobs = (_job(context, part, tile, samples) for part, tile in behind)
-    for done, (job, found) in enumerate(context.workers.each(work, jobs), len(tiles) - len(behind) + 1):
-        _write(context, *place[job.name], found, samples)
+    jobs = (_job(context, part, tile, points.where(shown[part.material][tile]), samples) for part, tile in behind)
+    for done, (job, traced) in enumerate(context.workers.each(work, jobs), len(tiles) - len(behind) + 1):
+        _write(context, *place[job.name], traced, samples)
         context.progress(done, len(tiles), what)
 
 
-def _job(context: BakeContext, part: Part, tile: int, samples: int) -> Job:
-    points = context.view_tracer.points(part.view)
-    points = points.where(_shown(context, part)).where(_tiles(context, part)[tile])
+def _job(context: BakeContext, part: Part, tile: int, points: ViewPoints, samples: int) -> Job:
     names, before = part.names(tile), _samples(context, part, tile)
     held = tuple(_held(context, name, len(points)) for name in names) if before else ()
     return Job(part.material, points, names[0], samples, before, held)
@@ -133,17 +139,6 @@ def said(part: Part, term: int) -> dict[str, Any]:
     one, factors = part.bins.terms[term]
     curves = [[factor.curve, n] for factor, n in factors]
     return {"material": part.material, "term": term, "fixed": one.fixed, "curves": curves}
-
-
-def _shown(context: BakeContext, part: Part) -> np.ndarray:
-    """(P,) points of the view that show the part's material."""
-    materials = np.array([o.material for o in context.in_views.objects])
-    return np.asarray(materials[context.view_tracer.points(part.view).object] == part.material)
-
-
-def _tiles(context: BakeContext, part: Part) -> list[slice]:
-    """Of the part's points."""
-    return slices(int(np.count_nonzero(_shown(context, part))), POINTS)
 
 
 def _samples(context: BakeContext, part: Part, tile: int) -> int:

@@ -32,7 +32,7 @@ def over_albedo(editable: Editable) -> Floats:
     for that channel. A material with a black side has no shape there, and zeros throughout.
     """
     found = np.zeros((2, 2, 3))
-    for side in sides(editable):
+    for side in editable.sides:
         d = albedo(editable, side)
         if d.max() <= 0:
             return np.zeros((2, 2, 3))
@@ -42,14 +42,9 @@ def over_albedo(editable: Editable) -> Floats:
     return found
 
 
-def sides(editable: Editable) -> list[str]:
-    """The sides that a material scatters to."""
-    return sorted({"transmission" if term.side == "transmission" else "reflection" for term in editable.terms})
-
-
 def is_lambertian(editable: Editable) -> bool:
     """Whether all but `OTHER` of what a material scatters, to each side, is the same in all directions."""
-    for side in sides(editable):
+    for side in editable.sides:
         mine = [term for term in editable.terms if (term.side == "transmission") == (side == "transmission")]
         each = np.array([term_albedo(term, editable.curves) for term in mine])
         shaped = np.array([not _is_even(editable, term) for term in mine])

@@ -51,8 +51,7 @@ def tails_of(editables: Mapping[str, Editable], bounces: Bounces) -> Tails:
     edited = {name: one for name, one in editables.items() if name not in bounces.fixed}
     slots = []
     for name, one in edited.items():
-        sides = {"transmission" if t.side == "transmission" else "reflection" for t in one.terms}
-        slots += [(name, side) for side in sorted(sides)]
+        slots += [(name, side) for side in one.sides]
     second: list[SecondBands] = []
     if bounces.series[1] > 1:
         for name, one in edited.items():

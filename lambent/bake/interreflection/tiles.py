@@ -76,6 +76,11 @@ def unpacked(
     return counts, rest[:half], unpacked_rgb(rest[half:])
 
 
+def paths_at_once(by_second: bool) -> int:
+    """Paths that are traced together; fewer where second surfaces count by bands, which takes arrays of their own."""
+    return PATHS >> 2 if by_second else PATHS
+
+
 @dataclass(frozen=True)
 class Job:
     """Points of a material, to be brought to so many samples.
@@ -127,7 +132,7 @@ class TileTracer:
 
     def _at_once(self, points: int, samples: int) -> list[slice]:
         """Points whose new samples are traced together: a point's sums are written once, however many there are."""
-        most = max(1, (PATHS >> 2 if self._seconds else PATHS) // samples)
+        most = max(1, paths_at_once(by_second=bool(self._seconds)) // samples)
         return slices(points, -(-points // -(-points // most)))
 
     def _traced(self, job: Job, some: slice) -> list[Sorted]:

@@ -14,11 +14,12 @@ import numpy as np
 from lambent.bake.artefacts.interreflection import POINTS, passes
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.series import bins_of, tails_of
-from lambent.bake.interreflection.tiles import PATHS, Job, Tile, TileTracer, unpacked
+from lambent.bake.interreflection.tiles import Job, Tile, TileTracer, paths_at_once, unpacked
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.view_tracer import ViewTracer
 from lambent.bake.view import View
 from lambent.core.colour import luminance
+from lambent.core.files import folder_bytes
 from lambent.materials.factored.albedo import albedo
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import Scene
@@ -61,14 +62,9 @@ class Cost:
         found = points * (bounces.samples * self.path_s + len(done) * self.kept_s)
         for first in range(0, points, POINTS):
             paths = (min(POINTS, points - first) * more for more in added)
-            calls = sum(-(-count // paths_at_once(bounces)) for count in paths)
+            calls = sum(-(-count // paths_at_once(bounces.series[1] > 1)) for count in paths)
             found += calls * self.call_s + len(done) * self.tile_s
         return found
-
-
-def paths_at_once(bounces: Bounces) -> int:
-    """Of a call."""
-    return PATHS >> 2 if bounces.series[1] > 1 else PATHS
 
 
 class Trial:
@@ -116,7 +112,7 @@ class Trial:
         """Memory of one process: paths on the device and as arrays, sums of the largest tile before and after."""
         ways = 2 * (len(bounces.series) - 1)
         most = max(cost.entries * min(POINTS, self.shown[name]) for name, cost in costs.items())
-        return round(paths_at_once(bounces) * (3 * 16 * ways + 64) + 3 * 16 * most)
+        return round(paths_at_once(bounces.series[1] > 1) * (3 * 16 * ways + 64) + 3 * 16 * most)
 
     def _cost(self, work: TileTracer, name: str, bounces: Bounces) -> Cost:
         samples = min(bounces.samples, MOST_SAMPLES)
@@ -133,7 +129,7 @@ class Trial:
 
         # Of few points and one sample, and of many: what a call and a tile take, and what is in proportion.
         few, many = self._some(name, FEW), self._some(name, TIMED)
-        batch = max(2, paths_at_once(bounces) // len(many))
+        batch = max(2, paths_at_once(bounces.series[1] > 1) // len(many))
         call_s, tile_s, _ = _timed(work, name, few, tiles, samples, 1)
         batch_s, keep_s, smaller = _timed(work, name, many, tiles, samples, batch)
         path_s = max(batch_s - call_s, 0.0) / (len(many) * batch)
@@ -189,4 +185,4 @@ def _written(tiles: tuple[Tile, ...]) -> tuple[int, float]:
         for k, tile in enumerate(tiles):
             store.put(f"trial/{k}", "trial", tile.array, key="")
         seconds = time.perf_counter() - start
-        return sum(file.stat().st_size for file in Path(folder).rglob("*") if file.is_file()), seconds
+        return folder_bytes(Path(folder)), seconds

@@ -64,8 +64,8 @@ class ViewPoints:
     def __len__(self) -> int:
         return len(self.pixel)
 
-    def where(self, chosen: NDArray[np.bool_] | slice) -> ViewPoints:
-        """The chosen points."""
+    def where(self, chosen: NDArray[np.bool_ | np.integer] | slice) -> ViewPoints:
+        """The chosen points, by a mask, by their numbers or by a slice."""
         return replace(self, **{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
 
 

@@ -103,6 +103,11 @@ class Editable:
         used = {name for term in self.terms for name in term.curves}
         assert used == set(self.curves), f"curves {sorted(used ^ set(self.curves))} are unused or missing"
 
+    @property
+    def sides(self) -> list[str]:
+        """Those that it scatters to: reflection, transmission or both."""
+        return sorted({"transmission" if term.side == "transmission" else "reflection" for term in self.terms})
+
     def with_curve(self, name: str, curve: Curve) -> Editable:
         return replace(self, curves={**self.curves, name: curve})
 
