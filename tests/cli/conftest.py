@@ -37,7 +37,7 @@ def lambent(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 
 @pytest.fixture
 def refused(lambent: Callable[..., Outcome]) -> Callable[..., str]:
-    """Runs a command line that must be refused: code 2, nothing on stdout, one line on stderr after those of its steps."""
+    """Runs a command line that must be refused: code 2, nothing on stdout, one line on stderr after its steps."""
 
     def call(*arguments: object) -> str:
         outcome = lambent(*arguments)
