@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -37,6 +37,8 @@ from lambent.store.source import scene_of
 from lambent.store.store import Store
 
 NAME = "equal-time"
+T = TypeVar("T")
+
 SCENE = "builtin:room"  # baked here where no store is given
 
 
@@ -125,7 +127,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _timed(make: Callable[[], Floats], runs: int, clock: Callable[[], float]) -> tuple[Floats, list[float]]:
+def _timed(make: Callable[[], T], runs: int, clock: Callable[[], float]) -> tuple[T, list[float]]:
     """The last result, and the seconds of each run but the first, which compiles."""
     made, seconds = make(), []
     for _ in range(runs):
