@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal
@@ -67,14 +68,23 @@ def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> st
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr; nothing where stderr is no terminal."""
+    """A bar with the time left on stderr; where stderr is no terminal, a line for each step with its time."""
+    if not sys.stderr.isatty():
+        lines = _StepLines()
+        try:
+            yield lines
+        except BaseException:
+            lines.end("stopped after ")
+            raise
+        lines.end()
+        return
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
     columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Bars(*columns, console=console, transient=True, disable=not console.is_terminal) as bars:
+    with Bars(*columns, console=console, transient=True) as bars:
         tasks: dict[str, Any] = {}
 
         def update(done: float, total: float, what: str) -> None:
@@ -85,6 +95,33 @@ def progress_bar() -> Iterator[Progress]:
             bars.update(tasks[what], completed=done, total=total, visible=True)
 
         yield update
+
+
+class _StepLines:
+    """A line on stderr for each step that took over half a second, and one a minute while a step goes on."""
+
+    SHORTEST_S = 0.5
+    STILL_S = 60.0
+
+    def __init__(self) -> None:
+        self.step = ""
+        self.begun = self.said = time.monotonic()
+
+    def __call__(self, done: float, total: float, what: str) -> None:
+        now = time.monotonic()
+        if what != self.step:
+            self.end()
+            self.step, self.begun, self.said = what, now, now
+        elif now - self.said >= self.STILL_S:
+            self.said = now
+            say(f"{what}: {min(done / max(total, 1e-9), 1):.0%} after {now - self.begun:.0f} s")
+
+    def end(self, outcome: str = "") -> None:
+        """Say how long the step took that is under way, if there is one."""
+        seconds = time.monotonic() - self.begun
+        if self.step and seconds >= self.SHORTEST_S:
+            say(f"{self.step}: {outcome}{seconds:.1f} s")
+        self.step = ""
 
 
 def parse_size(text: str) -> tuple[int, int]:

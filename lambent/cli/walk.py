@@ -15,7 +15,7 @@ SIZE = "1680x1050"
 
 
 def command(store: Store, size: Size = SIZE) -> None:
-    """Walk through a baked scene: WASD and the mouse; standing still converges to the exact picture.
+    """Walk through a baked scene: WASD and the mouse; standing still converges to the exact answer for the baked light.
 
     Example: lambent walk room.store
     """

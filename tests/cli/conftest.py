@@ -37,12 +37,14 @@ def lambent(capfd: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 
 @pytest.fixture
 def refused(lambent: Callable[..., Outcome]) -> Callable[..., str]:
-    """Runs a command line that must be refused: code 2, nothing on stdout, exactly one line on stderr."""
+    """Runs a command line that must be refused: code 2, nothing on stdout, one line on stderr after its steps."""
 
     def call(*arguments: object) -> str:
         outcome = lambent(*arguments)
         assert (outcome.code, outcome.out) == (2, ""), outcome
-        assert outcome.err.startswith("lambent: error: ") and outcome.err.count("\n") == 1, outcome.err
-        return outcome.err
+        *steps, error = outcome.err.splitlines(keepends=True)
+        assert error.startswith("lambent: error: ") and error.endswith("\n"), outcome.err
+        assert all(step.endswith(" s\n") for step in steps), outcome.err
+        return error
 
     return call

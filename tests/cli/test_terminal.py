@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lambent.cli import console
 from lambent.cli.console import progress_bar, table
 from lambent.core.errors import UserError
 from lambent.core.images import write_shown
@@ -68,6 +69,21 @@ def test_file_names_that_are_no_text(lambent, material, tmp_path):
     write_gonio(Path(f"{file}.txt"), specimen)
     outcome = lambent("fit", f"{file}.txt", "-o", tmp_path / "fitted.json")
     assert outcome.code in (0, 2) and "Traceback" not in outcome.err
+
+
+def test_steps_of_redirected_output_are_lines(capsys, monkeypatch):
+    """A log has a line for each step that took a while, one a minute meanwhile, and the step that was interrupted."""
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    with pytest.raises(KeyboardInterrupt), progress_bar() as progress:
+        for now[0], done, step in (0, 0, "light map"), (10, 1, "light map"), (70, 3, "light map"), (75, 0, "short"):
+            progress(done, 4, step)
+        now[0] += 0.1
+        progress(0, 1, "probes")
+        now[0] += 2.5
+        raise KeyboardInterrupt
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["light map: 75% after 70 s", "light map: 75.0 s", "probes: stopped after 2.5 s"]
 
 
 def test_long_errors_are_cut_and_their_hints_are_not():

@@ -1,0 +1,144 @@
+"""`equal-time`: one frame in motion beside path tracing with Open Image Denoise, by error and by time.
+
+Rows are scene x method. `frame` is what the window draws while it moves; `path N spp` is N paths a pixel, albedo,
+normals and the denoiser; both as they are displayed. Times are of all cores together on a software adapter, whose
+drawing and the path tracer then share a processor; on a graphics card they are seconds. Kernels are compiled and the
+scene is loaded before anything counts. The row marked `equal` has the fewest paths that take at least the frame's time,
+so that the comparison is never kinder to the frame than its time.
+
+The truth is path traced with the store's own materials in two halves. `reference_flip` is the FLIP of one half to the
+other: two independent errors, each 1.4 times that of the truth, and a part of every figure.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from lambent.core import metrics
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera
+from lambent.core.colour import srgb_encode
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, part_of, silent
+from lambent.realtime.device import adapter_info, open_device
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.store.contract import scene_record
+from lambent.store.source import scene_of
+from lambent.store.store import Store
+
+NAME = "equal-time"
+T = TypeVar("T")
+
+SCENE = "builtin:room"  # baked here where no store is given
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Pixels of the picture, samples of the truth, how often a frame is timed, and how many paths are tried."""
+
+    width: int = 960
+    height: int = 540
+    truth_spp: int = 1024
+    runs: int = 5
+    spps: tuple[int, ...] = (1, 2, 4, 8, 16)
+    scene: str = SCENE
+
+
+FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
+
+
+def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
+    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    with tempfile.TemporaryDirectory() as folder:
+        stores = [Store.open(path) for path in inputs] or [_baked(effort.scene, Path(folder) / "store", progress)]
+        parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]
+        rows = [row for store, part in zip(stores, parts, strict=True) for row in rows_of(store, effort, part)]
+    return {"rows": rows, "summary": summary(rows)}
+
+
+def rows_of(store: Store, effort: Effort, progress: Progress) -> list[dict[str, Any]]:
+    """The frame and its rivals in the first camera of a store."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant `engine` has set
+
+    if not scene_record(store).cameras:
+        raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
+    camera: Camera = scene_record(store).cameras[0]
+    tracer = DenoisedView(scene_of(store), camera, effort.width, effort.height)
+    halves = []
+    for seed in (1, 2):
+        halves.append(tracer.image(effort.truth_spp // 2, seed))
+        progress(seed, 3, "truth")
+    truth = (halves[0] + halves[1]) / 2
+    exposure_ev = metrics.display_exposure(truth)
+
+    def shown(radiance: Floats) -> Floats:
+        return srgb_encode(radiance * np.float32(2.0**exposure_ev))
+
+    def row(method: str, picture: Floats, seconds: list[float]) -> dict[str, Any]:
+        flip = metrics.flip_error(encoded, picture)
+        return {
+            "scene": store.folder.name,
+            "method": method,
+            "seconds": statistics.median(seconds),
+            "seconds_min": min(seconds),
+            "seconds_max": max(seconds),
+            "flip": round(float(flip.mean()), 4),
+            "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 4),
+            "psnr": round(metrics.psnr(encoded, picture), 2),
+            "reference_flip": reference_flip,
+        }
+
+    encoded = shown(truth)
+    reference_flip = round(float(metrics.flip_error(shown(halves[0]), shown(halves[1])).mean()), 4)
+    device = open_device()
+    renderer = Renderer(device, store)
+    clock = time.process_time if adapter_info(device).is_software else time.perf_counter
+    state = FrameState(camera, effort.width, effort.height, exposure_ev=exposure_ev, view_transform="linear")
+    frame, seconds = _timed(lambda: renderer.display_image(state), effort.runs, clock)
+    rows = [row("frame", frame.astype(np.float32) / 255, seconds)]
+    for spp in effort.spps:
+        image, taken = _timed(partial(tracer.denoised, spp, seed=9), effort.runs, clock)
+        rows.append(row(f"path {spp} spp", shown(image), taken))
+    rivals = rows[1:]
+    equal = next((one for one in rivals if one["seconds"] >= rows[0]["seconds"]), rivals[-1])
+    return [{**one, "equal": one is equal} for one in rows]
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """By scene, how many times the frame's FLIP the rival of equal time has, and its time in frames."""
+    frames = {row["scene"]: row for row in rows if row["method"] == "frame"}
+    equal = [row for row in rows if row["equal"]]
+    return {
+        "flip_of_path_over_frame": {r["scene"]: round(r["flip"] / frames[r["scene"]]["flip"], 3) for r in equal},
+        "time_of_path_over_frame": {r["scene"]: round(r["seconds"] / frames[r["scene"]]["seconds"], 2) for r in equal},
+    }
+
+
+def _timed(make: Callable[[], T], runs: int, clock: Callable[[], float]) -> tuple[T, list[float]]:
+    """The last result, and the seconds of each run but the first, which compiles."""
+    made, seconds = make(), []
+    for _ in range(runs):
+        begun = clock()
+        made = make()
+        seconds.append(clock() - begun)
+    return made, seconds
+
+
+def _baked(scene: str, folder: Path, progress: Progress) -> Store:
+    from lambent.bake.bake import bake
+    from lambent.scenes import load_scene
+
+    return bake(load_scene(scene), folder, quality="preview", progress=progress)
