@@ -10,6 +10,7 @@ import typer
 
 from lambent.cli.console import Force, Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError
+from lambent.core.projections import Projection
 
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
@@ -65,6 +66,12 @@ def command(
             "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
+    projection: Annotated[
+        Projection, typer.Option(help="How directions lie in the picture; fisheyes are square.")
+    ] = Projection.perspective,
+    field: Annotated[
+        float | None, typer.Option(help="Degrees across a fisheye or a cylinder. [default: 180, 360]")
+    ] = None,
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     edit: Annotated[
         Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
@@ -91,8 +98,9 @@ def command(
 
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
-        *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar
-    )
+        *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
+        projection=projection, field_deg=field,
+    )  # fmt: skip
     settings.check()
     if edit is not None:
         _check_edit(context, edit)
