@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from lambent.cli.console import Force, Json, parse_size, progress_bar, say, show
 from lambent.core.errors import UserError
-from lambent.core.projections import Projection
 
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
@@ -67,8 +66,9 @@ def command(
         ),
     ] = "auto",
     projection: Annotated[
-        Projection, typer.Option(help="How directions lie in the picture; fisheyes are square.")
-    ] = Projection.perspective,
+        Literal["perspective", "fisheye", "hemispherical", "cylinder"],
+        typer.Option(help="How directions lie in the picture; fisheyes are square."),
+    ] = "perspective",
     field: Annotated[
         float | None, typer.Option(help="Degrees across a fisheye or a cylinder. [default: 180, 360]")
     ] = None,
@@ -95,11 +95,12 @@ def command(
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
+    from lambent.core.projections import Projection
 
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
-        projection=projection, field_deg=field,
+        projection=Projection(projection), field_deg=field,
     )  # fmt: skip
     settings.check()
     if edit is not None:

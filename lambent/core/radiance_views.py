@@ -63,7 +63,9 @@ def view_of(line: str, file: Path) -> View:
     if not (np.any(found["d"]) and np.all(np.isfinite([*found["p"], *found["d"], *found["u"]]))):
         raise UserError("view has no direction", file=file, field="-vd", got=" ".join(map(str, found["d"])))
     eye = np.array(found["p"])
-    camera = Camera("view", triple(eye), triple(eye + found["d"] / np.linalg.norm(found["d"])), triple(found["u"]))
+    camera = Camera(
+        "view", triple(eye), triple(eye + np.divide(found["d"], np.linalg.norm(found["d"]))), triple(found["u"])
+    )
     view = View(camera, kinds[kind], found["h"][0], found["v"][0])
     view.check()
     return view
