@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -65,6 +65,13 @@ def command(
             "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
+    projection: Annotated[
+        Literal["perspective", "fisheye", "hemispherical", "cylinder"],
+        typer.Option(help="How directions lie in the picture; fisheyes are square."),
+    ] = "perspective",
+    field: Annotated[
+        float | None, typer.Option(help="Degrees across a fisheye or a cylinder. [default: 180, 360]")
+    ] = None,
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     edit: Annotated[
         Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
@@ -88,11 +95,13 @@ def command(
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
+    from lambent.core.projections import Projection
 
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
-        *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar
-    )
+        *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
+        projection=Projection(projection), field_deg=field,
+    )  # fmt: skip
     settings.check()
     if edit is not None:
         _check_edit(context, edit)

@@ -73,10 +73,11 @@ def _stored(path: Path) -> NDArray[Any]:
         raise UserError("picture is damaged or cut off", file=path, hint="copy or export it again") from error
 
 
-def write_image(path: Path, image: NDArray[Any]) -> None:
+def write_image(path: Path, image: NDArray[Any], view: str | None = None) -> None:
     """Write linear RGB (H, W, 3), atomically, in the format of the suffix: .exr, .hdr or .png.
 
-    PNG values are clipped to [0, 1] and sRGB-encoded: apply `colour.filmic` first to scene radiance.
+    PNG values are clipped to [0, 1] and sRGB-encoded: apply `colour.filmic` first to scene radiance. `view` is written
+    to .hdr as Radiance's options of the view.
     """
     path = Path(path)
     rgb = np.asarray(image, np.float32)
@@ -86,7 +87,7 @@ def write_image(path: Path, image: NDArray[Any]) -> None:
         if path.suffix.lower() == ".exr":
             exr.encode(rgb, beside)
         elif path.suffix.lower() == ".hdr":
-            beside.write_bytes(rgbe.encode(rgb))
+            beside.write_bytes(rgbe.encode(rgb, view))
         else:
             _save_png(beside, to_bytes(srgb_encode(rgb)))
 

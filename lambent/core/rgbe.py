@@ -20,6 +20,7 @@ from lambent.core.outputs import MARK
 from lambent.core.plain import is_number
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
+REC_709 = ".64 .33 .30 .60 .15 .06 .3127 .3290"  # x and y of red, green, blue and white
 _RESOLUTION = re.compile(rb"([-+])Y (\d{1,9}) ([-+])X (\d{1,9})\n")
 _MIN_RUN_WIDTH, _MAX_RUN_WIDTH = 8, 0x7FFF  # widths outside are never run-length encoded per channel
 
@@ -49,15 +50,27 @@ def decode(data: bytes, file: Path) -> Image:
     return np.ascontiguousarray(image[:: 1 if match[1] == b"-" else -1, :: 1 if match[3] == b"+" else -1])
 
 
-def encode(image: Image) -> bytes:
-    """Bytes of a flat (not run-length encoded) file of linear RGB (H, W, 3); negative values become 0."""
+def header_lines(data: bytes) -> list[str]:
+    """Lines of the header of a picture's bytes; none where it does not end."""
+    end = data.find(b"\n\n", 0, 1 << 16)
+    return data[:end].decode("latin-1").splitlines() if end >= 0 else []
+
+
+def encode(image: Image, view: str | None = None) -> bytes:
+    """Bytes of a flat (not run-length encoded) file of linear RGB (H, W, 3); negative values become 0.
+
+    `view` holds Radiance's options of the view. Values are W/(sr m^2) as they stand, so EXPOSURE is 1; the primaries
+    are Rec.709's, which other programs take every .hdr to have and Radiance does not.
+    """
     rgb = np.maximum(image, 0)
     _, exponent = np.frexp(rgb.max(axis=-1))
     mantissa = np.minimum(np.rint(np.ldexp(rgb, 8 - exponent[..., None])), 255)
     exponent = np.clip(np.where(rgb.max(axis=-1) > 0, exponent + 128, 0), 0, 255)
     pixels = np.concatenate([mantissa, exponent[..., None]], axis=-1).astype(np.uint8)
     height, width = image.shape[:2]
-    header = f"#?RADIANCE\nSOFTWARE={MARK}\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
+    seen = f"VIEW= {view}\n" if view else ""
+    about = f"SOFTWARE={MARK}\n{seen}EXPOSURE=1\nPRIMARIES= {REC_709}\n"
+    header = f"#?RADIANCE\n{about}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
     return header.encode("ascii") + pixels.tobytes()
 
 

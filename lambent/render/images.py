@@ -17,6 +17,7 @@ from lambent.core.false_colour import Range, false_colour, fitting_range, with_s
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.progress import Progress, silent
+from lambent.core.projections import Projection, View
 
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
@@ -49,6 +50,10 @@ class Settings:
         standard error in percent, always in false colours.
     planar : str
         How planar reflectors are drawn: auto, off (from their probes), or a method that the integrator knows.
+    projection : Projection
+        Perspective, or what is drawn from the faces of a cube around the eye.
+    field_deg : float, optional
+        Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     """
 
     width: int = 1280
@@ -61,6 +66,8 @@ class Settings:
     log: bool = True
     show: str = "full"
     planar: str = "auto"
+    projection: Projection = Projection.perspective
+    field_deg: float | None = None
 
     @property
     def is_false_coloured(self) -> bool:
@@ -75,6 +82,10 @@ class Settings:
         if self.exposure_ev is not None and not -64 <= self.exposure_ev <= 64:  # also refuses nan
             got, expected = self.exposure_ev, "-64 to 64 EV"
             raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
+        if self.projection is not Projection.perspective:
+            View.of(Camera("", (0, 0, 0), (0, 0, -1)), self.projection, self.width, self.height, self.field_deg).check()
+        elif self.field_deg is not None:
+            raise UserError("is of fisheyes and cylinders", field="--field", hint="a camera has its own field of view")
 
 
 class Images(ABC):

@@ -10,12 +10,15 @@ from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
 from lambent.core.progress import Progress, silent, tracked
+from lambent.core.projections import Projection, View
 from lambent.render.images import PATH_TRACER, Images, Settings
+from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.store import Store
@@ -87,7 +90,23 @@ def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = si
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
-        write_image(file, drawn.radiance(view, progress))
+        of = drawn.settings
+        seen = View.of(view, of.projection, of.width, of.height, of.field_deg).radiance_options()
+        write_image(file, drawn.radiance(view, progress), seen)
+
+
+def drawn_view(
+    store: Store | Path | str,
+    camera: str | None,
+    settings: Settings = DEFAULT,
+    *,
+    note: Note = ignore,
+    progress: Progress = silent,
+) -> tuple[Floats, Camera]:
+    """Radiance (height, width, 3) of a store's view, in memory, and its camera; parameters are those of `still`."""
+    opened, record = _opened(store)
+    view = _named("camera", record.cameras, camera)
+    return images(opened, settings, note=note).radiance(view, progress), view
 
 
 def film(
@@ -148,6 +167,8 @@ def images(
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
     settings = exposed(settings, store)
+    if settings.projection is not Projection.perspective:
+        return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.integrator == PATH_TRACER:
         from lambent.render.path_traced import PathTraced
 

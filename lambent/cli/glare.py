@@ -1,0 +1,69 @@
+"""`lambent glare`: discomfort glare of a view, by a picture of Radiance's or a baked store."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lambent.cli.console import Force, Json, progress_bar, say, show, table
+from lambent.core.errors import UserError
+
+SIDE_PX = 800
+
+
+def command(
+    what: Annotated[Path, typer.Argument(help="Radiance picture (.hdr) of a fisheye, or folder of a baked store.")],
+    output: Annotated[Path | None, typer.Option("-o", help="Picture with the sources marked (.png).")] = None,
+    camera: Annotated[str | None, typer.Option(help="Of a store: camera or saved view. [default: the first]")] = None,
+    integrator: Annotated[
+        str, typer.Option(help="Of a store: how it is drawn, as `lambent render` names it.")
+    ] = "rings",
+    threshold: Annotated[float, typer.Option(min=1, help="Luminance of a source of glare, cd/m2.")] = 2000.0,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Rate the glare of a view: daylight glare probability (DGP), unified glare rating (UGR), and every source.
+
+    Example: lambent glare room.store --camera entrance -o glare.png
+    """
+    from lambent.core.glare import glare
+    from lambent.core.images import read_image, write_shown
+    from lambent.core.outputs import check_output
+    from lambent.core.projections import Projection, View
+    from lambent.core.radiance_views import read_view
+
+    if output is not None:
+        check_output(output, (".png",), force=force, inputs=[what])
+    if what.is_dir():
+        from lambent.render import Settings
+        from lambent.render.output import drawn_view
+
+        settings = Settings(SIDE_PX, SIDE_PX, integrator, projection=Projection.fisheye)
+        with progress_bar() as progress:
+            radiance, seen = drawn_view(
+                what, camera, settings, note=lambda text: say(f"note: {text}"), progress=progress
+            )
+        view = View.of(seen, Projection.fisheye, SIDE_PX, SIDE_PX)
+    elif camera is not None:
+        raise UserError("is of stores", field="--camera", got=camera, hint="a picture says its own view")
+    else:
+        view, radiance = read_view(what), read_image(what)
+    found = glare(radiance, view, threshold)
+    if output is not None:
+        from lambent.core.glare_picture import marked
+
+        write_shown(output, marked(radiance, found))
+    facts = {key: getattr(found, key) for key in ("dgp", "ugr", "comfort", "illuminance_lx", "background")}
+    facts |= {"sources": [asdict(source) for source in found.sources], "written": output}
+    lines = [
+        ("DGP", f"{found.dgp:.3f}, {found.comfort}"),
+        ("UGR", f"{found.ugr:.1f}"),
+        ("at the eye", f"{found.illuminance_lx:.0f} lx"),
+        ("background", f"{found.background:.0f} cd/m2"),
+    ]
+    columns = ("cd/m2", "sr", "position index", "right, deg", "up, deg")
+    rows = [tuple(f"{value:.4g}" for value in asdict(source).values()) for source in found.sources]
+    show(facts, "\n\n".join([table(lines), table([columns, *rows]) if rows else "nothing glares"]), json)
