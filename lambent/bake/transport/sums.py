@@ -84,7 +84,8 @@ def _of_piece(light, power, wide, ends, between, up, local, height, quotient):  
     """The light of a piece: of a wide light, its own."""
     if wide:
         middle = dr.normalize(highest_part(sum(between), ends, up, dr))
-        light = power * quotient(middle) * cosine_integral(*map(local, ends), dr)
+        a, b, c = (local(w) for w in ends)
+        light = power * quotient(middle) * cosine_integral(a, b, c, dr)
         light = dr.select(height(middle) > 0, light, 0.0)
     return light
 
