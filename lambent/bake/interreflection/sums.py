@@ -82,6 +82,14 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
     return rows.view(np.uint32)[..., 3]
 
 
+def compile_sums(by_second: bool) -> None:
+    """Compile what `Sums.and_of` calls, for arrays like those of paths: seconds, where numba's cache is empty."""
+    rows = [np.zeros((*shape, 4), np.float32) for shape in ((2,), (2, 2), (int(by_second), 2, 2))]
+    first, light, second = rows
+    nothing = Sorted(first, light, np.zeros(2, np.uint32), second, np.ones(2, np.int64))
+    Sums.none(1).and_of(nothing, bands=1, tails=1)
+
+
 @numba.njit(cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
     codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands,
