@@ -123,3 +123,17 @@ def test_a_lamp_that_a_floor_cuts_lights_with_what_is_above_it() -> None:
     seen = view(Scene("cut", (floor,), {"white": Material(kd=1.0)}), lights, (2, 2), at)
     found = seen.picture(of_material(Material(kd=1.0)), 64)
     assert found == pytest.approx(2 * beside(0.5 / 0.2, 0.4 / 0.2), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("material", "side"), [(Material(kd=1.0), 1), (Material(kt_d=1.0), -1)], ids=["before", "behind"]
+)
+def test_a_lamp_a_centimetre_from_a_sheet(material: Material, side: int) -> None:
+    """Two metres by one, a corner over the point: nearly a quarter of what a whole sky would be."""
+    sheet = SceneObject("sheet", patch((-3, 0, 3), (6, 0, 0), (0, 0, -6)), "sheet")
+    at = Camera("at", (0.0, 0.008, 1e-4), (0.0, 0.0, 0.0), fov_y_deg=0.1)
+    y = 0.01 * side
+    corners = np.array([[0, y, 0], [2, y, 0], [2, y, 1], [0, y, 1]], float)[::side]
+    lights = surface_triangles(corners[[[0, 1, 2], [0, 2, 3]]], np.ones((2, 3)), 5.0)
+    found = view(Scene("sheet", (sheet,), {"sheet": material}), lights, (2, 2), at).picture(of_material(material), 64)
+    assert found == pytest.approx(overhead(200, 100), rel=2e-3)
