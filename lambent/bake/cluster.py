@@ -177,8 +177,6 @@ def _loaded(work: bytes) -> Any:
 
 def _limit(threads: int) -> None:
     import drjit as dr
-    import numba
 
     if dr.thread_count() != threads:
         dr.set_thread_count(threads)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]

@@ -20,7 +20,6 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from lambent.core.arrays import Floats
 from lambent.core.directions import basis
@@ -207,6 +206,8 @@ def _face_arrays(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats]:
 
 def _outline(points: Floats, normal: Floats) -> Floats:
     """Convex hull (P, 3) of points in a plane, counter-clockwise seen from its normal's side."""
+    from scipy.spatial import ConvexHull, QhullError  # half a second, only for scenes with reflectors
+
     flat = points @ np.stack(basis(normal), axis=1)
     _, kept = np.unique(flat.round(4), axis=0, return_index=True)
     if len(kept) > 2:

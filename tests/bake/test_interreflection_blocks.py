@@ -11,7 +11,7 @@ import pytest
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection import tiles
 from lambent.bake.interreflection.series import bins_of, tails_of
-from lambent.bake.interreflection.sums import Sorted, Sums
+from lambent.bake.interreflection.sums import Sorted, Sums, _add, compile_sums
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.bake.transport.view_tracer import ViewTracer
@@ -123,3 +123,12 @@ def test_kernels_do_not_depend_on_the_number_of_paths(series: tuple[int, ...]) -
         history = dr.kernel_history((dr.KernelType.JIT,))
     assert len(history) > 4
     assert not [kernel["size"] for kernel in history if not kernel["cache_hit"]]
+
+
+@pytest.mark.parametrize("terms", [0, 1])
+def test_sums_are_compiled_for_the_arrays_of_paths(terms: int) -> None:
+    """Beside the first tile's paths; not once more when they are there."""
+    compile_sums(by_second=terms > 0)
+    before = list(_add.signatures)
+    Sums.none(3).and_of(random_samples(3, 4, terms, np.random.default_rng(0)), 3, 10)
+    assert _add.signatures == before

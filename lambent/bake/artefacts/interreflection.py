@@ -18,7 +18,7 @@ from lambent.bake.engine import engine
 from lambent.bake.interreflection.as_baked import SCATTERING_TEXTURES, shapes_of, state_of
 from lambent.bake.interreflection.series import Bins, bins_of, tails_of, worn
 from lambent.bake.interreflection.tiles import Job, Tile, TileTracer
-from lambent.bake.keys import geometry_inputs, key_of, light_inputs, texture_inputs
+from lambent.bake.keys import key_of, light_inputs, texture_inputs
 from lambent.bake.tiles import slices
 from lambent.bake.view import View
 from lambent.materials.factored.roughness import varies
@@ -162,10 +162,7 @@ def _series_key(context: BakeContext, view: View) -> str:
     """The key of all that tiles depend on, but the material of their points."""
     scene, bounces, editables = context.in_views, context.bounces, _editables(context)
     lights, tails = light_inputs(scene), tails_of(editables, bounces).said()
-    return key_of(
-        KIND, REVISION, points_key(context, view), geometry_inputs(scene), lights, _as_baked(context), tails,
-        context.seed,
-    )  # fmt: skip
+    return key_of(KIND, REVISION, points_key(context, view), lights, _as_baked(context), tails, context.seed)
 
 
 def _as_baked(context: BakeContext) -> list[Any]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 KIND = "transport"
 NEEDS = ("view_points", "visibility")
 OF_VIEWS = True
-REVISION = 3
+REVISION = 4
 POINTS = 1 << 15  # a chunk
 LEAST = 2.0**-10  # of the light of a band of the first curve: less moves to a neighbour along a smooth second one
 ENTRIES = 1 << 20  # of pairs, a chunk: each costs milliseconds until it is on the disk

@@ -17,7 +17,7 @@ from lambent.bake.view import View
 KIND = "visibility"
 NEEDS = ("view_points",)
 OF_VIEWS = True
-REVISION = 2
+REVISION = 3
 POINTS = 1 << 16  # a chunk
 BITS = 32
 

@@ -82,7 +82,15 @@ def _bits(rows: NDArray[np.float32]) -> NDArray[np.uint32]:
     return rows.view(np.uint32)[..., 3]
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+def compile_sums(by_second: bool) -> None:
+    """Compile what `Sums.and_of` calls, for arrays like those of paths: seconds, where numba's cache is empty."""
+    rows = [np.zeros((*shape, 4), np.float32) for shape in ((2,), (2, 2), (int(by_second), 2, 2))]
+    first, light, second = rows
+    nothing = Sorted(first, light, np.zeros(2, np.uint32), second, np.ones(2, np.int64))
+    Sums.none(1).and_of(nothing, bands=1, tails=1)
+
+
+@numba.njit(cache=True, nogil=True)
 def _add(  # type: ignore[no-untyped-def]
     codes, sums, room, ends, old_codes, old_sums, first, band, light, tail, arrived, factor, second, widths, bands,
     size, together,
@@ -90,7 +98,7 @@ def _add(  # type: ignore[no-untyped-def]
     points = len(ends) - 1
     samples, entries, terms = len(band) // points, len(tail), len(factor)
     counts = np.zeros(points, np.int64)
-    for block in numba.prange((points + together - 1) // together):
+    for block in range((points + together - 1) // together):
         row = np.zeros((size, 3), np.float32)
         met = np.zeros(size, np.bool_)
         for p in range(block * together, min(points, (block + 1) * together)):
@@ -138,11 +146,11 @@ def _add(  # type: ignore[no-untyped-def]
     return counts
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True)
 def _closed_up(codes, light, room, ends):  # type: ignore[no-untyped-def]
     """Entries without the room between points."""
     out, sums = np.empty(ends[-1], np.uint32), np.empty((ends[-1], 3), np.float32)
-    for p in numba.prange(len(ends) - 1):
+    for p in range(len(ends) - 1):
         for k in range(ends[p + 1] - ends[p]):
             out[ends[p] + k] = codes[room[p] + k]
             for c in range(3):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,8 +120,11 @@ class TileTracer:
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
         engine()  # before Mitsuba is imported
+        from lambent.bake.interreflection.sums import compile_sums
+
         adding: list[Future[list[Sums]]] = []
-        with ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=(1,)) as adder:  # beside the next paths
+        with ThreadPoolExecutor(1) as adder:  # beside the next paths, and the compilation of those
+            adder.submit(compile_sums, bool(self.tails.second))
             for some in self._at_once(len(job.points), job.samples - job.before):
                 new = self._traced(job, some)
                 if adding:

@@ -209,20 +209,18 @@ class _Lit:
                 return above
             return dr.select(dr.squared_norm(sheet) > 0, dr.minimum(above, dr.dot(w, sheet) * mirrored), above)
 
-        def weight(w: Any) -> Any:
-            """rho_q cos of a direction on the side that the term scatters from."""
+        def quotient(w: Any) -> Any:
+            """rho_q of a direction on the side that the term scatters from."""
             wi = local(w)
-            quotient = term.quotient.evaluate(wi, wo, ops)
-            value = mi.Vector3f(*quotient) if isinstance(quotient, tuple) else mi.Vector3f(quotient)
-            if rough is not None:
-                value *= thinned(term, wi, wo, rough, ops)
-            return value * wi[2]
+            value = term.quotient.evaluate(wi, wo, ops)
+            value = mi.Vector3f(*value) if isinstance(value, tuple) else mi.Vector3f(value)
+            return value if rough is None else value * thinned(term, wi, wo, rough, ops)
 
         row = dr.alloc_local(mi.Float, 3 * count * int(np.prod(self.counts[1:])), value=mi.Float(0))
         part = dr.opaque(mi.UInt32, begin), dr.opaque(mi.UInt32, begin + count)
         row = accumulate(
             row, part, pixel, active, dr.opaque(mi.UInt32, self._many), p, self._lights, self._seen, self._number,
-            steps, height, weight, self.counts,
+            axes[2] * mirrored, local, steps, height, quotient, self.counts,
         )  # fmt: skip
         return row, pixel, active
 

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.pieces import solid_angle
+from lambent.bake.transport.polygon_light import highest_part
 from lambent.scenes.triangle_lights import TriangleLights
+
+WIDE_SR = 1e-3  # of lights of the scene: wider ones are integrated over their extent
 
 
 def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
@@ -33,26 +36,35 @@ def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
     return arrays
 
 
-def light_at(lights: dict[str, Any], m: Any, p: Any) -> tuple[Any, ...]:
-    """Direction and corners of light m from p, and its radiance times its solid angle."""
+def light_at(lights: dict[str, Any], m: Any, p: Any, n: Any = None) -> tuple[Any, ...]:
+    """Direction and corners of light m from p, its light, the solid angle that multiplies it, and whether it is wide.
+
+    The last is None where all lights are at infinity.
+    The direction to a wide light is above a surface of normal n, if there is one and any of the light is.
+    """
     centre = dr.gather(mi.Vector3f, lights["centres"], m)
     a, b, c = [dr.gather(mi.Vector3f, corner, m) for corner in lights["corners"]]
-    power = dr.gather(mi.Vector3f, lights["light"], m)
+    light = dr.gather(mi.Vector3f, lights["light"], m)
     if "near" not in lights:
-        return centre, a, b, c, power
+        return centre, a, b, c, light, 1.0, None
     near = dr.gather(mi.Bool, lights["near"], m)
     here = mi.Vector3f(p)
     across = dr.cross(b - a, c - a)
     to = centre - here
     facing, is_point = dr.dot(across, to) < 0, dr.all(a == b)
     share = dr.select(facing, solid_angle(a - here, b - here, c - here, across), 0.0)
-    a, b, c, centre = [dr.select(near, dr.normalize(v - here), v) for v in (a, b, c, centre)]
+    wide = near & (share > WIDE_SR)
+    if n is not None:
+        to = dr.select(wide, highest_part(to, [v - here for v in (a, b, c)], n, dr), to)
+    a, b, c = [dr.select(near, dr.normalize(v - here), v) for v in (a, b, c)]
+    centre = dr.select(near, dr.normalize(to), centre)
     if "cone" in lights:
         angle = dr.acos(dr.clip(-dr.dot(centre, dr.gather(mi.Vector3f, lights["axes"], m)), -1, 1))
         outer, width = [dr.gather(mi.Float, one, m) for one in lights["cone"]]
         inside = dr.select(outer < np.float32(np.pi), dr.clip((outer - angle) / width, 0, 1), 1.0)
         share = dr.select(is_point, inside / dr.squared_norm(to), share)
-    return centre, a, b, c, power * dr.select(near, share, 1.0)
+        wide &= ~is_point
+    return centre, a, b, c, light, dr.select(near, share, 1.0), wide
 
 
 def brightest(p: NDArray[np.float32], lights: TriangleLights) -> float:
@@ -69,7 +81,7 @@ def _reaching(here, lights, count):  # type: ignore[no-untyped-def]
     m = mi.UInt32(0)
     total = dr.zeros(mi.Float, dr.width(here))
     while m < count:
-        most = 2 * dr.pi * dr.gather(mi.Vector3f, lights["light"], m)  # points come near to point lights
-        total += dr.max(dr.minimum(light_at(lights, m, here)[4], most))
+        light, share = light_at(lights, m, here)[4:6]
+        total += dr.max(light) * dr.minimum(share, 2 * dr.pi)  # points come near to point lights
         m += 1
     return total

@@ -15,7 +15,8 @@ from lambent.materials.factored.curve import END_RAD
 BEND, BEND_BY_ANGLE, MOST_BEND = 0.5, 1 / 8, 4.0  # bands that an angle may be from linear within a piece; more, in
 # proportion to the angle, where curves have no narrow peaks
 WIDEST = 3  # nodes that a piece may span along both of two curves
-MOST_CUTS = 5  # of a triangle into four, and of those
+COS_BROAD = 0.975  # between the corners of a piece of a wide light: more than 13 degrees
+MOST_CUTS, MOST_CUTS_OF_WIDE = 5, 10  # of a triangle into four, and of those
 
 
 def in_bands(angle: Any, count: int) -> Any:
@@ -36,6 +37,17 @@ def is_bent(corners: list[Any], middles: list[Any]) -> Any:
     if len(corners[0]) == 2:
         bent |= dr.minimum(*(_most(x) - _least(x) for x in zip(*corners, strict=True))) > WIDEST
     return bent
+
+
+def is_broad(corners: list[Any]) -> Any:
+    """Whether a piece spans so many directions that its quotient may differ much from that at its middle."""
+    a, b, c = corners
+    return _least([dr.dot(a, b), dr.dot(b, c), dr.dot(c, a)]) < COS_BROAD
+
+
+def above(w: Any, n: Any) -> Any:
+    """Unit w, or the direction on the horizon of n that is above it."""
+    return dr.normalize(w - n * dr.minimum(dr.dot(w, n), 0.0))
 
 
 def _most(values: Sequence[Any]) -> Any:

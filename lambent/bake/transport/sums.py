@@ -11,10 +11,14 @@ from lambent.bake.transport.device_lights import light_at
 from lambent.bake.transport.overlaps import below
 from lambent.bake.transport.pieces import (
     MOST_CUTS,
+    MOST_CUTS_OF_WIDE,
+    Where,
+    above,
     angles,
     corners_of,
     first_part,
     is_bent,
+    is_broad,
     is_last_part,
     next_part,
     parent,
@@ -22,6 +26,7 @@ from lambent.bake.transport.pieces import (
     spread_of,
     whole,
 )
+from lambent.bake.transport.polygon_light import cosine_integral, highest_part
 from lambent.bake.transport.visibility import BITS
 
 TINY = 1e-12  # of a light: less is nowhere
@@ -29,30 +34,60 @@ TINY = 1e-12  # of a light: less is nowhere
 
 @dr.syntax
 def accumulate(  # type: ignore[no-untyped-def]
-    row, part, pixel, active, pixels, p, lights, seen, count, steps, height, weight, counts
+    row, part, pixel, active, pixels, p, lights, seen, count, up, local, steps, height, quotient, counts
 ):
-    """Add all lights that a point sees to its row. Pieces are cut where the angles bend, depth first."""
+    """Add all lights that a point sees to its row. Pieces are cut where the angles bend, depth first.
+
+    Of wide lights, each piece counts by its own light and quotient, and what is below the horizon is on it.
+    """
     m = mi.UInt32(0)
     while active & (m < count):
         bit = (dr.gather(mi.UInt32, seen, (m // BITS) * pixels + pixel) >> (m % BITS)) & 1
-        centre, a, b, c, power = light_at(lights, m, p)
-        if (bit == 1) & (height(centre) > 0) & (dr.max(power) > 0):
-            power *= weight(centre)
+        centre, a, b, c, power, solid, wide = light_at(lights, m, p, up)
+        if (bit == 1) & (height(centre) > 0) & (dr.max(power) * solid > 0):
+            of_point = solid * quotient(centre) * dr.dot(centre, up)
+            power *= of_point if wide is None else dr.select(wide, 1.0, of_point)
             where = whole()
             busy = mi.Bool(True)
             while busy:
                 ends, between = corners_of(a, b, c, where)
-                corners, middles = list(map(steps, ends)), list(map(steps, between))
-                if is_bent(corners, middles) & (where[0] < MOST_CUTS):
+                corners, middles = [[steps(w) for w in _lifted(few, up, wide)] for few in (ends, between)]
+                if _is_coarse(where, ends, is_bent(corners, middles), wide):
                     where = first_part(where)
                 else:
-                    _add_piece(row, part, power * share_of(where), angles(corners, middles, counts), counts)
+                    light = power * share_of(where)
+                    if dr.hint(wide is not None, mode="scalar"):
+                        light = _of_piece(light, power, wide, ends, between, up, local, height, quotient)
+                    _add_piece(row, part, light, angles(corners, middles, counts), counts)
                     while (where[0] > 0) & is_last_part(where):
                         where = parent(where)
                     busy = where[0] > 0
                     where = next_part(where)
         m += 1
     return row
+
+
+def _lifted(directions: list[Any], up: Any, wide: Any) -> list[Any]:
+    """What is below the horizon of a wide light, on it."""
+    return directions if wide is None else [dr.select(wide, above(w, up), w) for w in directions]
+
+
+def _is_coarse(where: Where, corners: list[Any], bent: Any, wide: Any) -> Any:
+    """Whether a piece has to be cut."""
+    if wide is None:
+        return bent & (where[0] < MOST_CUTS)
+    return (bent | (wide & is_broad(corners))) & (where[0] < dr.select(wide, MOST_CUTS_OF_WIDE, MOST_CUTS))
+
+
+@dr.syntax
+def _of_piece(light, power, wide, ends, between, up, local, height, quotient):  # type: ignore[no-untyped-def]
+    """The light of a piece: of a wide light, its own."""
+    if wide:
+        middle = dr.normalize(highest_part(sum(between), ends, up, dr))
+        a, b, c = (local(w) for w in ends)
+        light = power * quotient(middle) * cosine_integral(a, b, c, dr)
+        light = dr.select(height(middle) > 0, light, 0.0)
+    return light
 
 
 @dr.syntax

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.tracing.rays import has_holes, hidden, in_shadow, leaving, vectors
+from lambent.bake.transport.polygon_light import highest_part
 from lambent.bake.transport.view_points import ViewPoints
 from lambent.scenes.triangle_lights import TriangleLights
 
@@ -20,6 +21,8 @@ def visibility(
     scene: Any, points: ViewPoints, lights: TriangleLights, behind: NDArray[np.bool_] | None = None
 ) -> NDArray[np.uint32]:
     """Words (ceil(M / 32), P): bit m % 32 of word m // 32 is set where light m's centre is seen.
+
+    Of surfaces that shine, a place above the point's horizon is seen instead, where the centre is below it.
 
     Parameters
     ----------
@@ -38,19 +41,27 @@ def visibility(
     both = dr.gather(mi.Bool, mi.Bool(np.ones(len(points), bool) if behind is None else behind), at)
     seen = _seen(
         scene, p, flat, normal, both, thread // count * BITS, dr.opaque(mi.UInt32, len(lights)),
-        vectors(mi.Vector3f, lights.centres), mi.Bool(lights.near), bool(lights.near.any()), has_holes(scene),
+        vectors(mi.Vector3f, lights.centres), [vectors(mi.Vector3f, lights.corners[:, c]) for c in range(3)],
+        mi.Bool(lights.near), bool(lights.near.any()), has_holes(scene),
     )  # fmt: skip
     return np.array(seen).reshape(words, len(points))
 
 
 @dr.syntax
-def _seen(scene, p, flat, normal, both, first, lights, centres, near, any_near, holes):  # type: ignore[no-untyped-def]
+def _seen(  # type: ignore[no-untyped-def]
+    scene, p, flat, normal, both, first, lights, centres, corners, near, any_near, holes
+):
     word, i = mi.UInt32(0), mi.UInt32(0)
     while i < BITS:
         m = first + i
         here = m < lights
         centre = dr.gather(mi.Vector3f, centres, m, here)
         is_near = dr.gather(mi.Bool, near, m, here) if dr.hint(any_near, mode="scalar") else mi.Bool(False)
+        if dr.hint(any_near, mode="scalar"):
+            at = mi.Vector3f(p)
+            places = [dr.gather(mi.Vector3f, corner, m, here) - at for corner in corners]
+            highest = highest_part(centre - at, places, normal, dr) + at
+            centre = dr.select(is_near & ~both, highest, centre)
         here &= both | (dr.dot(normal, centre - dr.select(is_near, mi.Vector3f(p), 0)) > 0)
         blocked = in_shadow(scene, leaving(scene, p, flat, centre), here & ~is_near, holes, coherent=True)
         if dr.hint(any_near, mode="scalar"):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -70,20 +71,31 @@ def _axes(term: Term) -> list[_Axis]:
 
 def _shares(term: Term, axes: list[_Axis]) -> Floats:
     """e (bands of each axis, 3)."""
-    wi, wo, weight = _nodes(not term.is_diffuse, 1 if _is_isotropic(term, axes) else TURNS)
+    wi, wo, weight = _nodes(not term.is_diffuse)
+    turns = 1 if _is_isotropic(term, axes) else TURNS
+    shape = [axis.bands for axis in axes]
+    total = np.zeros((3, int(np.prod(shape, dtype=int))))
+    for turn_rad in (np.arange(turns) + 0.5) / turns * 2 * np.pi:  # one after another: each is a million nodes
+        total += _sums(term, axes, _turned(wi, turn_rad), _turned(wo, turn_rad), weight / turns)
+    return np.ascontiguousarray(total.T).reshape(*shape, 3)
+
+
+def _sums(term: Term, axes: list[_Axis], wi: Vector, wo: Vector, weight: Floats) -> Floats:
+    """(3, bands of all axes) sums over nodes."""
     quotient = term.quotient.evaluate(wi, wo, NUMPY)
-    value = (
-        np.stack(np.broadcast_arrays(*quotient, weight)[:3], -1) if isinstance(quotient, tuple) else quotient[:, None]
-    )
-    value = value * weight[:, None] / np.pi
     place: Indices = np.zeros(len(weight), np.int64)
     for axis in axes:
-        angle = angle_of(axis.factor.over, wi, wo, axis.factor.stretch)
-        place = place * axis.bands + axis.band(angle)
-    shape = [axis.bands for axis in axes]
-    size = int(np.prod(shape, dtype=int))
-    columns = [np.bincount(place, column, size) for column in np.broadcast_to(value, (len(place), 3)).T]
-    return np.asarray(np.stack(columns, -1).reshape(*shape, 3), float)
+        place = place * axis.bands + axis.band(angle_of(axis.factor.over, wi, wo, axis.factor.stretch))
+    size = int(np.prod([axis.bands for axis in axes], dtype=int))
+    if not isinstance(quotient, tuple):
+        return np.broadcast_to(np.bincount(place, quotient * weight / np.pi, size), (3, size))
+    return np.stack([np.bincount(place, channel * weight / np.pi, size) for channel in quotient])
+
+
+def _turned(w: Vector, by_rad: float) -> Vector:
+    """Directions turned about the normal."""
+    c, s = np.cos(by_rad), np.sin(by_rad)
+    return c * w[0] - s * w[1], s * w[0] + c * w[1], w[2]
 
 
 def _is_isotropic(term: Term, axes: list[_Axis]) -> bool:
@@ -102,24 +114,28 @@ def _is_isotropic(term: Term, axes: list[_Axis]) -> bool:
     return all(np.allclose(found[0], other, rtol=1e-4, atol=1e-6) for other in found[1:])
 
 
-def _nodes(about_half_vector: bool, turns: int) -> tuple[Vector, Vector, Floats]:
-    """Pairs of directions above the surface, and their weight cos_i cos_o dwi dwo."""
+def _nodes(about_half_vector: bool) -> tuple[Vector, Vector, Floats]:
+    """Pairs of directions above the surface, wo without y, and their weight cos_i cos_o dwi dwo."""
     square_o = (np.arange(VIEWERS) + 0.5) / VIEWERS  # sin^2 theta_o: cosine distributed, each pi / VIEWERS of cos dw
     phi = (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS * 2 * np.pi
-    turn = (np.arange(turns) + 0.5) / turns * 2 * np.pi
     ends = (np.arange(ELEVATIONS + 1) / ELEVATIONS) ** 2 * END_RAD
     # Solid angles, and cosines over them, are exact: the albedo of a constant is 1 to the last digit.
     theta, solid = (ends[1:] + ends[:-1]) / 2, -np.diff(np.cos(ends))
     projected = np.diff(np.sin(ends) ** 2) / 2
-    o, k, a, r = (x.ravel() for x in np.meshgrid(square_o, np.arange(ELEVATIONS), phi, turn, indexing="ij"))
-    e, each = theta[k], (2 * np.pi / AZIMUTHS) * (np.pi / VIEWERS / turns)
-    wo = np.sqrt(o) * np.cos(r), np.sqrt(o) * np.sin(r), np.sqrt(1 - o)
-    w = np.sin(e) * np.cos(a + r), np.sin(e) * np.sin(a + r), np.cos(e)
+    o, e, a = np.broadcast_arrays(square_o[:, None, None], theta[:, None], phi)
+    each = (2 * np.pi / AZIMUTHS) * (np.pi / VIEWERS)
+    wo = np.sqrt(o), np.zeros(o.shape), np.sqrt(1 - o)
+    w = np.sin(e) * np.cos(a), np.sin(e) * np.sin(a), np.cos(e)
     if not about_half_vector:
-        return w, wo, projected[k] * each
-    d = w[0] * wo[0] + w[1] * wo[1] + w[2] * wo[2]
-    wi = 2 * d * w[0] - wo[0], 2 * d * w[1] - wo[1], 2 * d * w[2] - wo[2]
-    weight = np.where((d > 0) & (wi[2] > 0), 4 * d * solid[k] * each * np.maximum(wi[2], 0), 0.0)
-    kept = weight > 0
-    x, y, z = (c[kept] for c in wi)
-    return (x, y, z), (wo[0][kept], wo[1][kept], wo[2][kept]), weight[kept]
+        weight = np.broadcast_to(projected[:, None] * each, o.shape)
+        return _flat(w), _flat(wo), weight.ravel()
+    d = w[0] * wo[0] + w[2] * wo[2]
+    wi = 2 * d * w[0] - wo[0], 2 * d * w[1], 2 * d * w[2] - wo[2]
+    kept = (d > 0) & (wi[2] > 0)
+    weight = 4 * d * solid[:, None] * each * wi[2]
+    return _flat(wi, kept), _flat(wo, kept), weight[kept]
+
+
+def _flat(w: Vector, kept: Any = slice(None)) -> Vector:
+    x, y, z = (c[kept].ravel() for c in w)
+    return x, y, z
