@@ -53,7 +53,7 @@ class Beside:
 class Drawing:
     """Fills the picture's place with `views` of textures: of A and, beside a `divider`, of B.
 
-    `images` are further textures, by name; one called "picture A" takes the place of A's view.
+    `images` are further textures by name, arrays or views; one called "picture A" takes the place of A's view.
     """
 
     def __init__(self, device: Any) -> None:
@@ -68,7 +68,7 @@ class Drawing:
         raise NotImplementedError
 
     @property
-    def images(self) -> Mapping[str, Image]:
+    def images(self) -> Mapping[str, Any]:
         return {}
 
     @property

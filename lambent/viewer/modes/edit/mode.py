@@ -97,9 +97,7 @@ class EditMode(Mode):
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
-        outline = textures.get("outline")
-        if outline is not None and state.outlined:
-            imgui.get_background_draw_list().add_image(outline, place.point(0, 0), place.point(1, 1))
+        overlay.over(place, textures.get("outline") if state.outlined else None)
         if state.pointed is not None:
             x, y = imgui.get_mouse_pos()
             shadowed(imgui.get_background_draw_list(), (x + 14, y + 4), state.pointed[1], (1, 1, 1, 1))

@@ -71,6 +71,7 @@ class WalkMode(Mode):
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
+        overlay.over(place, textures.get("outline"))
         marks.draw(state.marks, state.selection.name, place, textures)
         comparison, recorder, filming = state.comparison, state.recordings.recorder, state.films.under_way
         if comparison.mode == "error map" and comparison.figures is not None:
