@@ -1,9 +1,10 @@
 """When to draw the picture, how large, and with which integrator.
 
-A changed material: the objects that have it, at full size over the last picture. In motion: the few-sample integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of
-planar reflectors (which show their probes then) where even half of the width and height takes too long with them.
-`REST_S` after the last change: the same once more, whole and with everything; then every frame adds samples of `qmc`
-to the picture, up to a stated count; then nothing is drawn any more.
+A changed material is drawn over the last picture at full size, on its objects alone. In motion: the few-sample
+integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of planar reflectors (which
+show their probes then) where even half of the width and height takes too long with them. `REST_S` after the last
+change: the same once more, whole and with everything; then every frame adds samples of `qmc` to the picture, up to a
+stated count; then nothing is drawn any more.
 """
 
 from __future__ import annotations
