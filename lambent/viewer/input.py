@@ -80,6 +80,8 @@ class Input:
                 self.edits.undo()
             elif key == "s":
                 self.saved()
+            elif key == "q":
+                self.screen.close_wanted = True
         elif key == "p":
             self.screen.save_wanted = True
         elif key == "h":

@@ -12,6 +12,7 @@ import imgui_bundle
 from imgui_bundle import imgui, implot
 
 from lambent.viewer.mode import Beside, Drawing, Mode, Textures
+from lambent.viewer.panels import closing
 from lambent.viewer.panels.widgets import shadowed
 from lambent.viewer.screen import Rect
 
@@ -95,6 +96,7 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
         _column(mode)
         imgui.end()
     mode.draw_over(textures)
+    closing.draw(mode)
     return dragged or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 

@@ -130,6 +130,17 @@ class Mode:
     def drop(self, path: str) -> None:
         """Take a file that was dropped onto the window."""
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        """What would be lost if the window closed now, in plain words."""
+        return ()
+
+    def save(self) -> None:
+        """Save what is unsaved, and say so on the screen, or why not."""
+
+    def discard(self) -> None:
+        """Closing keeps nothing of what is unsaved."""
+
     def rescue(self) -> None:
         """The window is lost: write unsaved work to files of new names, and say where on stderr."""
 

@@ -128,7 +128,12 @@ def test_close(window):
         window.click(*window.point(header, 0.3))
     window.drag(window.point("mx", 0.5), window.point("mx", 0.8))
     window.wait_for(lambda state: state["edited"])
-    assert window.close() == 0
+    window.tool("key", "ctrl+q")
+    window.wait_for(lambda state: "stay##closing" in state["rects"])
+    window.tool("key", "Escape")
+    window.settle()
+    assert window.process.poll() is None and window.state()["selected"] == "ball", "the question took the key"
+    assert window.close("discard") == 0
     assert "note: brass changed and not saved" in window.log()
 
 

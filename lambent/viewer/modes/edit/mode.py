@@ -27,6 +27,7 @@ SHORTCUTS = (
     ("Tab", "the next material"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
     ("Ctrl+S", "save the session"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show everything but the picture"),
 )
@@ -124,6 +125,13 @@ class EditMode(Mode):
 
     def drop(self, path: str) -> None:
         self.state.files.open(path, self.state.material)
+
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        return ("the session",) if self.state.files.unsaved else ()
+
+    def save(self) -> None:
+        self.state.files.save()
 
     def rescue(self) -> None:
         rescued("the unsaved session", self.state.files.rescue)

@@ -36,6 +36,7 @@ SHORTCUTS = (
     ("Ctrl+click on a slider", "type a number"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
     ("Ctrl+S", "save the material"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show everything but the picture"),
 )
@@ -131,6 +132,13 @@ class MaterialMode(Mode):
     def drop(self, path: str) -> None:
         self.state.editor.files.open(path)
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        return (self.title,) if self.state.editor.subject.unsaved else ()
+
+    def save(self) -> None:
+        self.state.editor.save()
+
     def rescue(self) -> None:
         subject = self.state.editor.subject
         names = [subject.name] if subject.unsaved else []
@@ -138,7 +146,7 @@ class MaterialMode(Mode):
 
     def close(self) -> None:
         self.state.editor.close()
-        if self.state.editor.subject.unsaved:
+        if self.unsaved:
             sys.stderr.write(f"lambent: note: {self.title} was changed and not saved\n")
 
 

@@ -26,6 +26,8 @@ SHORTCUTS = (
     ("V", "save the view"),
     ("R", "record the way, or stop"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
+    ("Ctrl+S", "save the selected material"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
@@ -114,5 +116,8 @@ class WalkInput(Input):
             navigation.jump(state.recordings.cameras[int(key) - 1])
 
     def saved(self) -> None:
-        if self._state.materials.editor is not None:
-            self._state.materials.editor.save()
+        materials, name = self._state.materials, self._state.selection.material
+        if materials.editor is not None:
+            materials.editor.save()
+        elif name is not None:
+            materials.save(name)

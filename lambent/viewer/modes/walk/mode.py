@@ -99,6 +99,19 @@ class WalkMode(Mode):
         if self.state.materials.editor is not None:
             self.state.materials.editor.files.open(path)
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        walk = ("the recorded walk",) if self.state.recordings.unsaved else ()
+        return (*self.state.materials.unsaved, *walk)
+
+    def save(self) -> None:
+        for name in self.state.materials.unsaved:
+            self.state.materials.save(name)
+        self.state.recordings.keep()
+
+    def discard(self) -> None:
+        self.state.recordings.drop()
+
     def rescue(self) -> None:
         rescued("an unsaved material", self.state.materials.rescue)
         rescued("the recorded walk", self.state.recordings.rescue)

@@ -184,6 +184,12 @@ class Recordings:
             self.navigation.scrub(added, 0.0)
             self.screen.say(f"saved the path {added.name}")
 
+    @property
+    def unsaved(self) -> bool:
+        """Whether there is a recording that closing would lose."""
+        recorder = self.recorder
+        return recorder.draft is not None or (recorder.on and recorder.recording.path(DRAFT) is not None)
+
     def keep(self) -> str | None:
         """Save an unsaved recording because the window closes; returns the path's name."""
         if self.recorder.on:
@@ -212,7 +218,8 @@ class Recordings:
         return (f"{file}, a views.json for a store",)
 
     def drop(self) -> None:
-        """Forget the draft."""
+        """Forget the draft, or what is being recorded."""
+        self.recorder.on = False
         path = self.navigation.path
         if path is not None and path.path == self.recorder.draft:
             self.navigation.path = None
