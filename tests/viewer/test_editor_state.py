@@ -293,3 +293,17 @@ def test_work_is_cancelled_through_its_progress():
     work.wait()
     assert work.poll() and ends == []
     assert isinstance(work._error, Cancelled)
+
+
+def test_the_editor_fits_as_the_command_line_does(screen):
+    """One default: what a person gets does not depend on the door."""
+    from inspect import signature
+
+    from lambent.cli.fit import command
+    from lambent.materials.fitting.fit import fit
+
+    made = Editor(MaterialEdits({"m": Material(name="m")}), "m", screen).fit
+    for function in (fit, command):
+        assert signature(function).parameters["distribution"].default == made.distribution
+        assert signature(function).parameters["method"].default == made.method
+    assert str(signature(command).parameters["lobes"].default) == made.lobes

@@ -10,9 +10,10 @@ from typing import get_args
 from imgui_bundle import imgui
 
 from lambent.materials.document import KINDS, Lobe, Material
+from lambent.materials.fitting.choices import DISTRIBUTION_CHOICES
 from lambent.materials.measured.metrics import METRICS
 from lambent.materials.models.model import Parameter
-from lambent.viewer.editor.editor import DISTRIBUTIONS, LOBES, METHODS, Editor
+from lambent.viewer.editor.editor import LOBES, METHODS, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
 from lambent.viewer.editor.subject import REFERENCES
 from lambent.viewer.panels import parameters
@@ -203,7 +204,7 @@ def draw_fit(editor: Editor) -> None:
     fit = editor.fit
     fit.lobes = choice("lobes", fit.lobes, LOBES)
     explain("per side; auto adds lobes as long as they take off a share of the error")
-    fit.distribution = choice("distribution", fit.distribution, DISTRIBUTIONS)
+    fit.distribution = choice("distribution", fit.distribution, DISTRIBUTION_CHOICES)
     explain("distribution of the microfacets; best tries both")
     fit.method = choice("method", fit.method, METHODS)
     explain("gradient: least squares from several starts; grid: the hierarchical search of the thesis")
