@@ -73,6 +73,24 @@ def test_a_drag_selects_nothing(mouse, state):
     assert state.selection.name is None
 
 
+def test_a_key_that_is_released_before_the_frame_takes_a_step(mouse, state):
+    before = state.navigation.camera
+    send(mouse, "key_down", key="w")
+    send(mouse, "key_up", key="w")
+    assert mouse.walking
+    mouse.walk(0.0)
+    stepped = state.navigation.camera
+    assert stepped != before and not mouse.walking
+    mouse.walk(0.2)
+    assert state.navigation.camera == stepped
+    send(mouse, "key_down", key="w")
+    mouse.walk(0.0)
+    assert state.navigation.camera == stepped, "the sleep before a first step is not walked through"
+    send(mouse, "key_up", key="w")
+    mouse.walk(0.1)
+    assert state.navigation.camera != stepped and not mouse.walking
+
+
 def test_walking(mouse, state):
     send(mouse, "key_down", key="w")
     assert mouse.walking

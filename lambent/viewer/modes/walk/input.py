@@ -31,6 +31,7 @@ SHORTCUTS = (
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
+TAP_S = 0.05  # that a key counts for at least
 
 
 class WalkInput(Input):
@@ -40,26 +41,31 @@ class WalkInput(Input):
         super().__init__(state.screen, state.navigation, state.materials.edits)
         self._state, self._geometry, self._walls = state, geometry, Walls(geometry.triangles)
         self.held: set[str] = set()
+        self._tapped: set[str] = set()  # pressed since the last step: a key may be released before a slow frame ends
         self._fast = self._on_divider = self._flew = False
 
     @property
     def walking(self) -> bool:
-        return any(key in cameras.KEYS for key in self.held)
+        return any(key in cameras.KEYS for key in self.held | self._tapped)
 
     def walk(self, dt_s: float) -> None:
         """Let the held keys carry the eye for `dt_s` seconds; whoever has just stopped flying comes down."""
-        navigation = self.navigation
+        navigation, keys, held = self.navigation, self.held | self._tapped, bool(self.held)
+        if not held:
+            dt_s = TAP_S
+        if dt_s > 0:
+            self._tapped.clear()
         camera, bounds, flying = navigation.camera, navigation.bounds, navigation.flying
         height_m, walks = navigation.walker.eye_height_m, navigation.movement == "walk"
         flew, self._flew = self._flew, flying and walks
         if flew and walks and not flying and not navigation.playing:
             floor_y = self._walls.floor_below(camera.position, height_m)
             navigation.move(camera := cameras.standing(camera, bounds, floor_y, height_m))
-        if not self.walking or not walks:
+        if not keys or not walks:
             return
         floor_y = None if flying else self._walls.floor_below(camera.position, height_m)
         moved = cameras.walk(
-            camera, navigation.walker, self.held, dt_s, bounds=bounds, floor_y=floor_y, flying=flying,
+            camera, navigation.walker, keys, dt_s, bounds=bounds, floor_y=floor_y, flying=flying,
             fast=self._fast, allowed=lambda eye, step: self._walls.allowed(eye, step, height_m),
         )  # fmt: skip
         navigation.move(moved)
@@ -96,12 +102,14 @@ class WalkInput(Input):
             self.held.discard(key)
         elif ui_has_keys:
             self.held.clear()
+            self._tapped.clear()
         super().keys(key, event, ui_has_keys)
 
     def pressed_key(self, key: str) -> None:
         state, navigation = self._state, self.navigation
         if key in cameras.KEYS:
             self.held.add(key)
+            self._tapped.add(key)
         elif key == "f":
             navigation.flying = not navigation.flying
         elif key == "o":
