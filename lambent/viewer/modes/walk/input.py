@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-from lambent.core.camera import rays_through
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera, rays_through
+from lambent.core.plain import Triple, triple
 from lambent.viewer import cameras
+from lambent.viewer.framing import framed
 from lambent.viewer.input import CLICK_PX, Input
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.walls import Walls
@@ -15,11 +21,12 @@ from lambent.viewer.picking import Geometry
 SHORTCUTS = (
     ("W A S D, arrows", "walk; with Shift faster"),
     ("E, Space / Q, C", "up / down, while flying"),
-    ("F", "fly, or come down onto the floor"),
-    ("O", "orbit the target, or walk"),
-    ("left drag", "look around; in orbit turn about the target"),
+    ("F", "frame the selected object, and orbit it"),
+    ("O", "orbit, or walk"),
+    ("G", "leave the ground to fly, or come down onto the floor"),
+    ("left drag", "look around; in orbit turn about the selected object, or the target"),
     ("right, middle drag", "shift the view (orbit)"),
-    ("wheel", "nearer to the target, or away (orbit)"),
+    ("wheel", "nearer to what orbit turns about, or away"),
     ("click", "select the object under the mouse"),
     ("Esc", "select nothing"),
     ("1 ... 9", "jump to a camera of the scene, or a saved view"),
@@ -31,6 +38,8 @@ SHORTCUTS = (
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
+LARGE = 0.5  # radius of an object, as a share of its distance, from which orbit turns about where it was clicked
+PIECE_PX = 12.0  # of a drag in orbit, between two looks for walls
 TAP_S = 0.05  # that a key counts for at least
 
 
@@ -93,8 +102,45 @@ class WalkInput(Input):
             return
         camera, place = self.navigation.camera, self.screen.picture
         towards = rays_through(camera, x, y, place.width, place.height)
-        found = self._geometry.pick(camera.position, towards)
-        self._state.selection.choose(found.name if found else None)
+        found, distance_m = self._geometry.hit(camera.position, towards)
+        if found is None:
+            self._state.selection.choose(None)
+            return
+        radius_m = math.dist(*found.bounds) / 2
+        at = triple(np.array(camera.position) + distance_m * towards)
+        self._state.selection.choose(found.name, at if radius_m > LARGE * distance_m else None)
+
+    @property
+    def pivot(self) -> Triple:
+        return self._state.selection.pivot or super().pivot
+
+    def turned(self, dx: float, dy: float) -> Camera:
+        """Who is within the scene stays there, and goes nearer to the pivot where a wall is in the way."""
+        navigation, pivot = self.navigation, self.pivot
+        camera, bounds = navigation.camera, navigation.bounds
+        pieces = math.ceil(math.hypot(dx, dy) / PIECE_PX)
+        for _ in range(pieces):
+            after = cameras.orbit(camera, dx / pieces, dy / pieces, pivot)
+            if cameras.is_within(camera.position, bounds):
+                after = cameras.nearer(after, pivot, self._walls.share(pivot, camera.position, after.position, bounds))
+            camera = after
+        return camera
+
+    def _frame(self) -> None:
+        """Show the selected object as a whole, and orbit it."""
+        navigation, place, found = self.navigation, self.screen.picture, self._state.selection.record
+        if found is None:
+            self.screen.say("nothing to frame: click an object first")
+            return
+        eye, bounds = navigation.camera.position, navigation.bounds
+        around = cameras.is_within(eye, found.bounds)  # such as walls: seen from within
+
+        def free_m(point: Floats, direction: Floats) -> float:
+            out_m = cameras.way_out_m(point, direction, bounds) if cameras.is_within(eye, bounds) else math.inf
+            return min(self._geometry.free_m(point, direction, "" if around else found.name), out_m)
+
+        navigation.move(framed(navigation.camera, found.bounds, place.width / place.height, free_m))
+        navigation.movement, self._state.selection.pointed = "orbit", None
 
     def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
         self._fast = "Shift" in event["modifiers"]
@@ -111,6 +157,8 @@ class WalkInput(Input):
             self.held.add(key)
             self._tapped.add(key)
         elif key == "f":
+            self._frame()
+        elif key == "g":
             navigation.flying = not navigation.flying
         elif key == "o":
             navigation.movement = "walk" if navigation.movement == "orbit" else "orbit"

@@ -31,7 +31,7 @@ class Recording:
     still_s: float = 0.0  # when the last camera was seen last
 
     def take(self, camera: Camera, time_s: float) -> None:
-        """The camera at this moment; each frame is told of, and those that are slow are not taken for standing still."""
+        """The camera at this moment. Each frame is told of, so that a slow one is not taken for standing still."""
         if self.cameras and camera == self.cameras[-1]:
             self.still_s = max(time_s, self.still_s)
             return

@@ -45,7 +45,8 @@ def _objects(selection: Selection) -> None:
     imgui.begin_child("objects", (0, min(len(objects), LISTED) * imgui.get_text_line_height_with_spacing()))
     for index, item in enumerate(objects):
         if imgui.selectable(f"{item.name}##{index}", item.name == selection.name)[0]:
-            selection.name = item.name
+            selection.choose(item.name)
+            selection.reveal = False  # it is in sight
         if item.name == selection.name and selection.reveal:
             imgui.set_scroll_here_y()
             selection.reveal = False
