@@ -34,10 +34,11 @@ class Divider:
 
 @dataclass(frozen=True)
 class Panel:
-    """A section of the column at the right, under a header that folds it."""
+    """A section of the column at the right, under a header that folds it; `meaning` says what it is for."""
 
     title: str
     draw: Callable[[], None]
+    meaning: str
     opened: bool = False  # at the start
 
 

@@ -152,11 +152,11 @@ class Window:
         """Ask before the window closes with unsaved work."""
 
         def pressed(_: object) -> None:
-            glfw.set_window_should_close(self.canvas._window, 0)  # type: ignore[arg-type]
+            glfw.set_window_should_close(self.canvas._window, 0)
             with self._watched():
                 self._want_close()
 
-        glfw.set_window_close_callback(self.canvas._window, pressed)  # type: ignore[arg-type]
+        glfw.set_window_close_callback(self.canvas._window, pressed)
 
     def _want_close(self) -> None:
         self.screen.close_wanted = False

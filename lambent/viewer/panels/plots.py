@@ -92,13 +92,11 @@ def _words(laid: Matrix, kinds: list[str], origin: imgui.ImVec2) -> None:
 
 def _curves(editor: Editor, textures: Textures) -> None:
     plots, shown = editor.plots, editor.shown
-    scale = choice("##axis", plots.scale, SCALES, 110)
+    scale = choice("##axis", plots.scale, SCALES, "scale of the axis of p", 110)
     if plots.scale != scale:
         plots.scale, plots.fit_axes = scale, True
-    explain("scale of the axis of p")
     imgui.same_line()
-    plots.channel = choice("##channel", plots.channel, CHANNELS, 90)
-    explain("mean over the channels, all three, or one")
+    plots.channel = choice("##channel", plots.channel, CHANNELS, "mean over the channels, all three, or one", 90)
     imgui.same_line()
     if not shown.curves:  # before the first frame
         return

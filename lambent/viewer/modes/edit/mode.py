@@ -144,11 +144,16 @@ class EditMode(Mode):
 def columns(state: EditState) -> tuple[Panel, ...]:
     """The column, each panel on the state."""
     return (
-        Panel("Scene", partial(panels.draw_scene, state), opened=True),
-        Panel("Interreflections", partial(draw_interreflections, state.bounced)),
-        Panel("Compare", partial(panels.draw_compare, state), opened=True),
-        Panel("Save", partial(panels.draw_files, state), opened=True),
-        Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),
-        Panel("View", partial(panels.draw_look, state), opened=True),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+        Panel(
+            "Material",
+            partial(panels.draw_material, state, panels.Curves(state)),
+            "the selected material and its curves",
+            opened=True,
+        ),
+        Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
+        Panel("Compare", partial(panels.draw_compare, state), "the picture against an earlier state", opened=True),
+        Panel("Save", partial(panels.draw_files, state), "the session, and the material as a document", opened=True),
+        Panel("Interreflections", partial(draw_interreflections, state.bounced), "light that met other surfaces"),
+        Panel("Scene", partial(panels.draw_scene, state), "the view, its light, and its transport", opened=True),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )

@@ -129,12 +129,32 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     """The column, each panel on the parts of the state that it needs."""
     about = (state.missing, state.scene.warnings)
     return (
-        Panel("Scene", partial(scene.draw, state.navigation, state.recordings, *about), opened=True),
-        Panel("View", partial(view.draw, state), opened=True),
-        Panel("Material", partial(material.draw, state.selection, state.materials), opened=True),
-        Panel("Light meter", partial(metering.draw, state.meter, state.look)),
-        Panel("Compare", partial(compare.draw, state.comparison)),
-        Panel("Film", partial(film.draw, state.films, state.recordings, state.navigation, state.screen)),
-        Panel("Statistics", lambda: statistics.draw(state.screen, state.materials.editor, state.notes)),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+        Panel(
+            "Material",
+            partial(material.draw, state.selection, state.materials),
+            "the objects, and every number of the selected one's material",
+            opened=True,
+        ),
+        Panel("View", partial(view.draw, state), "what the picture shows, and how bright", opened=True),
+        Panel(
+            "Scene",
+            partial(scene.draw, state.navigation, state.recordings, *about),
+            "ways to move, cameras, saved views and walks",
+            opened=True,
+        ),
+        Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
+        Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
+        Panel("Light meter", partial(metering.draw, state.meter, state.look), "luminances of the picture in numbers"),
+        Panel("Compare", partial(compare.draw, state.comparison), "the picture beside another integrator's"),
+        Panel(
+            "Film",
+            partial(film.draw, state.films, state.recordings, state.navigation, state.screen),
+            "a film along the chosen camera path",
+        ),
+        Panel(
+            "Statistics",
+            lambda: statistics.draw(state.screen, state.materials.editor, state.notes),
+            "cost of the last frame, and noise of the light map",
+        ),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )
