@@ -27,6 +27,7 @@ FONT_PX = 15.0
 COLOURS = {
     imgui.Col_.window_bg: (0.11, 0.115, 0.125, 1.0),
     imgui.Col_.popup_bg: (0.14, 0.145, 0.155, 1.0),
+    imgui.Col_.modal_window_dim_bg: (0.0, 0.0, 0.0, 0.45),
     imgui.Col_.frame_bg: (0.20, 0.21, 0.23, 1.0),
     imgui.Col_.frame_bg_hovered: (0.26, 0.28, 0.32, 1.0),
     imgui.Col_.frame_bg_active: (0.30, 0.34, 0.40, 1.0),

@@ -94,7 +94,7 @@ class Window:
         now_s = self.screen.clock()
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
         self.mode.advance(since_last_s if self._moving else 0.0)  # the sleep before a first step is not walked through
-        if self.screen.close_wanted:
+        if self.screen.close_wanted or self.screen.closes:
             self._want_close()
         self.screen.drop_old_messages()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
@@ -160,7 +160,7 @@ class Window:
 
     def _want_close(self) -> None:
         self.screen.close_wanted = False
-        if self.mode.unsaved:
+        if self.mode.unsaved and not self.screen.closes:
             self.screen.asks_to_close = True
             self._extra_frames = SETTLE_FRAMES
             self.canvas.request_draw()

@@ -54,7 +54,7 @@ def test_saving_keeps_all_of_it_and_closes(panels, state, tmp_path):
     record(state)
     ask(panels)
     panels.click("save##closing")
-    assert state.screen.close_wanted and not state.screen.asks_to_close and panels.mode.unsaved == ()
+    assert state.screen.closes and not state.screen.asks_to_close and panels.mode.unsaved == ()
     assert load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
     assert [path.name for path in read_views(tmp_path).paths] == ["walk 1"]
 
@@ -64,11 +64,11 @@ def test_a_file_that_is_there_is_replaced_when_save_is_pressed_again(panels, sta
     change(state)
     ask(panels)
     panels.click("save##closing")
-    assert state.screen.asks_to_close and not state.screen.close_wanted
+    assert state.screen.asks_to_close and not state.screen.closes
     assert "save again" in state.screen.messages[-1].text
     assert (tmp_path / "brass.json").read_text() == "of somebody else"
     panels.click("save##closing")
-    assert state.screen.close_wanted and load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
+    assert state.screen.closes and load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
 
 
 def test_discarding_writes_nothing(panels, state, tmp_path, capsys):
@@ -76,7 +76,7 @@ def test_discarding_writes_nothing(panels, state, tmp_path, capsys):
     record(state)
     ask(panels)
     panels.click("discard##closing")
-    assert state.screen.close_wanted
+    assert state.screen.closes
     panels.mode.close()
     assert list(tmp_path.iterdir()) == [] and "brass changed and not saved" in capsys.readouterr().err
 
@@ -88,7 +88,7 @@ def test_staying_goes_on(panels, state):
         assert panels.popup_open, "the mouse is the question's"
         answer()
         panels.frame(2)
-        assert not (state.screen.asks_to_close or state.screen.close_wanted or panels.popup_open)
+        assert not (state.screen.asks_to_close or state.screen.closes or panels.popup_open)
     assert panels.mode.unsaved == ("brass",)
 
 
@@ -104,7 +104,7 @@ def test_enter_saves(panels, state, tmp_path):
     change(state)
     ask(panels)
     press(panels, "enter")
-    assert state.screen.close_wanted and (tmp_path / "brass.json").exists()
+    assert state.screen.closes and (tmp_path / "brass.json").exists()
 
 
 def test_it_fits_a_small_window(monkeypatch, state, geometry):

@@ -31,13 +31,13 @@ def draw(mode: Mode) -> None:
 
     def discard() -> None:
         mode.discard()
-        screen.close_wanted = True
+        screen.closes = True
         stay()
 
     def save() -> None:
         mode.save()
         if not mode.unsaved:
-            screen.close_wanted = True
+            screen.closes = True
             stay()
 
     wrapped([f"not saved: {', '.join(mode.unsaved)}"])

@@ -16,6 +16,7 @@ from lambent.core.plain import Triple, triple
 
 Colour = tuple[float, float, float, float]
 Word = TypeVar("Word", bound=str)
+THREE_PX = 150.0  # of three sliders that have room for three digits
 AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
@@ -69,7 +70,8 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     imgui.push_id(label)
     swatch_px = imgui.get_frame_height()
     imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
-    changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, "%.3f", imgui.SliderFlags_.always_clamp)
+    digits = "%.3f" if imgui.calc_item_width() > THREE_PX else "%.2f"
+    changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, digits, imgui.SliderFlags_.always_clamp)
     explain(meaning)
     value = triple(moved) if changed else value
     scale = max(1.0, *value)
@@ -109,8 +111,8 @@ def typed_field(label: str, typed: dict[str, str], button: str, hint: str, meani
 
 
 def explain(text: str) -> None:
-    """Help that appears while the mouse rests on the control before."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+    """Help that appears while the mouse rests on the control before; not in a drag, where it would cover the next."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():
         imgui.set_tooltip(text)
 
 
