@@ -137,7 +137,10 @@ class WindowSession:
         if answer is not None:
             self.wait_for(lambda state: f"{answer}##closing" in state["rects"])
             self.settle()
-            self.click(*self.point(f"{answer}##closing"))
+            self.move(*self.point(f"{answer}##closing"))
+            self.tool("mousedown", 1)
+            self.settle()
+            self.tool("mouseup", 1)
         return self.process.wait(PATIENCE_S)
 
     def kill(self):

@@ -22,6 +22,9 @@ from lambent.viewer.panels.widgets import (
     wrapped,
 )
 
+HISTORY = ("undo", "redo")
+LEAST_CHOICE_PX = 80.0
+
 
 def draw_scene(state: EditState) -> None:
     """The view, its light, and how far its transport is."""
@@ -46,6 +49,10 @@ def draw_scene(state: EditState) -> None:
     )
     if text is not None:
         state.files.open(text, state.material)
+    meaning = "lets the material begin as something else; a file can be dropped onto the window, too"
+    text = typed_field("become", state.files.typed, "open", "a material document or a table...", meaning)
+    if text is not None:
+        state.files.open(text, state.material)
 
 
 def draw_material(state: EditState, curves: Curves) -> None:
@@ -55,22 +62,23 @@ def draw_material(state: EditState, curves: Curves) -> None:
         return
     if state.material not in names:
         state.material = names[0]
-    chosen = choice("material", state.material, names, "the material whose curves are pulled (Tab takes the next)")
+    meaning = "the material whose curves are pulled (Tab takes the next)"
+    room = imgui.get_content_region_avail().x - sum(imgui.calc_text_size(word).x for word in ("material", *HISTORY))
+    room -= 2 * imgui.get_style().item_spacing.x + 6 * imgui.get_style().frame_padding.x
+    chosen = choice("material", state.material, names, meaning, max(room, LEAST_CHOICE_PX))
     if chosen != state.material:
         state.select(chosen)
+    if room >= LEAST_CHOICE_PX:
+        imgui.same_line()
+    history, session = state.session.history, state.session
+    buttons([
+        (HISTORY[0], history.can_undo, session.undo, "takes back the last step (Ctrl+Z)"),
+        (HISTORY[1], history.can_redo, session.redo, "does the step again (Ctrl+Shift+Z)"),
+    ])  # fmt: skip
     fixed = state.session.original(chosen).fixed
     if fixed:
         coloured(f"stays as it is: {', '.join(fixed)}", DIM)
-    history, session = state.session.history, state.session
-    buttons([
-        ("undo", history.can_undo, session.undo, "takes back the last step (Ctrl+Z)"),
-        ("redo", history.can_redo, session.redo, "does the step again (Ctrl+Shift+Z)"),
-    ])  # fmt: skip
     curves.draw(chosen)
-    meaning = "lets the material begin as something else; a file can be dropped onto the window, too"
-    text = typed_field("become", state.files.typed, "open", "a material document or a table...", meaning)
-    if text is not None:
-        state.files.open(text, state.material)
 
 
 def draw_compare(state: EditState) -> None:

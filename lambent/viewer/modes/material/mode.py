@@ -165,6 +165,7 @@ def panels(state: MaterialState) -> tuple[Panel, ...]:
 
 def draw_preview(preview: Preview, editor: Editor, look: Look) -> None:
     """The shape, its light, and the exposure."""
+    looks.draw_exposure(look, "##preview")
     preview.shape = choice("shape", preview.shape, tuple(SHAPES), "what wears the material")
     meaning = "the environment around it; every one is scaled to the same mean radiance"
     preview.environment = choice("light", preview.environment, preview.environments, meaning)
@@ -172,6 +173,5 @@ def draw_preview(preview: Preview, editor: Editor, look: Look) -> None:
     text = typed_field("environment", editor.files.typed, "add", hint, "adds an environment to the list, and shows it")
     if text is not None:
         editor.files.open(text)
-    looks.draw_exposure(look, "##preview")
     meaning = "shows the plots of the material and of its measurement"
     editor.plots.visible = check("disks and curves beside the picture", editor.plots.visible, meaning)
