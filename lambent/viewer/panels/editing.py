@@ -186,12 +186,13 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     imgui.text_unformatted(f"lobe {index + 1}")
     imgui.same_line()
     meaning = "where the lobe points: to the mirror image, through the surface, or back to the light"
-    turned = choice("##kind", lobe.kind, KINDS, meaning, 112)
+    room = imgui.get_content_region_avail().x
+    turned = choice("##kind", lobe.kind, KINDS, meaning, min(112, 0.37 * room))
     if turned != lobe.kind:
         editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
     meaning = "distribution of the microfacets: beckmann falls off as a bell, ggx has long tails"
-    kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, 96)
+    kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(96, 0.3 * room))
     imgui.same_line()
     if press("remove", "takes the lobe away; this can be undone", -1):
         editor.queue(lambda: subject.remove_lobe(index))
