@@ -144,7 +144,11 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
         ),
         Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
         Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
-        Panel("Light meter", partial(metering.draw, state.meter, state.look), "luminances of the picture in numbers"),
+        Panel(
+            "Light meter",
+            partial(metering.draw, state.meter, state.look, state.navigation),
+            "luminances of the picture in numbers, and glare",
+        ),
         Panel("Compare", partial(compare.draw, state.comparison), "the picture beside another integrator's"),
         Panel(
             "Film",

@@ -17,6 +17,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
+from lambent.viewer.modes.walk.glare import GlareDrawing
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.state import WalkState
@@ -39,6 +40,8 @@ class Pictures(Pair):
         self._film_renderer: Renderer | None = None
         self._outlining = Outlining(renderer)
         self._read_version, self._read_s = -1, -1e9
+        self._glare = GlareDrawing(state.meter.glare)
+        self._glare_renderer: Renderer | None = None
 
     @property
     def images(self) -> Mapping[str, Any]:
@@ -68,13 +71,16 @@ class Pictures(Pair):
         look, size = state.look, (max(1, place.width), max(1, place.height))
         state.marks.update(state.navigation.camera, size, look.display_transform, look.exposure_ev)
         self._meter()
+        if self._glare.busy:
+            self._glare_renderer = self._glare_renderer or self._another_renderer()
+            self._glare.step(self._glare_renderer, wanted)
 
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
         return state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
 
     def wait_s(self) -> float | None:
-        if self._state.films.under_way is not None:
+        if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
         return least(super().wait_s(), 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
 
