@@ -27,8 +27,21 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
             result.update(f"{one.dtype} {one.shape}".encode())
             result.update(np.ascontiguousarray(one).tobytes())
         else:
-            result.update(json.dumps(one, sort_keys=True, default=str).encode())
+            result.update(json.dumps(one, sort_keys=True, default=_nested).encode())
     return result.hexdigest()
+
+
+def _nested(value: object) -> object:
+    """What JSON takes of an input within another; an array's text would leave out its middle."""
+    if isinstance(value, np.ndarray):
+        return key_of("array", 1, value)
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, frozenset | set):
+        return sorted(map(str, value))  # their order changes from process to process
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"no key of {type(value).__name__}: it has no text that is the same in every process")
 
 
 def geometry_inputs(scene: Scene) -> list[object]:

@@ -71,6 +71,9 @@ class FrameState:
         Share, in the display image of a progressive series, of the last frame of few samples that was displayed.
     antialias : bool
         Edges of the display image are blended, or, when accumulating, frames are jittered.
+    over : bool
+        Draw over the last displayed frame of few samples, and draw only the objects whose materials have changed since.
+        Where anything else but the size or planar reflections has changed, the frame is drawn whole.
     jitter_px : tuple of float
         Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
     """
@@ -92,6 +95,7 @@ class FrameState:
     accumulate: int | None = None
     prior: float = 0.0
     antialias: bool = True
+    over: bool = False
     jitter_px: tuple[float, float] = (0.0, 0.0)
 
     def check(self) -> None:

@@ -29,7 +29,9 @@ from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
+from lambent.realtime.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
+from lambent.realtime.passes.base import BasePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
@@ -66,16 +68,17 @@ class Renderer:
         self._clusters: Clusters = (
             beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
         )
-        depth = DepthPass(layouts)
+        depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
         display = TonemapPass(layouts), SmoothPass(layouts)
-        self._passes: tuple[Pass, ...] = (depth, planar, light, AccumulatePass(layouts), *display)
+        self._passes: tuple[Pass, ...] = (depth, planar, base, light, AccumulatePass(layouts), *display)
         self._targets, self._timer = Targets(device), PassTimer(device)
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, self.resources.sampler)
         self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
         self._few: Any = None  # radiance of the last displayed frame of few samples
+        self._few_state: FrameState | None = None
         self._counts: dict[str, Any] = {}
         self._gpu_ms: dict[str, float] | None = None  # of a frame in slices
         self._frames = 0  # that were begun
@@ -123,6 +126,20 @@ class Renderer:
             started = time.perf_counter()
         self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
         return context.radiance
+
+    def outline(self) -> Outline:
+        """What draws outlines of the scene's objects."""
+        return Outline(self._layouts, self.resources, self._clusters)
+
+    def redrawn(self, state: FrameState) -> frozenset[str] | None:
+        """Materials whose objects alone a frame would draw with `FrameState.over`; None where it is drawn whole."""
+        before = self._few_state
+        if before is None or replace(state, **_redrawable(before)) != replace(before, over=state.over):
+            return None
+        given = self.scene.record.materials
+        return frozenset(
+            name for name in given if state.materials.get(name, given[name]) != before.materials.get(name, given[name])
+        )
 
     def finish(self) -> None:
         """Return when the GPU is done with all frames."""
@@ -183,7 +200,7 @@ class Renderer:
         for one in self._passes:
             yield from one.encode(context)
         if context.is_passing:
-            self._few = context.radiance
+            self._few, self._few_state = context.radiance, context.state
         self._counts = {
             "integrator": context.state.integrator,
             "width": context.state.width,
@@ -210,6 +227,8 @@ class Renderer:
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few
+        if passing and state.over:
+            context.base, context.redrawn = self._few, self.redrawn(state)
         return context
 
     def _planar_views(self, state: FrameState, data: Record) -> list[PlanarView]:
@@ -230,6 +249,11 @@ def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:
     places = hammersley(count)
     for x, y in (places - places.mean(axis=0)).tolist():
         yield replace(state, accumulate=None, antialias=False, jitter_px=(x, y))
+
+
+def _redrawable(state: FrameState) -> dict[str, Any]:
+    """The fields in which a frame may differ from one that it is drawn over."""
+    return {name: getattr(state, name) for name in ("materials", "planar", "width", "height")}
 
 
 def _mean(images: Iterable[Floats]) -> Floats:

@@ -16,9 +16,9 @@ from lambent.core.errors import UserError, did_you_mean
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
 from lambent.core.progress import Progress, silent, tracked
-from lambent.core.projections import Projection, View
+from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
-from lambent.render.projected import Projected, faces_settings
+from lambent.render.projected import Projected, faces_settings, view_of
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.store import Store
@@ -90,9 +90,7 @@ def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = si
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
-        of = drawn.settings
-        seen = View.of(view, of.projection, of.width, of.height, of.field_deg).radiance_options()
-        write_image(file, drawn.radiance(view, progress), seen)
+        write_image(file, drawn.radiance(view, progress), view_of(drawn.settings, view).radiance_options())
 
 
 def drawn_view(

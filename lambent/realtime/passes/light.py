@@ -106,12 +106,18 @@ class LightPass:
         light = resources.noise_group if context.state.show == LIGHT_MAP_NOISE else resources.light_group
         masked = resources.masked if context.blends_masks else set()
         fringes = [draw for draw in context.draws if draw.item.record.name in masked]
+        draws, is_whole = context.draws, context.redrawn is None
+        if context.redrawn is not None:
+            draws = [draw for draw in draws if draw.item.record.material in context.redrawn]
         for band in context.slicing.bands("shade", context.state.size):
-            render = context.begin("shade", [context.target.radiance.create_view()], band.load_op, band=band)
+            render = context.begin(
+                "shade", [context.target.radiance.create_view()], band.load_op if is_whole else "load", band=band
+            )
             seen = context.seen(band.shares)
-            self._shade.draw(render, context, context.draws, seen, (format,), light)
-            self._draw_sky(render, context, format)
-            self._fringe.draw(render, context, fringes, seen, (format,), light)
+            self._shade.draw(render, context, draws, seen, (format,), light)
+            if is_whole:  # sky and fringes are there already, and fringes cannot be laid over themselves
+                self._draw_sky(render, context, format)
+                self._fringe.draw(render, context, fringes, seen, (format,), light)
             render.end()
             yield
         context.radiance = context.target.radiance

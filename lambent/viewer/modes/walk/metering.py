@@ -10,6 +10,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.false_colour import Range, fitting_range
 from lambent.core.photometry import LM_PER_W, LUMINANCE, Quantity, photometric
+from lambent.viewer.modes.walk.glare import GlareMeter
 
 KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
 PIXELS = 60_000  # that a reading looks at, evenly spread
@@ -70,3 +71,4 @@ class Meter:
     cursor: tuple[float, float] | None = None  # of the mouse, as shares of the picture
     readout_on: bool = False  # false colour shows it always
     under_cursor: tuple[float, float, float] | None = None  # radiance there
+    glare: GlareMeter = field(default_factory=GlareMeter)
