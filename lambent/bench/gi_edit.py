@@ -225,7 +225,7 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
             "samples_per_second": round(rate), "thesis_samples": case.published,
             "thesis_seconds": round(case.published * points / rate), "stored_mib": round(_stored(room.store) / MIB, 1),
             "memory_mib": round(held_bytes(light) / MIB, 1),
-            "share_not_zero": round(sum(len(term.codes) for _, term in terms) / max(1, room_for), 4),
+            "share_not_zero": round(sum(len(term.values) for _, term in terms) / max(1, room_for), 4),
             **_times(room, light, effort), **_errors(small, room, effort),
         }  # fmt: skip
 
