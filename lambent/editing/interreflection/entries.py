@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Indices
+from lambent.editing.products import unit_of
 
 Entries = tuple[NDArray[np.integer], NDArray[np.unsignedinteger[Any]], NDArray[np.uint32]]
 """Of each of a tile's points, how many; their numbers, rising within a point; their values."""
@@ -41,6 +42,8 @@ class TermLight:
         Bands of each of the term's curves, powers of two; empty where it has none.
     met : (T,) int64
         Numbers of the tails that have an entry, rising.
+    largest : float
+        Sum of all entries of a point in one channel, the largest of all points.
     """
 
     ends: NDArray[np.int64]
@@ -49,6 +52,7 @@ class TermLight:
     units: NDArray[np.float32]
     counts: tuple[int, ...]
     met: Indices
+    largest: float
 
     @property
     def bands(self) -> int:
@@ -74,16 +78,24 @@ class TermLight:
         made, met = [], [np.zeros(0, int)]
         for tile in tiles:
             dtype = dtype or (_narrowest(tile) if len(tile[1]) else None)
-            made.append(_stepped(tile, dtype or np.uint8))
-            met.append(np.flatnonzero(np.bincount(tile[1] // bands)))
+            made.append(_stepped(tile, dtype or np.uint8))  # which joins with any
+            met.append(_tails(tile[1], bands))
         room, steps, values = (np.concatenate(parts) for parts in zip(*made, strict=True))
-        return cls(_ends(room), steps.astype(dtype, copy=False), values, units, counts, np.unique(np.concatenate(met)))
+        ends = _ends(room)
+        largest = float(_largest(ends, values, units))
+        return cls(ends, steps, values, units, counts, np.unique(np.concatenate(met)), largest)
 
 
 def _narrowest(tile: Entries) -> type[np.unsignedinteger[Any]]:
     """What its steps take the fewest bytes in."""
     room = {of: _room(_ends(tile[0]), tile[1], np.iinfo(of).max).sum() for of in WIDTHS}
     return min(WIDTHS, key=lambda of: room[of] * (of().nbytes + BYTES))
+
+
+def _tails(codes: NDArray[np.unsignedinteger[Any]], bands: int) -> Indices:
+    met = np.zeros(int(codes.max(initial=0)) // bands + 1, bool)
+    _mark(met, codes, bands)
+    return np.flatnonzero(met)
 
 
 def _stepped(tile: Entries, dtype: type[np.unsignedinteger[Any]]) -> Entries:
@@ -127,3 +139,23 @@ def _step(ends, codes, values, begins, steps, out, most):  # type: ignore[no-unt
                 at += 1
             steps[at], out[at] = step, values[n]
             at += 1
+
+
+@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+def _largest(ends, values, units):  # type: ignore[no-untyped-def]
+    largest = np.float32(0)
+    for p in numba.prange(len(units)):
+        red, green, blue = np.float32(0), np.float32(0), np.float32(0)
+        for n in range(ends[p], ends[p + 1]):
+            unit = unit_of(values[n])
+            red += unit * np.float32(values[n] & 511)
+            green += unit * np.float32(values[n] >> 9 & 511)
+            blue += unit * np.float32(values[n] >> 18 & 511)
+        largest = max(largest, units[p] * max(red, green, blue))
+    return largest
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
+def _mark(met, codes, bands):  # type: ignore[no-untyped-def]
+    for n in numba.prange(len(codes)):
+        met[codes[n] // bands] = True

@@ -13,10 +13,13 @@ from lambent.core.wavelets import TAPS
 from lambent.editing.folding import TOGETHER, write_wavelets
 from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.powers import Powers
-from lambent.editing.products import Halves, Pixels, half_of_float, unit_of
+from lambent.editing.packed_light import add_weighted_light
+from lambent.editing.products import Halves, Pixels, half_of_float
 from lambent.editing.rows import LARGEST
 
 AT_ONCE = 32 * TOGETHER  # points that a thread takes with the same sums
+
+APART = 4  # sums that entries take turns at: one need not wait for the one before
 
 
 @dataclass(frozen=True)
@@ -72,13 +75,10 @@ def rows(light: TermLight, band: Floats, tail: Floats, cells: Cells, row: Indice
         Row of each band: its band of the curve that is edited. `band` has the coefficients of the other curve.
     """
     out = np.zeros((len(cells), count, 3, len(light.units)), np.uint16)
-    entries, tables = _entries(light), _tables(band, tail, cells)
     # No sum is larger than that of all entries of a point.
-    unit = unit_for(float(_largest(*entries, light.units, *tables)))
-    _rows(
-        out, *entries, (light.units / np.float32(unit)).astype(np.float32), *tables, np.asarray(row, np.int64),
-        TAPS.astype(np.float32),
-    )  # fmt: skip
+    unit = unit_for(light.largest * float(np.abs(band).max() * np.abs(tail).max()))
+    units = (light.units / np.float32(unit)).astype(np.float32)
+    _rows(out, *_entries(light), units, *_tables(band, tail, cells), np.asarray(row, np.int64), TAPS.astype(np.float32))
     return out.view(np.float16), unit
 
 
@@ -102,79 +102,56 @@ def _entries(light: TermLight) -> tuple[NDArray[np.int64], NDArray[np.unsignedin
 def _tables(
     band: Floats, tail: Floats, cells: Cells
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    return np.ascontiguousarray(band, np.float32), np.ascontiguousarray(tail, np.float32), cells.number
+    band, tail = (np.pad(np.asarray(table, np.float32), ((0, 0), (0, 1))) for table in (band, tail))
+    return band, tail, cells.number
 
 
 @numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _pixels(out, ends, steps, values, bits_of_bands, units, band, tail, cell, factor):  # type: ignore[no-untyped-def]
     cells, _, points = out.shape
-    mask, moving = (1 << bits_of_bands) - 1, 0 if factor.shape[1] == 1 else 1
+    row, moving = np.arange(len(band)) % APART, 0 if factor.shape[1] == 1 else 1
     for part in numba.prange((points + AT_ONCE - 1) // AT_ONCE):
-        sums = np.zeros((cells, 3, TOGETHER), np.float32)
+        sums, met = np.zeros((cells, APART, TOGETHER, 4), np.float32), np.zeros(cells, np.bool_)
         for first in range(part * AT_ONCE, min((part + 1) * AT_ONCE, points), TOGETHER):
             many = min(TOGETHER, points - first)
-            for i in range(many):
-                p, code = first + i, np.int64(0)
-                for n in range(ends[p], ends[p + 1]):
-                    code += np.int64(steps[n])
-                    z, j = code >> bits_of_bands, code & mask
-                    bits, at = values[n], sums[cell[z]]
-                    unit = units[p] * unit_of(bits)
-                    at[0, i] += unit * np.float32(bits & 511) * band[j, 0] * tail[z, 0]
-                    at[1, i] += unit * np.float32(bits >> 9 & 511) * band[j, 1] * tail[z, 1]
-                    at[2, i] += unit * np.float32(bits >> 18 & 511) * band[j, 2] * tail[z, 2]
+            _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band, tail, cell, row)
             for c in range(cells):
                 for k in range(3):
                     for i in range(many):
-                        out[c, k, first + i] += factor[k, moving * (first + i)] * sums[c, k, i]
+                        out[c, k, first + i] += factor[k, moving * (first + i)] * sums[c, :, i, k].sum()
             sums[:] = 0
-
-
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
-def _largest(ends, steps, values, bits_of_bands, units, band, tail, cell):  # type: ignore[no-untyped-def]
-    """Sum of all entries of a point in one channel, the largest of all points."""
-    mask, largest = (1 << bits_of_bands) - 1, np.float32(0)
-    for p in numba.prange(len(units)):
-        code, red, green, blue = np.int64(0), np.float32(0), np.float32(0), np.float32(0)
-        for n in range(ends[p], ends[p + 1]):
-            code += np.int64(steps[n])
-            z, j = code >> bits_of_bands, code & mask
-            bits = values[n]
-            unit = unit_of(bits)
-            red += unit * np.float32(bits & 511) * abs(band[j, 0] * tail[z, 0])
-            green += unit * np.float32(bits >> 9 & 511) * abs(band[j, 1] * tail[z, 1])
-            blue += unit * np.float32(bits >> 18 & 511) * abs(band[j, 2] * tail[z, 2])
-        largest = max(largest, units[p] * max(red, green, blue))
-    return largest
 
 
 @numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _rows(out, ends, steps, values, bits_of_bands, units, band, tail, cell, row, taps):  # type: ignore[no-untyped-def]
     cells, count, _, points = out.shape
-    mask = (1 << bits_of_bands) - 1
     for part in numba.prange((points + AT_ONCE - 1) // AT_ONCE):
-        sums = np.zeros((cells, count, TOGETHER, 4), np.float32)
+        sums, met = np.zeros((cells, count, TOGETHER, 4), np.float32), np.zeros(cells, np.bool_)
         before = np.empty((count, TOGETHER, 4), np.float32)
-        met = np.zeros(cells, np.bool_)
         for first in range(part * AT_ONCE, min((part + 1) * AT_ONCE, points), TOGETHER):
-            for i in range(min(TOGETHER, points - first)):
-                p, code = first + i, np.int64(0)
-                for n in range(ends[p], ends[p + 1]):
-                    code += np.int64(steps[n])
-                    z, j = code >> bits_of_bands, code & mask
-                    bits = values[n]
-                    unit = units[p] * unit_of(bits)
-                    c = cell[z]
-                    met[c] = True
-                    at = sums[c, row[j], i]
-                    at[0] += unit * np.float32(bits & 511) * band[j, 0] * tail[z, 0]
-                    at[1] += unit * np.float32(bits >> 9 & 511) * band[j, 1] * tail[z, 1]
-                    at[2] += unit * np.float32(bits >> 18 & 511) * band[j, 2] * tail[z, 2]
+            many = min(TOGETHER, points - first)
+            _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band, tail, cell, row)
             for c in range(cells):
                 if met[c]:  # what is not written costs no memory either
                     write_wavelets(out[c], first, sums[c], before, taps)
                     sums[c] = 0
                     met[c] = False
+
+
+@numba.njit(fastmath=True, cache=True, nogil=True)
+def _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band, tail, cell, row):  # type: ignore[no-untyped-def]
+    """sums (C, J, TOGETHER, 4) += light of `many` points from `first` on; `met` are the cells that have any."""
+    mask, count = (1 << bits_of_bands) - 1, sums.shape[1]
+    for i in range(many):
+        code, unit = np.int64(0), units[first + i]
+        for n in range(ends[first + i], ends[first + i + 1]):
+            code += np.int64(steps[n])
+            z, j = code >> bits_of_bands, code & mask
+            c = cell[z]
+            met[c] = True
+            add_weighted_light(  # type: ignore[call-arg]
+                sums, ((c * count + row[j]) * TOGETHER + i) * 4, band, j * 4, tail, z * 4, unit, values[n]
+            )
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
