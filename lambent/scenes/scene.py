@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ Array = NDArray[np.floating]
 UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
+SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
+LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
+Ground = Literal["diffuse", "black"]
 
 
 @dataclass(frozen=True)
@@ -97,13 +101,19 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SunSky:
-    """Clear daylight by Mitsuba's `sunsky` (Hosek-Wilkie), up is +y, over a diffuse ground of the same `albedo`."""
+    """Clear daylight, up is +y, over a `ground` that is diffuse, of the sky's `albedo` and lit by it, or black.
+
+    Colours and distribution are those of Mitsuba's `sunsky` (Hosek-Wilkie), illuminances those of `scenes.clear_sky`
+    times `sun_scale` and `sky_scale`. The sun gives the same light whatever its radius.
+    """
 
     sun_direction: Triple  # unit, towards the sun
     turbidity: float = 3.0
     albedo: float = 0.3
     sun_scale: float = 1.0
     sky_scale: float = 1.0
+    sun_radius_deg: float = SUN_RADIUS_DEG
+    ground: Ground = "diffuse"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,17 @@ from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple, triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
-from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
+from lambent.scenes.scene import (
+    LEAST_SUN_DEG,
+    MOST_SUN_DEG,
+    SUN_RADIUS_DEG,
+    ComputedEnvironment,
+    ConstantEnvironment,
+    DirectionalLight,
+    Ground,
+    PointLight,
+    SunSky,
+)
 
 FORMAT = "lambent-scene"
 
@@ -53,6 +63,8 @@ class SunSkySection(Section):
     albedo: Annotated[float, Field(ge=0, le=1)] = 0.3
     sun_scale: NotNegative = 1.0
     sky_scale: NotNegative = 1.0
+    sun_radius_deg: Annotated[float, Field(ge=LEAST_SUN_DEG, le=MOST_SUN_DEG)] = SUN_RADIUS_DEG
+    ground: Ground = "diffuse"
 
     @field_validator("sun_direction")
     @classmethod
@@ -62,7 +74,7 @@ class SunSkySection(Section):
         return _not_zero(vector)
 
     def environment(self) -> SunSky:
-        return SunSky(_unit(self.sun_direction), self.turbidity, self.albedo, self.sun_scale, self.sky_scale)
+        return SunSky(**{**self.model_dump(exclude={"kind"}), "sun_direction": _unit(self.sun_direction)})
 
 
 class ImageSection(Section):
