@@ -13,7 +13,7 @@ disc keeps its power. Interpolation between pixels widens it from .53 to about .
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -29,7 +29,6 @@ from lambent.core.colour import luminance
 from lambent.core.directions import normalize
 from lambent.core.latlong import lat_long_direction
 from lambent.core.photometry import radiometric
-from lambent.core.plain import triple
 from lambent.scenes.clear_sky import sky_illuminance, sun_illuminance
 from lambent.scenes.scene import SunSky
 
@@ -38,7 +37,7 @@ LIMB_DARKENING = 0.6  # of the sun's edge against its middle, at 550 nm
 DIRECTIONS = 1 << 14
 SUPERSAMPLES = 16  # per pixel and axis, near the sun
 PIXELS_AT_ONCE = 1 << 12
-LOWEST_SINE = 0.005  # of the height at which the sun's colour is taken at the least
+LOWEST_SINE = 0.005  # of the sun's height: Mitsuba's sky is black where it is on the horizon
 
 
 @dataclass(frozen=True)
@@ -65,9 +64,8 @@ class SunDisc:
 def sun_disc(sky: SunSky) -> SunDisc:
     """The sun of daylight: the colour of Mitsuba's model, and the illuminance of `scenes.clear_sky`."""
     direction = normalize(np.asarray(sky.sun_direction, float))
-    raised = normalize(np.maximum(direction, (-np.inf, LOWEST_SINE, -np.inf)))  # rounding may put it below
-    there = replace(sky, sun_direction=triple(raised))
-    colour = (_model(there, raised[None], sun=True) - _model(there, raised[None], sun=False))[0].astype(float)
+    there = _raised(direction)[None]
+    colour = np.maximum(_model(sky, there, sun=True) - _model(sky, there, sun=False), 0)[0].astype(float)
     height_deg = float(np.degrees(np.arcsin(np.clip(direction[1], 0, 1))))
     wanted = sky.sun_scale * radiometric(np.array(sun_illuminance(height_deg, sky.turbidity)))
     irradiance = colour * (wanted / luminance(colour)) if wanted > 0 and colour.any() else np.zeros(3)
@@ -92,12 +90,17 @@ def _sky_scale(sky: SunSky) -> float:
     return float(wanted / has)
 
 
+def _raised(sun_direction: Floats) -> Floats:
+    """A direction to the sun for which Mitsuba's model is not black."""
+    return normalize(np.maximum(sun_direction, (-np.inf, LOWEST_SINE, -np.inf)))
+
+
 def _model(sky: SunSky, w: Floats, *, sun: bool) -> NDArray[np.float32]:
     """Mitsuba's `sunsky` (n, 3), W/(sr m^2 nm), from world directions; its up is z, turned by -90 degrees about x."""
     description = {
         "type": "sunsky",
         "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90),
-        "sun_direction": list(sky.sun_direction),
+        "sun_direction": _raised(np.asarray(sky.sun_direction, float)).tolist(),
         "sun_scale": float(sun),
         **{name: getattr(sky, name) for name in ("turbidity", "albedo")},
     }
