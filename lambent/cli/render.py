@@ -20,6 +20,7 @@ SHOWN_BY = (
     "edit",
     "surfaces",
     "exposure",
+    "ev100",
     "view",
     "false_range",
     "linear",
@@ -44,7 +45,12 @@ def command(
         str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
     ] = "rings",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
-    exposure: Annotated[float | None, typer.Option(help="In EV. [default: the scene's]")] = None,
+    exposure: Annotated[
+        float | None, typer.Option(help="In EV: stops on radiance. [default: the scene's, else metered]")
+    ] = None,
+    ev100: Annotated[
+        float | None, typer.Option("--ev100", help="The same as EV100, 15 in the sun, 8 in a room by night.")
+    ] = None,
     view: Annotated[
         str, typer.Option(help="How PNG and MP4 show light: filmic, neutral, linear, or false-colour (cd/m2).")
     ] = "filmic",
@@ -85,10 +91,15 @@ def command(
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
+    from lambent.core.exposure import exposure_of
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
 
+    if ev100 is not None:
+        if exposure is not None:
+            raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
+        exposure = exposure_of(ev100)
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar
@@ -120,7 +131,9 @@ def command(
         else:
             done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
     size = f"{done.width}x{done.height}"
-    show(asdict(done), f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {done.seconds:.1f} s", json)
+    exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
+    text = f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {exposed}{done.seconds:.1f} s"
+    show(asdict(done), text, json)
 
 
 def parse_range(text: str, *, log: bool) -> Range:

@@ -169,7 +169,7 @@ class Flow:
     def walk(self) -> None:
         """Stills along the walk and the film of it, from the frame code of the window."""
         effort, renderer = self.effort, self._renderer
-        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev
+        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev or 0.0
 
         def cameras(count: int) -> list[Camera]:
             return [camera_at(path, k / (count - 1) * path.seconds) for k in range(count)]

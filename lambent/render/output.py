@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.exposure import ev100_of
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
 from lambent.core.progress import Progress, silent, tracked
@@ -28,7 +29,10 @@ DEFAULT = Settings()
 
 @dataclass(frozen=True)
 class Rendered:
-    """The written file, its size in pixels, its frames, and the time that it took."""
+    """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
+
+    `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours.
+    """
 
     file: Path
     width: int
@@ -36,6 +40,8 @@ class Rendered:
     integrator: str
     frames: int
     seconds: float
+    exposure_ev: float | None = None
+    ev100: float | None = None
 
 
 def ignore(text: str) -> None:
@@ -78,8 +84,18 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = _opened(store)
     view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
-    write_still(images(opened, settings, scene=scene, note=note), file, view, progress)
-    return Rendered(file, settings.width, settings.height, settings.integrator, 1, time.perf_counter() - began)
+    drawn = images(opened, settings, scene=scene, note=note)
+    write_still(drawn, file, view, progress)
+    seconds = time.perf_counter() - began
+    return Rendered(file, settings.width, settings.height, settings.integrator, 1, seconds, *exposure_in(file, drawn))
+
+
+def exposure_in(file: Path, drawn: Images) -> tuple[float | None, float | None]:
+    """The exposure of what was displayed in a file, in stops and as EV100."""
+    displayed = file.suffix.lower() in (".png", FILM) and not drawn.settings.is_false_coloured
+    if not displayed or drawn.exposure_ev is None:
+        return None, None
+    return drawn.exposure_ev, ev100_of(drawn.exposure_ev)
 
 
 def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:
@@ -126,7 +142,8 @@ def film(
     cameras = [camera_at(chosen, index / fps) for index in range(chosen.frames(fps))]
     write_frames(file, cameras, draw, (settings.width, settings.height), fps, progress)
     seconds = time.perf_counter() - began
-    return Rendered(file, settings.width, settings.height, settings.integrator, len(cameras), seconds)
+    width, height, said = settings.width, settings.height, exposure_in(file, drawn)
+    return Rendered(file, width, height, settings.integrator, len(cameras), seconds, *said)
 
 
 def write_frames(

@@ -190,7 +190,7 @@ class Scene:
     lights: tuple[Light, ...] = ()
     cameras: tuple[Camera, ...] = ()
     paths: tuple[CameraPath, ...] = ()
-    exposure_ev: float = 0.0
+    exposure_ev: float | None = None  # stops; None: by the first picture (core.exposure)
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name

@@ -184,7 +184,7 @@ class SceneRecord(_Record):
     cameras: tuple[Camera, ...]
     paths: tuple[CameraPath, ...] = ()
     reflectors: tuple[ReflectorRecord, ...] = ()
-    exposure_ev: float = 0.0
+    exposure_ev: float | None = 0.0  # None: by the first picture (core.exposure)
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = {}  # by the material's name

@@ -47,8 +47,8 @@ class SunDisc:
     Its irradiance does not depend on its radius. Of a disc that the horizon cuts, the rest is seen.
     """
 
-    direction: NDArray[np.float64]
-    irradiance: NDArray[np.float64]
+    direction: Floats
+    irradiance: Floats
     radius_rad: float
 
     def radiance(self, w: Floats) -> Floats:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import LEAST, MOST, Range
 from lambent.realtime.planar_integrators import CHOICES as PLANARS
 from lambent.viewer.look import INTEGRATORS, LOOKUPS, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
@@ -29,6 +30,8 @@ def draw(look: Look, screen: Screen) -> None:
 
 def draw_exposure(look: Look, key: str = "") -> None:
     look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -EXPOSURE_EV, EXPOSURE_EV, unit=" EV")
+    explain(f"stops on radiance; this is EV100 {ev100_of(look.exposure_ev):.1f}: 15 in the sun, 8 in a room by night")
+    imgui.text_disabled(f"EV100 {ev100_of(look.exposure_ev):.1f}")
 
 
 def draw_shown(look: Look) -> None:

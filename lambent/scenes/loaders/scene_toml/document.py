@@ -63,7 +63,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         lights=(*(light for c in contents for light in c.lights), *(section.light() for section in document.lights)),
         cameras=cameras,
         paths=tuple(section.path() for section in document.paths),
-        exposure_ev=document.exposure_ev,
+        exposure_ev=document.exposure,
         sources=tuple(files.sources),
         warnings=(*whole.warnings, *unfit),
         textures={name: t for name, t in whole.textures.items() if name not in described},

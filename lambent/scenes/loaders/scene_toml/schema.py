@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.exposure import exposure_of
 from lambent.core.plain import Triple, triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
@@ -228,7 +229,8 @@ class SceneDocument(Section):
     version: Literal[1]
     name: str = "scene"
     geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
-    exposure_ev: Annotated[float, Field(ge=-30, le=30)] = 0.0
+    exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
+    exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None
     environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -239,6 +241,17 @@ class SceneDocument(Section):
     cameras: tuple[CameraSection, ...] = ()
     reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()
+
+    @property
+    def exposure(self) -> float | None:
+        """Stops on radiance; None: by the first picture."""
+        return self.exposure_ev if self.exposure_ev100 is None else exposure_of(self.exposure_ev100)
+
+    @model_validator(mode="after")
+    def _one_exposure(self) -> SceneDocument:
+        if self.exposure_ev is not None and self.exposure_ev100 is not None:
+            raise ValueError("says its exposure twice, by exposure_ev and exposure_ev100")
+        return self
 
     @field_validator("geometry", mode="before")
     @classmethod
