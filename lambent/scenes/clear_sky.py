@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.scenes.scene import SunSky
 
 SOLAR_W_M2, SOLAR_LX = 1367.0, 133_800.0
 WATER_CM = 2.0
@@ -50,6 +51,18 @@ def sky_illuminance(height_deg: float, turbidity: float) -> float:
     esra_lx = diffuse_w_m2 * efficacies(height_deg, beam_w_m2, diffuse_w_m2)[1]
     within = min(height_deg, _ZENITH_UP_TO_DEG), max(turbidity, _ZENITH_FROM)
     return float(np.sqrt(esra_lx * cie_clear_sky(*within)))
+
+
+def daylight_in_words(sky: SunSky) -> str:
+    """What daylight is, in a line: its sun, its illuminances, and what lies below the horizon."""
+    height_deg = float(np.degrees(np.arcsin(np.clip(sky.sun_direction[1], 0, 1))))
+    sun_klx = sky.sun_scale * sun_illuminance(height_deg, sky.turbidity) / 1000
+    sky_klx = sky.sky_scale * sky_illuminance(height_deg, sky.turbidity) / 1000
+    ground = "nothing" if sky.ground == "black" else f"a diffuse ground of albedo {sky.albedo:g}"
+    return (
+        f"sun {height_deg:.0f} degrees high, {sun_klx:.1f} klx facing it; sky {sky_klx:.1f} klx, turbidity "
+        f"{sky.turbidity:g}; below the horizon {ground}"
+    )
 
 
 def air_mass(height_deg: float) -> float:

@@ -26,7 +26,7 @@ from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.loaders.surfaces.surface import Surface
-from lambent.scenes.scene import Environment, Light, SceneObject
+from lambent.scenes.scene import Environment, Light, SceneObject, SunSky
 
 GROUPS = ("shapegroup", "instance", "merge")
 LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
@@ -70,6 +70,8 @@ class _Scene:
         if not self._objects:
             raise UserError("holds no triangles", file=self._path, hint="; ".join(self._notes()) or None)
         environment, point_lights = self._lights()
+        if isinstance(environment, SunSky):
+            self._take_sky_units(point_lights)
         cameras = self._cameras(sensors)
         self._say_the_rest()
         return Contents(
@@ -150,6 +152,14 @@ class _Scene:
             else:
                 environment = lights.environment_of(plugin, self._world)
         return environment, found
+
+    def _take_sky_units(self, point_lights: list[Light]) -> None:
+        """Bring lamps beside a sky into its unit: Mitsuba has all light in W/(sr m^2 nm) then."""
+        shining = [o for o in self._objects if any(o.emission)]
+        if shining or point_lights:
+            self._warnings.append("its lamps are taken to be in the unit of its sky, W/(sr m2 nm): 1 is 73 kcd/m2")
+        self._objects = [replace(o, emission=lights.scaled(o.emission)) for o in self._objects]
+        point_lights[:] = map(lights.in_sky_units, point_lights)
 
     def _cameras(self, sensors: list[Plugin]) -> list[Camera]:
         names = UniqueNames()
