@@ -19,6 +19,7 @@ from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
+from lambent.scenes.ies import Photometry
 
 Array = NDArray[np.floating]
 UvTransform = tuple[Triple, Triple]
@@ -163,7 +164,38 @@ class DirectionalLight:
     irradiance: Triple
 
 
-Light = PointLight | DirectionalLight
+@dataclass(frozen=True)
+class IesLight:
+    """A luminaire at a point; `scale` is W/sr for each candela of its photometry.
+
+    It is aimed along `aim`, unit; `rotation_deg` turns it about that, counter-clockwise seen from behind.
+    """
+
+    position: Triple
+    photometry: Photometry
+    scale: Triple
+    aim: Triple = (0.0, -1.0, 0.0)
+    rotation_deg: float = 0.0
+
+    @property
+    def axes(self) -> Array:
+        """(3, 3) rows: unit world directions of the horizontal angles 0 and 90, and of vertical angle 0.
+
+        Aimed straight down, horizontal angle 0 is +x and 90 is -z; aimed elsewhere, as the shortest turn leaves them.
+        """
+        aim, down = np.asarray(self.aim, float), np.array([0.0, -1.0, 0.0])
+        angle = np.radians(self.rotation_deg)
+        across = np.array([np.cos(angle), 0.0, -np.sin(angle)])
+        beside = np.array([-np.sin(angle), 0.0, -np.cos(angle)])
+        turn = np.cross(down, aim)
+        cosine = float(down @ aim)
+        if cosine < -1 + 1e-9:  # straight up: half a turn about x
+            return np.array([across * (1, 1, -1), beside * (1, 1, -1), aim])
+        turned = [v + np.cross(turn, v) + np.cross(turn, np.cross(turn, v)) / (1 + cosine) for v in (across, beside)]
+        return np.array([*turned, aim])
+
+
+Light = PointLight | DirectionalLight | IesLight
 Environment = SunSky | ImageEnvironment | ConstantEnvironment | ComputedEnvironment
 
 
