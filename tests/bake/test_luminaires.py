@@ -14,6 +14,7 @@ from lambent.core.photometry import LM_PER_W, photometric
 from lambent.scenes.ies import Photometry
 from lambent.scenes.scene import IesLight
 from tests.bake.small_scenes import TINY, plane
+from tests.scenes.test_gltf import document, loaded
 
 VERTICAL, HORIZONTAL = (0.0, 20.0, 33.3, 60.0, 90.0), (0.0, 90.0, 180.0, 290.0, 360.0)
 CANDELA = tuple(tuple(100.0 * (1 + k) / (1 + j) for j in range(5)) for k in (0, 1, 2, 3, 0))
@@ -80,3 +81,18 @@ def test_a_light_map_under_a_luminaire(mi: Any, tmp_path: Path, method: str) -> 
     expected = illuminance(light, np.stack([x, 0 * x, z], axis=1), np.array([0.0, 1.0, 0.0]))
     assert found.mean() == pytest.approx(expected.mean(), rel=0.03)
     assert np.percentile(found, 80) == pytest.approx(np.percentile(expected, 80), rel=0.06)
+
+
+def test_a_gltf_light_of_1000_cd_gives_1000_lx_at_a_metre(mi: Any, tmp_path: Path) -> None:
+    content = document(
+        nodes=[
+            {"mesh": 0, "scale": [0.02, 0.02, 0.02]},
+            {"translation": [0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+        ],
+        scenes=[{"nodes": [0, 1]}],
+        extensions={"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 1000}]}},
+    )
+    scene = replace(loaded(tmp_path, content), environment=None)
+    store = bake(scene, tmp_path / "s", quality=TINY, only=("light_map",))
+    lx = photometric(store.read("light_map/irradiance").astype(float))
+    assert lx[lx > 0] == pytest.approx(1000, rel=0.01) and (lx > 0).sum() > 10
