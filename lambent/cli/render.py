@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
 
+MEASURED = {"luminance": "full", "illuminance": "light-map"}  # the part of the light that has it
 SHOWN_BY = (
     "store",
     "output",
@@ -55,13 +56,16 @@ def command(
         str, typer.Option(help="How PNG and MP4 show light: filmic, neutral, linear, or false-colour (cd/m2).")
     ] = "filmic",
     false_range: Annotated[
-        str | None, typer.Option("--range", help="LOW:HIGH of false-colour, in cd/m2. [default: by the first image]")
+        str | None,
+        typer.Option("--range", help="LOW:HIGH of false colours, cd/m2 or lx. [default: by the first image]"),
     ] = None,
     linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
     part: Annotated[
         str,
         typer.Option(
-            "--show", help="full, diffuse, specular, light-map: irradiance, in lx, or noise: its standard error, %."
+            "--show",
+            help="full, diffuse, specular, light-map: irradiance, or noise: its standard error, %. In false colours: "
+            "luminance (cd/m2) or illuminance of surfaces (lx).",
         ),
     ] = "full",
     planar: Annotated[
@@ -100,6 +104,10 @@ def command(
         if exposure is not None:
             raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
         exposure = exposure_of(ev100)
+    if part in MEASURED:
+        if view not in ("filmic", "false-colour"):
+            raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
+        part, view = MEASURED[part], "false-colour"
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar

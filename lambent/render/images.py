@@ -85,7 +85,7 @@ class Images(ABC):
     quantity: Quantity = LUMINANCE
 
     def __init__(self, settings: Settings) -> None:
-        self.settings, self._scale = settings, settings.scale
+        self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed
         self.exposure_ev = settings.exposure_ev  # None until an image was displayed
 
     @abstractmethod
@@ -98,8 +98,8 @@ class Images(ABC):
         if not self.settings.is_false_coloured:
             return to_bytes(shown(radiance, self.settings.view, self.exposed(radiance)))
         values = photometric(radiance, self.quantity)
-        self._scale = self._scale or fitting_range(values, log=self.settings.log)
-        return with_scale(to_bytes(false_colour(values, self._scale)), self._scale, self.quantity.unit)
+        self.scale = self.scale or fitting_range(values, log=self.settings.log)
+        return with_scale(to_bytes(false_colour(values, self.scale)), self.scale, self.quantity.unit)
 
     def exposed(self, radiance: Floats) -> float:
         """The exposure of displayed images, that of `radiance` where none was there yet."""

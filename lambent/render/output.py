@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,7 +31,8 @@ DEFAULT = Settings()
 class Rendered:
     """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
 
-    `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours.
+    `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours; of these `scale`
+    says what they mean: low, high, log, unit.
     """
 
     file: Path
@@ -42,6 +43,7 @@ class Rendered:
     seconds: float
     exposure_ev: float | None = None
     ev100: float | None = None
+    scale: dict[str, float | bool | str] | None = None
 
 
 def ignore(text: str) -> None:
@@ -87,15 +89,17 @@ def still(
     drawn = images(opened, settings, scene=scene, note=note)
     write_still(drawn, file, view, progress)
     seconds = time.perf_counter() - began
-    return Rendered(file, settings.width, settings.height, settings.integrator, 1, seconds, *exposure_in(file, drawn))
+    return Rendered(file, settings.width, settings.height, settings.integrator, 1, seconds, **displayed_as(file, drawn))
 
 
-def exposure_in(file: Path, drawn: Images) -> tuple[float | None, float | None]:
-    """The exposure of what was displayed in a file, in stops and as EV100."""
-    displayed = file.suffix.lower() in (".png", FILM) and not drawn.settings.is_false_coloured
-    if not displayed or drawn.exposure_ev is None:
-        return None, None
-    return drawn.exposure_ev, ev100_of(drawn.exposure_ev)
+def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
+    """How what is in a file is displayed: the last fields of `Rendered`."""
+    if file.suffix.lower() not in (".png", FILM):
+        return {}
+    if drawn.settings.is_false_coloured:
+        return {"scale": None if drawn.scale is None else {**asdict(drawn.scale), "unit": drawn.quantity.unit}}
+    exposure_ev = drawn.exposure_ev
+    return {} if exposure_ev is None else {"exposure_ev": exposure_ev, "ev100": ev100_of(exposure_ev)}
 
 
 def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:
@@ -142,8 +146,8 @@ def film(
     cameras = [camera_at(chosen, index / fps) for index in range(chosen.frames(fps))]
     write_frames(file, cameras, draw, (settings.width, settings.height), fps, progress)
     seconds = time.perf_counter() - began
-    width, height, said = settings.width, settings.height, exposure_in(file, drawn)
-    return Rendered(file, width, height, settings.integrator, len(cameras), seconds, *said)
+    width, height, said = settings.width, settings.height, displayed_as(file, drawn)
+    return Rendered(file, width, height, settings.integrator, len(cameras), seconds, **said)
 
 
 def write_frames(
