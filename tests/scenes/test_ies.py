@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.scenes.ies import FEET_M, read_ies
+from lambent.scenes.scene import IesLight
 
 HEADS = {1986: "", 1991: "IESNA91\n", 1995: "IESNA:LM-63-1995\n", 2002: "IESNA:LM-63-2002\n"}
 
@@ -120,3 +123,36 @@ def test_what_is_refused(tmp_path: Path, text: str, word: str) -> None:
     with pytest.raises(UserError, match=word) as caught:
         read_ies(written(tmp_path, text))
     assert "\n" not in str(caught.value) and "cannot be read as" not in str(caught.value)
+
+
+ROUND = "\n".join(
+    ("500 400 300 100 0", "500 300 200 50 0", "500 450 350 120 0", "500 200 100 20 0", "500 400 300 100 0")
+)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pyradiance") is None, reason="pyradiance is not installed")
+def test_radiance_sees_the_same_luminaire(tmp_path: Path) -> None:
+    """Illuminance by ies2rad and rtrace, whose up is z; all the way round, with multiplier and ballast factor."""
+    text = ies("0 20 40 60 90", "0 90 180 270 360", ROUND, head=HEADS[1995], numbers="1 -1 2", factors=".9 1 50")
+    path = written(tmp_path, text.replace(" .5 .25 0\n", " .01 .01 0\n"))
+    package = Path(str(importlib.util.find_spec("pyradiance").origin)).parent  # type: ignore[union-attr]
+    library = {"PATH": f"{package / 'bin'}:/usr/bin:/bin", "RAYPATH": f".:{package / 'lib'}"}
+
+    def run(*command: str, given: str = "") -> str:
+        told = {"input": given, "capture_output": True, "text": True, "check": True}
+        return str(subprocess.run(command, cwd=tmp_path, env=library, **told).stdout)  # type: ignore[call-overload]
+
+    run("ies2rad", "-t", "default", "-dm", "-o", "lamp", path.name)
+    (tmp_path / "scene.rad").write_text(run("xform", "-t", "0", "0", "2", "lamp.rad"))
+    with open(tmp_path / "scene.oct", "wb") as octree:
+        subprocess.run(["oconv", "scene.rad"], cwd=tmp_path, env=library, stdout=octree, check=True)
+    x, z = np.random.default_rng(0).uniform(-2, 2, (2, 40))
+    places = "".join(f"{a} {-b} 0 0 0 1\n" for a, b in zip(x, z, strict=True))
+    answer = run("rtrace", "-I", "-h", "-ab", "0", "-dc", "1", "-dt", "0", "-ds", ".01", "scene.oct", given=places)
+    lx = 179 * np.array([line.split() for line in answer.splitlines()], float)[:, 1]
+    lamp = IesLight((0.0, 2.0, 0.0), read_ies(path), (1.0, 1.0, 1.0))
+    to = np.stack([x, 0 * x - 2, z], axis=1)
+    metres = np.linalg.norm(to, axis=1)
+    a, b, down = ((to / metres[:, None]) @ axis for axis in lamp.axes)
+    cd = lamp.photometry.at(np.degrees(np.arccos(down)), np.degrees(np.arctan2(b, a)))
+    np.testing.assert_allclose(lx, 2 * cd / metres**3, rtol=2e-3, atol=0.01)
