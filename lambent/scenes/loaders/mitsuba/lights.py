@@ -105,10 +105,10 @@ def _sun_radius_deg(plugin: Plugin) -> float:
     return radius_deg
 
 
-def light_of(plugin: Plugin, world: Floats) -> Light | None:
+def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | None:
     """A light without extent; None, and a warning, if its kind is unknown."""
     matrix = world @ plugin.transform()
-    made: Light
+    made: PointLight | DirectionalLight
     if plugin.type == "point":
         position = plugin.vector("position")
         at = matrix[:3, 3] if position is None else matrix[:3, :3] @ position + matrix[:3, 3]
@@ -131,11 +131,11 @@ def light_of(plugin: Plugin, world: Floats) -> Light | None:
     return made
 
 
-def in_sky_units(light: Light) -> Light:
+def in_sky_units(light: PointLight | DirectionalLight) -> Light:
     """A light of a file that has a sky."""
-    if isinstance(light, DirectionalLight):
-        return replace(light, irradiance=scaled(light.irradiance))
-    return replace(light, intensity=scaled(light.intensity))
+    if isinstance(light, PointLight):
+        return replace(light, intensity=scaled(light.intensity))
+    return replace(light, irradiance=scaled(light.irradiance))
 
 
 def scaled(light: Triple) -> Triple:
