@@ -15,8 +15,10 @@ from lambent.core.environment_layouts import layout_of
 from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.interiors import lat_long_image
-from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene
+from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.textures import digest, parts
+
+DAYLIGHT = "clear_sky 1"  # the model that daylight is calibrated to: raise where it changes
 
 
 def key_of(what: str, revision: int, *inputs: object) -> str:
@@ -96,4 +98,6 @@ def environment_inputs(environment: Environment | None) -> object:
         values = {name: value for name, value in values.items() if plain.get(name) != value}
     elif isinstance(environment, ComputedEnvironment):
         values = {**values, "image": key_of("computed", 1, lat_long_image(environment.name))}
+    elif isinstance(environment, SunSky):
+        values = {**values, "model": DAYLIGHT}
     return [type(environment).__name__, values]

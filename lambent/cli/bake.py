@@ -91,6 +91,8 @@ def command(
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
+    from lambent.scenes.clear_sky import daylight_in_words
+    from lambent.scenes.scene import SunSky
 
     if output is None and not propose:
         raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
@@ -116,8 +118,9 @@ def command(
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     seconds = store.documents.get("timings", {})
-    facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings}
-    rows = [(name, f"{value:.1f} s") for name, value in seconds.items()]
+    daylight = [("daylight", daylight_in_words(what.environment))] if isinstance(what.environment, SunSky) else []
+    facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings, **dict(daylight)}
+    rows = [*daylight, *((name, f"{value:.1f} s") for name, value in seconds.items())]
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
 
 

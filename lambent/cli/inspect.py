@@ -113,6 +113,8 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
 def inspect_scene(file: str) -> Facts:
     """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
+    from lambent.scenes.clear_sky import daylight_in_words
+    from lambent.scenes.scene import SunSky
 
     scene = load_scene(file)
     low, high = scene.bounds
@@ -123,6 +125,7 @@ def inspect_scene(file: str) -> Facts:
         "triangles": sum(len(o.mesh.faces) for o in scene.objects),
         "materials": sorted(scene.materials),
         "environment": type(scene.environment).__name__ if scene.environment else "none",
+        **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
         "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
         "cameras": [camera.name for camera in scene.cameras],
         "paths": [path.name for path in scene.paths],

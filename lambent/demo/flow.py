@@ -179,7 +179,7 @@ class Flow:
     def walk(self) -> None:
         """Stills along the walk and the film of it, from the frame code of the window."""
         effort, renderer = self.effort, self._renderer
-        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev
+        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev or 0.0
 
         views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(path, STILLS)]
         renderer.display_image(views[0])  # the first frame also builds the pipelines

@@ -26,7 +26,7 @@ from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.draws import draws_of
-from lambent.realtime.frame_state import QMC_N, SHOW, FrameState, frame_data
+from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.outline import Outline
@@ -147,7 +147,14 @@ class Renderer:
 
     def image(self, state: FrameState) -> Floats:
         """Linear radiance (height, width, 3) float32, row 0 on top."""
-        return np.asarray(pixels(self.device, self.draw(state)), np.float32)
+        return self.in_units(pixels(self.device, self.draw(state)), state)
+
+    def in_units(self, texels: NDArray[Any], state: FrameState) -> NDArray[np.float32]:
+        """W/(sr m^2), or what else the state shows, of texels of the texture of radiance that `draw` left."""
+        return np.asarray(texels, np.float32) * np.float32(self._unit(state))
+
+    def _unit(self, state: FrameState) -> float:
+        return 1.0 if state.show == LIGHT_MAP_NOISE else self.scene.unit
 
     def display_image(self, state: FrameState) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
@@ -185,7 +192,7 @@ class Renderer:
             if index % 16 == 15:
                 self.finish()
                 progress((index + 1) * per_frame, frames * per_frame, "samples per pixel")
-        return np.asarray(pixels(self.device, radiance), np.float32)
+        return self.in_units(pixels(self.device, radiance), state)
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -216,6 +223,8 @@ class Renderer:
         state.check()
         self._frames += 1
         data = frame_data(state, self.scene.record.bounds)
+        for factor in (data["exposure"], data["scale"][3:]):  # light is in the scene's units
+            factor *= self._unit(state)
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         views = self._planar_views(state, data)
         draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})

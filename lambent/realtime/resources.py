@@ -35,8 +35,8 @@ def device_needs(scene: BakedScene) -> dict[str, int]:
 class ObjectResources:
     """One object: its range of the index buffer, its light and its bind groups."""
 
-    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight) -> None:
-        self.record, self.light, self._layouts = record, light, layouts
+    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float) -> None:
+        self.record, self.light, self._layouts, self._unit = record, light, layouts, unit
         self.group = cache(self._new_group)
 
     def _new_group(self, cube: Cube, look_up: LookUp, aimed: bool = False) -> Any:
@@ -44,8 +44,8 @@ class ObjectResources:
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
-        data["emission"][0, :3] = self.record.emission
-        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = probe.irradiance
+        data["emission"][0, :3] = np.array(self.record.emission) / self._unit
+        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         uniform = self._layouts.buffer("UNIFORM", data)
         table = self.light.lamps.buffer if aimed else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS)
@@ -76,7 +76,7 @@ class SceneResources:
             probe = scene.probe_of(record)
             if probe not in lights:
                 lights[probe] = ProbeLight(layouts, probe, self.sampler, known)
-            self.objects.append(ObjectResources(layouts, record, lights[probe]))
+            self.objects.append(ObjectResources(layouts, record, lights[probe], scene.unit))
         textures = TextureCache(device)
         self.materials = {
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))

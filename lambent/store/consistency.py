@@ -48,7 +48,7 @@ def check_record(store: Store, record: SceneRecord) -> None:
     for field, camera in _cameras(record):
         if not is_usable(camera):
             raise _broken(store, field, "a camera is not finite, or sees no angle")
-    numbers = [record.exposure_ev, *_flat(record.bounds)]
+    numbers = [record.exposure_ev or 0.0, *_flat(record.bounds)]
     numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds))]
     numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
     numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]

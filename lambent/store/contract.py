@@ -10,12 +10,13 @@
                                            before denoising; may be absent
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
-    environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
-    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], without OBJECT if
-                                           meta["object_left_out"]. meta["seen_irradiance"], may be absent: luminance of
-                                           the irradiance it would give, coefficients of 1, x, y, z, xy, yz, 3zz - 1,
-                                           xz, xx - yy of the normal; scale its light by the light map's share of that,
-                                           at most 1
+    environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
+                                           in units of meta["unit"] W/(sr m^2): a power of two; 1 where it is absent
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] in meta["unit"] as
+                                           above, without OBJECT if meta["object_left_out"]. meta["seen_irradiance"],
+                                           may be absent: luminance of the irradiance it would give, coefficients of
+                                           1, x, y, z, xy, yz, 3zz - 1, xz, xx - yy of the normal; scale its light by
+                                           the light map's share of that, at most 1
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
@@ -99,6 +100,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
@@ -182,7 +184,7 @@ class SceneRecord(_Record):
     cameras: tuple[Camera, ...]
     paths: tuple[CameraPath, ...] = ()
     reflectors: tuple[ReflectorRecord, ...] = ()
-    exposure_ev: float = 0.0
+    exposure_ev: float | None = 0.0  # None: by the first picture (core.exposure)
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = {}  # by the material's name
@@ -246,6 +248,15 @@ def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
     """What a probe alone would give (see the head), where the light map is to scale it; else nothing."""
     name = probe_name(object_name, "radiance")
     return numbers_of(store, name, "seen_irradiance", 9) if store.artefact(name).meta.get("seen_irradiance") else ()
+
+
+def radiance_unit(store: Store, name: str) -> float:
+    """W/(sr m^2) that 1 stands for in a cube map of radiance."""
+    unit = store.artefact(name).meta.get("unit", 1.0)
+    if not (isinstance(unit, int | float) and 1 <= unit <= MOST_UNIT):
+        expected = f"a number from 1 to {MOST_UNIT:g}"
+        raise UserError("broken store", file=store.folder, field=f"{name}: unit", got=unit, expected=expected)
+    return float(unit)
 
 
 def noise_name(side: str) -> str:

@@ -209,7 +209,8 @@ class Picture:
         dtype = np.dtype(np.float16 if self.radiance.format == "rgba16float" else np.float32)
         source, layout = {"texture": self.radiance, "origin": (x, y, 0)}, {"bytes_per_row": width * 4 * dtype.itemsize}
         data = self._device.queue.read_texture(source, layout, (width, height, 1))
-        return np.asarray(np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3], np.float32)
+        assert isinstance(self.pacer.shown, FrameState)
+        return self._renderer.in_units(np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3], self.pacer.shown)
 
     @property
     def samples(self) -> int:

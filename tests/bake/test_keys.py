@@ -117,6 +117,8 @@ SUN_SKY: Answers = {
     "albedo": (0.2, SKY),
     "sun_scale": (0.5, SKY),
     "sky_scale": (0.5, SKY),
+    "sun_radius_deg": (1.0, SKY),
+    "ground": ("black", SKY),
 }
 IMAGE: Answers = {
     "file": (lambda file: file.with_name("dusk.exr"), SKY),

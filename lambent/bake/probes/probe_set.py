@@ -18,6 +18,7 @@ from lambent.bake.probes.selection import OWN, RAYS, TRIAL_SAMPLES, TRIAL_TEXELS
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
+from lambent.core.colour import in_halves
 
 
 class ProbeSet:
@@ -112,8 +113,9 @@ class ProbeSet:
         else:
             planes = np.asarray(given, np.float32).reshape(-1, 4)
         about = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
-        arrays: dict[str, NDArray[Any]] = {"radiance": probe.radiance, "distance": probe.distance, "planes": planes}
-        meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out}
+        radiance, unit = in_halves(probe.radiance)
+        arrays: dict[str, NDArray[Any]] = {"radiance": radiance, "distance": probe.distance, "planes": planes}
+        meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out, "unit": unit}
         meta["traced"] = self._cache is None
         if rays is not None:
             found = judged(rays, probe, centre, about, through=self._transmits(name))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import LEAST, MOST, Range
 from lambent.realtime.planar_integrators import CHOICES as PLANARS
 from lambent.viewer.look import INTEGRATORS, LOOKUPS, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
@@ -28,8 +29,10 @@ def draw(look: Look, screen: Screen) -> None:
 
 
 def draw_exposure(look: Look, key: str = "") -> None:
-    meaning = "makes the picture brighter or darker; one EV doubles it"
+    ev100 = f"EV100 {ev100_of(look.exposure_ev):.1f}"
+    meaning = f"stops on radiance, brighter or darker; now {ev100}: 15 in the sun, 8 in a room by night"
     look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -EXPOSURE_EV, EXPOSURE_EV, meaning, unit=" EV")
+    imgui.text_disabled(ev100)
 
 
 def draw_shown(look: Look) -> None:

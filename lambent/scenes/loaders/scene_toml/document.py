@@ -15,16 +15,34 @@ from pydantic import ValidationError
 
 from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
+from lambent.core.geometry import triangle_areas
 from lambent.core.inputs import read_bytes, read_head
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
+from lambent.scenes.ies import read_ies
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
-from lambent.scenes.loaders.scene_toml.schema import GeometrySection, ImageSection, SceneDocument, known_keys
-from lambent.scenes.scene import Environment, ImageEnvironment, PointLight, ReflectorRule, Scene, SceneObject
+from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
+from lambent.scenes.loaders.scene_toml.schema import (
+    GeometrySection,
+    ImageSection,
+    ObjectSection,
+    SceneDocument,
+    known_keys,
+)
+from lambent.scenes.scene import (
+    Environment,
+    ImageEnvironment,
+    Light,
+    Mesh,
+    PointLight,
+    ReflectorRule,
+    Scene,
+    SceneObject,
+)
 
 _DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
@@ -60,10 +78,10 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         objects=objects,
         materials=materials,
         environment=environment,
-        lights=(*(light for c in contents for light in c.lights), *(section.light() for section in document.lights)),
+        lights=(*(light for c in contents for light in c.lights), *_lights(document, path, files)),
         cameras=cameras,
         paths=tuple(section.path() for section in document.paths),
-        exposure_ev=document.exposure_ev,
+        exposure_ev=document.exposure,
         sources=tuple(files.sources),
         warnings=(*whole.warnings, *unfit),
         textures={name: t for name, t in whole.textures.items() if name not in described},
@@ -164,8 +182,10 @@ def _apply(
     for pattern, section in document.objects.items():
         settings = section.model_dump(exclude_none=True)
         centre, own_planes = settings.pop("probe_centre", None), settings.pop("probe_planes", None)
+        for key in ("luminance", "lumens", "colour"):
+            settings.pop(key, None)
         for name in fitting(pattern, by_name, path, f"objects.{pattern}"):
-            by_name[name] = replace(by_name[name], **settings)
+            by_name[name] = replace(by_name[name], **settings, **_light_of(by_name[name].mesh, section))
             if centre is not None:
                 centres[name] = centre
             if own_planes is not None:
@@ -185,6 +205,29 @@ def _unit_planes(planes: Any) -> Any:
     """(P, 4) planes with normals of unit length."""
     array = np.asarray(planes, np.float32).reshape(-1, 4)
     return array / np.linalg.norm(array[:, :3], axis=-1, keepdims=True)
+
+
+def _lights(document: SceneDocument, path: Path, files: SceneFiles) -> list[Light]:
+    found: list[Light] = []
+    for section in document.lights:
+        if isinstance(section, IesSection):
+            file = files.path(section.file, path, "lights.file")
+            if not file.is_file():
+                raise UserError("file not found", file=path, field="lights.file", got=section.file)
+            files.use(file)
+            found.append(section.luminaire(read_ies(file)))
+        else:
+            found.append(section.light())
+    return found
+
+
+def _light_of(mesh: Mesh, section: ObjectSection) -> dict[str, Any]:
+    """The emission of an object that its section says in photometric units."""
+    if section.luminance is None and section.lumens is None:
+        return {}
+    area_m2 = float(triangle_areas(mesh.corners).sum())
+    of_flux = (section.lumens or 0.0) / max(np.pi * area_m2, 1e-12)
+    return {"emission": coloured(section.luminance if section.luminance is not None else of_flux, section.colour)}
 
 
 def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Environment | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -69,7 +70,8 @@ class Pictures(Pair):
             self.shown = (self._a,)
             self._a.update(wanted, refine=None if state.films.under_way is None else False)
         look, size = state.look, (max(1, place.width), max(1, place.height))
-        state.marks.update(state.navigation.camera, size, look.display_transform, look.exposure_ev)
+        exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
+        state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
         self._meter()
         if self._glare.busy:
             self._glare_renderer = self._glare_renderer or self._another_renderer()

@@ -136,11 +136,12 @@ class WalkState:
     @classmethod
     def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
         """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
+        look, meter = Look(scene.exposure_ev or 0.0), Meter(expose_wanted=scene.exposure_ev is None)
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
         fault = views.load()
         return cls(
-            scene, screen, Look(scene.exposure_ev), navigation, Selection(scene.objects),
+            scene, screen, look, navigation, Selection(scene.objects),
             Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen),
-            Marks({}, scene.reflectors),
+            Marks({}, scene.reflectors), meter=meter,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from lambent.core.camera import Camera
+from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import number
 from lambent.core.photometry import photometric
 from lambent.viewer.look import Look
@@ -32,7 +33,7 @@ def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
         ("mean", f"{number(reading.mean)} {unit}"),
         ("log-average", f"{number(reading.log_mean)} {unit}"),
         ("darkest, brightest", f"{number(reading.low)}, {number(reading.high)} {unit}"),
-        *([] if look.shows_noise else [("log-average is grey at", f"{reading.exposure_ev:+.2f} EV")]),
+        *([] if look.shows_noise else [("middle is grey at", f"EV100 {ev100_of(reading.exposure_ev):.2f}")]),
     ]
     rows(table, "meter")
     counts = np.asarray(reading.counts, np.float32)
