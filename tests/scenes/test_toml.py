@@ -122,6 +122,7 @@ WRONG = {
     "[materials.white]\nkd = -1.0": r"materials.white: kd.*greater than or equal to 0",
     "[objects.sphre]\nmaterial = 'white'": r"objects.sphre: fits no object; did you mean 'sphere'\?",
     MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
+    "[[cameras]]\nname='a'\nposition=[1e308,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.0.*1000000000",
     "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
     "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
     MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from lambent.core.camera import Camera, CameraPath
+from lambent.core.camera import FARTHEST_M, Camera, CameraPath
 from lambent.core.plain import Triple, triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
@@ -18,7 +18,9 @@ FORMAT = "lambent-scene"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Near = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+Place = tuple[Near, Near, Near]
 Colour = tuple[NotNegative, NotNegative, NotNegative]
 Plane = tuple[Finite, Finite, Finite, Finite]
 
@@ -163,9 +165,9 @@ class DirectionalSection(Section):
 class ViewSection(Section):
     """A camera without a name."""
 
-    position: Vector
-    target: Vector
-    up: Vector = (0.0, 1.0, 0.0)
+    position: Place
+    target: Place
+    up: Place = (0.0, 1.0, 0.0)
     fov_y_deg: Annotated[float, Field(ge=1, le=150)] = 45.0
 
     @model_validator(mode="after")
