@@ -11,8 +11,10 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.scene_toml.assembly import assigned
 from lambent.scenes.loaders.scene_toml.schema import SceneDocument, known_keys
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight, SceneObject
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 MATERIALS = """
@@ -245,3 +247,10 @@ def test_known_keys_are_all_keys() -> None:
     assert {"turbidity", "probe_planes", "fov_y_deg", "intensity", "scale"} | set(
         SceneDocument.model_fields
     ) <= known_keys()
+
+
+def test_of_two_rules_that_fit_the_later_wins() -> None:
+    objects = [SceneObject(name, patch((0, 0, 0), (1, 0, 0), (0, 1, 0)), "plain") for name in ("chair_1", "chair_2")]
+    rules, materials = {"chair_*": "oak", "chair_2": "ash"}, dict.fromkeys(("oak", "ash"), Material())
+    found, warnings = assigned(rules, objects, materials, Path("scene.toml"))
+    assert [o.material for o in found] == ["oak", "ash"] and not warnings
