@@ -14,8 +14,17 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.photometry import photometric
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.scene_toml.assembly import assigned
 from lambent.scenes.loaders.scene_toml.schema import SceneDocument, known_keys
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, IesLight, ImageEnvironment, PointLight
+from lambent.scenes.scene import (
+    ConstantEnvironment,
+    DirectionalLight,
+    IesLight,
+    ImageEnvironment,
+    PointLight,
+    SceneObject,
+)
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 MATERIALS = """
@@ -182,6 +191,7 @@ WRONG = {
     "[materials.white]\nkd = -1.0": r"materials.white: kd.*greater than or equal to 0",
     "[objects.sphre]\nmaterial = 'white'": r"objects.sphre: fits no object; did you mean 'sphere'\?",
     MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
+    "[[cameras]]\nname='a'\nposition=[1e308,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.0.*1000000000",
     "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
     "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
     MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",
@@ -311,3 +321,10 @@ def test_known_keys_are_all_keys() -> None:
     assert {"turbidity", "probe_planes", "fov_y_deg", "intensity", "scale"} | set(
         SceneDocument.model_fields
     ) <= known_keys()
+
+
+def test_of_two_rules_that_fit_the_later_wins() -> None:
+    objects = [SceneObject(name, patch((0, 0, 0), (1, 0, 0), (0, 1, 0)), "plain") for name in ("chair_1", "chair_2")]
+    rules, materials = {"chair_*": "oak", "chair_2": "ash"}, dict.fromkeys(("oak", "ash"), Material())
+    found, warnings = assigned(rules, objects, materials, Path("scene.toml"))
+    assert [o.material for o in found] == ["oak", "ash"] and not warnings

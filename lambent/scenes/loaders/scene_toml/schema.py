@@ -15,6 +15,7 @@ from lambent.scenes.loaders.scene_toml.sections import (
     Colour,
     Finite,
     NotNegative,
+    Place,
     Plane,
     Positive,
     Section,
@@ -131,9 +132,9 @@ class ObjectSection(Section):
 class ViewSection(Section):
     """A camera without a name."""
 
-    position: Vector
-    target: Vector
-    up: Vector = (0.0, 1.0, 0.0)
+    position: Place
+    target: Place
+    up: Place = (0.0, 1.0, 0.0)
     fov_y_deg: Annotated[float, Field(ge=1, le=150)] = 45.0
 
     @model_validator(mode="after")
