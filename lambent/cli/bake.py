@@ -85,8 +85,11 @@ def command(
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
 
     Example: lambent bake builtin:room -o room.store --quality preview
+
     Example: lambent bake builtin:teatray -o tray.store --only transport --view front:512x512
+
     Example: lambent bake builtin:cornell -o box.store --only transport --only interreflection --view front:450x450
+
     Example: lambent bake builtin:cornell --view front:450x450 --samples 4096 --propose
     """
     from lambent.bake.bake import bake

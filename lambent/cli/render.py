@@ -99,6 +99,7 @@ def command(
     """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through a view transform.
 
     Example: lambent render room.store --camera entrance -o entrance.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
