@@ -15,7 +15,7 @@ from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
-from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -55,6 +55,7 @@ class BakedScene:
     noise: Floats | None = None  # (H, W), relative standard error of the light map
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
+    sun: SunRecord | None = None  # whose direct light the light maps leave out
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -114,6 +115,7 @@ def read_baked(store: Store) -> BakedScene:
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
+        sun=contract.sun_beside(store),
     )
 
 

@@ -3,6 +3,7 @@
 #include "vertex.wgsl"
 #include "surface.wgsl"
 #include "dominant_direction.wgsl"
+#include "sun.wgsl"
 
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
 
@@ -49,21 +50,36 @@ fn light_map(layer: u32, uv2: vec2f) -> vec3f {
     return select(vec3f(0.0), found, layer <= last);
 }
 
+// Irradiance of the sun on a surface that faces it, where either side of this one shows it; `facing` is the cosine on the
+// side that is seen. Takes derivatives.
+fn sunlight(v: Varyings, facing: f32) -> vec3f {
+    let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
+    if (sun.irradiance.w == 0.0) { return vec3f(0.0); }
+    if (facing <= 0.0 && all(material.kt_d.rgb == vec3f(0.0))) { return vec3f(0.0); }
+    turn_sun_pattern(vec2u(v.position.xy));
+    let n = select(mesh_frame(v)[2], normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+    return sun.irradiance.rgb * sun_visibility(v.p_world, n);
+}
+
 fn surface_light(v: Varyings, front: bool) -> vec3f {
     let view = normalize(frame.eye.xyz - v.p_world);
     var s = shading_frame(v, select(-1.0, 1.0, front), view);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
 
+    let mesh = mesh_frame(v);
+    let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
+    let direct = sunlight(v, facing);
     let e_front = light_map(FRONT, v.uv2);
     let e_back = light_map(BACK, v.uv2);
-    let e_here = select(e_back, e_front, front);
-    let e_beyond = select(e_front, e_back, front);
-    var e_bent = e_here;
+    var e_here = select(e_back, e_front, front);
+    let e_beyond = select(e_front, e_back, front) + max(-facing, 0.0) * direct;
+    var e_bent = e_here + max(facing, 0.0) * direct;
     if ((TEXTURES & 8u) != 0u && front) {
-        let mesh = mesh_frame(v);
         let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
-        e_bent *= bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
+        e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
+        e_bent += select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0) * direct;
     }
+    e_here += max(facing, 0.0) * direct;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
