@@ -26,7 +26,8 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
-LIGHT = ("layers", "uniform", "depth layers", "exact layers")  # light maps; the sun, its shadow map, blocks of that
+LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
+SHADOW_MAP = "uniform", "depth layers", "exact layers"  # the sun, depths towards it, and their blocks
 
 
 class Layouts:

@@ -86,16 +86,16 @@ class SceneResources:
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         whole = (r for r in records if r.name not in self.masked)
         self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
-        self.light = self.light_view, *sun_light(layouts, scene, self).bound
-        self.light_group = layouts.group(layouts.light, *self.light)
+        self.sun = sun_light(layouts, scene, self)
 
     @cached_property
     def noise_group(self) -> Any:
-        """Stands in for `light_group`: the noise of the light map."""
+        """Group 3 that shows the noise of the light map instead of its light, without a sun."""
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
-        view, dark = light_layers(self._layouts.device, *grey), SunLight(self._layouts, None, None, None)
-        return self._layouts.group(self._layouts.light, view, *dark.bound)
+        dark = SunLight(self._layouts)
+        view = light_layers(self._layouts.device, *grey)
+        return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
 def light_layers(device: Any, front: Floats | None, back: Floats | None, direction: Floats | None = None) -> Any:

@@ -11,7 +11,7 @@ from lambent.realtime.shader_source import assemble
 Record = NDArray[np.void]
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
-    "Sun": "sun", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
+    "Sun": "sun_record", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
 }  # fmt: skip
 STRUCTS = {
     name: wgsl_dtype(name, assemble(f"{file}.wgsl", given={"look_up.wgsl": ""}))[0] for name, file in _DECLARED.items()

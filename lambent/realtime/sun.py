@@ -19,7 +19,7 @@ from lambent.core.directions import basis
 from lambent.core.geometry import points_on_triangles, triangle_areas
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.integrators import INTEGRATORS
-from lambent.realtime.layouts import Layouts
+from lambent.realtime.layouts import SHADOW_MAP, Layouts
 from lambent.realtime.pipelines import pipeline
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.structs import FRAME_DTYPE, SUN_DTYPE, Record
@@ -107,21 +107,22 @@ def _quantiles(values: Floats, weight: Floats) -> tuple[float, float]:
 
 
 class SunLight:
-    """A sun on the GPU: its record, its shadow map and the blocks of that, as shaders/sun.wgsl binds them."""
+    """A sun on the GPU: its record, its shadow map and the blocks of that; none without `squares`.
 
-    def __init__(self, layouts: Layouts, sun: SunRecord | None, squares: SunSquares | None, depths: Any) -> None:
-        layers = 1 if squares is None else len(squares.squares)
-        self.squares = squares
-        self._depths = depths or _depth_texture(layouts.device, 1, 1)
-        self._uniform = layouts.buffer("UNIFORM", sun_data(sun, squares))
-        if squares is None:
-            blocks = np.zeros((1, 1, 1, 2), np.float32)
-        else:
-            blocks = block_ranges(np.stack([_read(layouts.device, depths, layer) for layer in range(layers)]))
-        texture = upload(layouts.device, [blocks], "rg32float")
-        self.bound = (
-            self._uniform, self._depths.create_view(dimension="2d-array"), texture.create_view(dimension="2d-array")
-        )  # fmt: skip
+    `nowhere` stands for the pixels that see a sun where there is none.
+    """
+
+    def __init__(
+        self, layouts: Layouts, sun: SunRecord | None = None, squares: SunSquares | None = None, depths: Any = None
+    ) -> None:
+        self.exists = squares is not None
+        self.uniform = layouts.buffer("UNIFORM", sun_data(sun, squares))
+        self.nowhere = upload(layouts.device, [np.zeros((1, 1, 1, 1), np.float16)], "r16float").create_view()
+        if squares is not None:
+            read = [_read(layouts.device, depths, layer) for layer in range(len(squares.squares))]
+            blocks = upload(layouts.device, [block_ranges(np.stack(read))], "rg32float")
+            views = (texture.create_view(dimension="2d-array") for texture in (depths, blocks))
+            self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views)
 
 
 def sun_data(sun: SunRecord | None, squares: SunSquares | None) -> Record:
@@ -194,7 +195,7 @@ def draw_depths(layouts: Layouts, squares: SunSquares, resources: Any) -> Any:
 def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
     """The sun of a baked scene, its shadow map drawn; dark where there is none."""
     if scene.sun is None:
-        return SunLight(layouts, None, None, None)
+        return SunLight(layouts)
     paths = (camera for path in scene.record.paths for camera in path.keys)
     eyes = np.array([camera.position for camera in (*scene.record.cameras, *paths)], float).reshape(-1, 3)
     squares = squares_of(scene.sun.direction, scene.positions[scene.faces].astype(float), eyes)

@@ -50,7 +50,7 @@ class PlanarPass:
             yield from self._buffers.encode(mirrored, index, view)
             yield from self._encode_hits(context, index, view, how, layers[:FOUND])
         self._encode_clean(context, how, texture, layers[FOUND:])
-        views = *context.resources.light, texture.create_view(dimension="2d-array")
+        views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
         yield
 

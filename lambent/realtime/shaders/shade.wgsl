@@ -3,9 +3,11 @@
 #include "vertex.wgsl"
 #include "surface.wgsl"
 #include "dominant_direction.wgsl"
-#include "sun.wgsl"
+#include "sun_record.wgsl"
 
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
+@group(3) @binding(1) var<uniform> sun: Sun;
+@group(3) @binding(2) var sun_seen: texture_2d<f32>; // share of its disc by pixel, of sun.wgsl
 
 const FRONT = 0u;     // irradiance on the side of the normal
 const BACK = 1u;      // on the other
@@ -50,17 +52,6 @@ fn light_map(layer: u32, uv2: vec2f) -> vec3f {
     return select(vec3f(0.0), found, layer <= last);
 }
 
-// Irradiance of the sun on a surface that faces it, where either side of this one shows it; `facing` is the cosine on the
-// side that is seen. Takes derivatives.
-fn sunlight(v: Varyings, facing: f32) -> vec3f {
-    let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
-    if (sun.irradiance.w == 0.0) { return vec3f(0.0); }
-    if (facing <= 0.0 && all(material.kt_d.rgb == vec3f(0.0))) { return vec3f(0.0); }
-    turn_sun_pattern(vec2u(v.position.xy));
-    let n = select(mesh_frame(v)[2], normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
-    return sun.irradiance.rgb * sun_visibility(v.p_world, n);
-}
-
 fn surface_light(v: Varyings, front: bool) -> vec3f {
     let view = normalize(frame.eye.xyz - v.p_world);
     var s = shading_frame(v, select(-1.0, 1.0, front), view);
@@ -68,7 +59,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
 
     let mesh = mesh_frame(v);
     let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
-    let direct = sunlight(v, facing);
+    let direct = sun.irradiance.rgb * textureLoad(sun_seen, vec2i(v.position.xy), 0).r;
     let e_front = light_map(FRONT, v.uv2);
     let e_back = light_map(BACK, v.uv2);
     var e_here = select(e_back, e_front, front);

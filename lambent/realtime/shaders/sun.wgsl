@@ -1,22 +1,17 @@
-// Direct sunlight from a shadow map of the scene, made once (realtime/sun.py): depth along the sun's direction in nested
+// The share of the sun's disc that each pixel sees, by a shadow map of the scene, made once (realtime/sun.py): depth along the sun's direction in nested
 // squares, the smallest first, and the least and greatest depths of blocks of texels.
 //
 // Penumbras are as wide as the sun's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer
 // soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself.
 
-#include "frame.wgsl"
+#include "vertex.wgsl"
+#include "sun_record.wgsl"
 
-struct Sun {
-    towards: vec4f,    // unit; w: tangent of its angular radius
-    across: vec4f,     // unit, along rows of the map; w: depth of 0, m
-    down: vec4f,       // unit, along columns; w: metres that depths of 0 to 1 span
-    irradiance: vec4f, // W/m^2 on a surface that faces it; w: number of squares, 0 where there is no sun
-    squares: array<vec4f, 4>, // corner (across, down), m; texels per metre; metres per texel
-}
+@group(1) @binding(0) var<uniform> sun: Sun;
+@group(1) @binding(1) var sun_depths: texture_depth_2d_array;
+@group(1) @binding(2) var sun_blocks: texture_2d_array<f32>; // (least, greatest) depth
 
-@group(3) @binding(1) var<uniform> sun: Sun;
-@group(3) @binding(2) var sun_depths: texture_depth_2d_array;
-@group(3) @binding(3) var sun_blocks: texture_2d_array<f32>; // (least, greatest) depth
+override TRANSMITS: bool = false; // surfaces show light from behind them
 
 const SUN_BLOCK = 8.0;       // texels along the side of the smallest block: BLOCK of realtime/sun.py
 const SUN_SEARCH = 8u;       // taps that look for blockers
@@ -25,7 +20,6 @@ const SUN_LEAST_PX = 1.0;    // texels: least radius of either
 const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface is not followed
 const SUN_BIAS_PX = 0.7;     // texels, by which what is nearer to the sun casts no shadow
 const SUN_ROUNDING = 4e-7;   // of the depths' span
-const GOLDEN_ANGLE = 2.39996323;
 
 var<private> sun_turn: vec2f; // of the pattern at this pixel: share of a ring, share of a turn
 
@@ -79,57 +73,94 @@ fn sun_rise(at: SunPlace, offset: vec2f) -> f32 {
     return sun_depth_m(textureLoad(sun_depths, vec2i(texel), at.square, 0)) - here;
 }
 
-// Tap k of n, spread evenly over a disc of radius 1 (Vogel 1979).
-fn sun_tap(k: u32, n: u32) -> vec2f {
-    let r = sqrt((f32(k) + sun_turn.x) / f32(n));
-    let phi = GOLDEN_ANGLE * f32(k) + 6.283185307 * sun_turn.y;
-    return r * vec2f(cos(phi), sin(phi));
+// A point of a disc of radius 1, and the next: n of them are spread evenly over it (Vogel 1979).
+struct SunTap {
+    across: vec2f, // unit
+    order: f32,
 }
 
-// The share of the sun's disc that a point sees; n is the normal of the flat surface there, on either side.
-fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
+fn first_sun_tap() -> SunTap {
+    let phi = 6.283185307 * sun_turn.y;
+    return SunTap(vec2f(cos(phi), sin(phi)), sun_turn.x);
+}
+
+fn next_sun_tap(tap: SunTap) -> SunTap {
+    let golden = vec2f(-0.73736888, 0.67549029); // cosine and sine of the golden angle
+    let turned = vec2f(dot(tap.across, vec2f(golden.x, -golden.y)), dot(tap.across, golden.yx));
+    return SunTap(turned, tap.order + 1.0);
+}
+
+fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
     let axes = vec2f(dot(sun.across.xyz, p_world), dot(sun.down.xyz, p_world));
     let side = f32(textureDimensions(sun_depths).x);
     var at = SunPlace();
     at.square = u32(sun.irradiance.w);
     for (var k = 0u; k < u32(sun.irradiance.w); k++) {
-        let texel = (axes - sun.squares[k].xy) * sun.squares[k].z;
-        if (all(texel > vec2f(2.0)) && all(texel < vec2f(side - 2.0))) {
+        at.texel = (axes - sun.squares[k].xy) * sun.squares[k].z;
+        at.texel_m = sun.squares[k].w;
+        if (all(at.texel > vec2f(2.0)) && all(at.texel < vec2f(side - 2.0))) {
             at.square = k;
-            at.texel = texel;
             break;
         }
     }
-    if (at.square == u32(sun.irradiance.w)) { return 1.0; }
-    at.texel_m = sun.squares[at.square].w;
     at.depth_m = dot(sun.towards.xyz, p_world);
     let facing = dot(sun.towards.xyz, n_world);
-    let falls = -vec2f(dot(sun.across.xyz, n_world), dot(sun.down.xyz, n_world)) / select(-1.0, 1.0, facing > 0.0);
+    let falls = -vec2f(dot(sun.across.xyz, n_world), dot(sun.down.xyz, n_world)) * select(-1.0, 1.0, facing > 0.0);
     at.slope = falls / max(abs(facing), length(falls) / SUN_STEEPEST);
+    return at;
+}
 
+// The share of the sun's disc that a point sees; n is the normal of the flat surface there, on either side.
+//
+// Adapters in software skip loops of no turns, but neither branches nor what follows a return.
+fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
+    let at = sun_place(p_world, n_world);
     let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * sun.down.w;
-    let highest_m = sun.across.w + sun.down.w - at.depth_m;
-    var radius = max(sun.towards.w * highest_m / at.texel_m, SUN_LEAST_PX);
-    var range = sun_range(at, radius);
-    radius = max(sun.towards.w * max(range.y - at.depth_m, 0.0) / at.texel_m, SUN_LEAST_PX);
-    range = sun_range(at, radius);
+    let px_per_m = sun.towards.w / at.texel_m;
+    var highest_m = sun.across.w + sun.down.w - at.depth_m;
+    var radius = 0.0;
+    var range = vec2f(0.0);
+    let inside = at.square < u32(sun.irradiance.w);
+    var turns = select(0u, 1u, inside);
+    for (var i = 0u; i < turns; i++) {
+        radius = max(px_per_m * highest_m, SUN_LEAST_PX);
+        range = sun_range(at, radius) - at.depth_m;
+        highest_m = max(range.y, 0.0);
+        turns = select(1u, 2u, radius > SUN_BLOCK);
+    }
+    radius = max(px_per_m * highest_m, SUN_LEAST_PX);
     let tilt_m = length(at.slope) * (radius + 1.0) * at.texel_m + bias_m;
-    if (range.y <= at.depth_m + 2.0 * bias_m - tilt_m) { return 1.0; }
-    if (range.x > at.depth_m + tilt_m) { return 0.0; }
+    let is_shaded = inside && range.x > tilt_m;
+    let is_lit = !inside || range.y <= 2.0 * bias_m - tilt_m;
 
     var blockers = 0.0;
     var rise_m = 0.0;
-    for (var k = 0u; k < SUN_SEARCH; k++) {
-        let rise = sun_rise(at, radius * sun_tap(k, SUN_SEARCH));
+    var tap = first_sun_tap();
+    let looks = select(SUN_SEARCH, 0u, is_shaded || is_lit);
+    for (var k = 0u; k < looks; k++) {
+        let rise = sun_rise(at, radius * sqrt(tap.order / f32(SUN_SEARCH)) * tap.across);
         let blocks = select(0.0, 1.0, rise > bias_m);
         blockers += blocks;
         rise_m += blocks * rise;
+        tap = next_sun_tap(tap);
     }
-    if (blockers == 0.0) { return 1.0; }
-    radius = max(sun.towards.w * (rise_m / blockers) / at.texel_m, SUN_LEAST_PX);
+    radius = max(px_per_m * rise_m / max(blockers, 1.0), SUN_LEAST_PX);
+    tap = first_sun_tap();
     var open = 0.0;
-    for (var k = 0u; k < SUN_TAPS; k++) {
-        open += select(0.0, 1.0, sun_rise(at, radius * sun_tap(k, SUN_TAPS)) <= bias_m);
+    let taps = select(0u, SUN_TAPS, blockers > 0.0);
+    for (var k = 0u; k < taps; k++) {
+        open += select(0.0, 1.0, sun_rise(at, radius * sqrt(tap.order / f32(SUN_TAPS)) * tap.across) <= bias_m);
+        tap = next_sun_tap(tap);
     }
-    return open / f32(SUN_TAPS);
+    return select(select(open / f32(SUN_TAPS), 1.0, blockers == 0.0), 0.0, is_shaded);
+}
+
+@fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let flat_normal = cross(dpdx(v.p_world), dpdy(v.p_world));
+    let n = select(v.n_world, normalize(flat_normal), dot(flat_normal, flat_normal) > 0.0);
+    let facing = dot(v.n_world, sun.towards.xyz) * select(-1.0, 1.0, front);
+    turn_sun_pattern(vec2u(v.position.xy));
+    var seen = 0.0;
+    for (var i = 0u; i < select(0u, 1u, TRANSMITS | (facing > 0.0)); i++) { seen = sun_visibility(v.p_world, n); }
+    return vec4f(seen);
 }
