@@ -1,4 +1,4 @@
-"""The sun that leaves the light map, for paths: what to leave out of their first light, and its light by shadow rays."""
+"""The sun that leaves the light map: what paths leave out of their first light, and its light by shadow rays."""
 
 from __future__ import annotations
 
