@@ -69,11 +69,12 @@ def test_plane_under_a_lamp_receives_the_inverse_square(tmp_path: Path) -> None:
 
 
 def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) -> None:
-    sun = DirectionalLight((0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
-    paper = replace(plane(), materials={"black": Material(kt_d=0.4)}, lights=(sun,))
+    weak = DirectionalLight((0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+    sun = DirectionalLight((0.1, 1.0, 0.0), (2.0, 2.0, 2.0))  # brighter, so that the map leaves it out
+    paper = replace(plane(), materials={"black": Material(kt_d=0.4)}, lights=(weak, sun))
     store = bake(paper, tmp_path / "s", quality=TINY)
     assert not known(store).any()
-    assert np.allclose(known(store, "traced_back"), 1.0, rtol=1e-5)
+    assert np.allclose(known(store, "traced_back"), 1.0, rtol=0.1)
 
 
 def test_opaque_objects_have_no_far_side(tmp_path: Path) -> None:

@@ -84,6 +84,15 @@ def test_brightest_of_two_suns_is_taken_and_the_halo_stays() -> None:
     assert with_halo is not None and np.degrees(with_halo.record.radius_rad) < 1.3
 
 
+def test_lights_along_one_direction_are_one_sun() -> None:
+    strong, along, other = (
+        DirectionalLight(d, (e, e, e))
+        for d, e in (((0.0, -1.0, 0.0), 2.0), ((0.0, -3.0, 0.0), 1.0), ((0.1, -1, 0), 2.5))
+    )
+    found = sun_of(Scene("lights", (), {}, lights=(along, other, strong)))
+    assert found is not None and found.picture is None and found.record.irradiance == (3.0, 3.0, 3.0)
+
+
 def environment_file(folder: Path, picture: Floats, name: str = "sky.exr") -> ImageEnvironment:
     write_image(folder / name, picture)
     return ImageEnvironment(folder / name, rotation_deg=30.0, scale=2.0, layout="lat-long")

@@ -24,6 +24,7 @@ BRIGHT = 8.0  # times the mean radiance: less is no sun
 SHARE = 0.05  # of the light from all around that a sun brings: with less, its shadow hardly shows
 LARGEST_RAD = np.radians(5.0)
 HALO = 3.0  # times the radius that holds half of the light: beyond it lies a halo, which is left in the sky
+ALIGNED = 1e-6  # of 1 - cos: directional lights from there are one sun
 RING_PX = 3.0  # around the sun, whose median is the sky behind it
 
 
@@ -51,15 +52,18 @@ class FoundSun:
 def sun_of(scene: Scene) -> FoundSun | None:
     """The sun that brings a scene the most light; None where there is none. Others stay in the light map."""
     lights = [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
-    suns = [FoundSun(_of_light(light)) for light in lights]
+    suns = [FoundSun(_of_lights(light, lights)) for light in lights]
     if scene.environment is not None and (found := _of_environment(scene.environment)) is not None:
         suns.append(found)
     return max(suns, key=lambda one: float(luminance(np.array(one.record.irradiance))), default=None)
 
 
-def _of_light(light: DirectionalLight) -> SunRecord:
-    towards = -normalize(np.asarray(light.direction, float))
-    return SunRecord(direction=triple(towards), irradiance=light.irradiance, radius_rad=0.0)
+def _of_lights(light: DirectionalLight, lights: list[DirectionalLight]) -> SunRecord:
+    """The sun that a light is, with all that shine along it."""
+    towards = [-normalize(np.asarray(one.direction, float)) for one in (light, *lights)]
+    along = [one for one, w in zip(lights, towards[1:], strict=True) if w @ towards[0] > 1 - ALIGNED]
+    irradiance = np.sum([one.irradiance for one in along], axis=0)
+    return SunRecord(direction=triple(towards[0]), irradiance=triple(irradiance), radius_rad=0.0)
 
 
 @lru_cache(maxsize=4)

@@ -8,11 +8,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.sky.sun import FoundSun
+from lambent.bake.sky.sun import ALIGNED, FoundSun
 from lambent.bake.tracing import rays
 from lambent.core.directions import basis
-
-ALIGNED = 1e-6  # of 1 - cos: a directional light from there is the sun
 
 
 class Sun:
