@@ -194,7 +194,7 @@ def draw_depths(layouts: Layouts, squares: SunSquares, resources: Any) -> Any:
 
 def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
     """The sun of a baked scene, its shadow map drawn; dark where there is none."""
-    if scene.sun is None:
+    if scene.sun is None or not len(scene.faces):
         return SunLight(layouts)
     paths = (camera for path in scene.record.paths for camera in path.keys)
     eyes = np.array([camera.position for camera in (*scene.record.cameras, *paths)], float).reshape(-1, 3)

@@ -95,13 +95,13 @@ def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
     added = np.maximum(picture[row, column] - _behind(picture, row, column, about), 0).astype(np.float32)
 
     arriving = added * _solid_angles(height, width)[row, None]
-    flux = luminance(arriving.astype(float))
-    if flux.sum() < SHARE * total:
+    left_out = luminance(arriving.astype(float))
+    if left_out.sum() < SHARE * total:
         return None
-    about = normalize(flux @ w)
+    about = normalize(left_out @ w)
     # of a disc with the second moment of the pixels, each of which is spread by its interpolation
     spread = (np.pi / height) ** 2 * (1 + (2 * np.sin(row * np.pi / height) * height / width) ** 2) / 6
-    radius_rad = float(np.sqrt(2 * (flux @ (_angles(w, about) ** 2 + spread)) / flux.sum()))
+    radius_rad = float(np.sqrt(2 * (left_out @ (_angles(w, about) ** 2 + spread)) / left_out.sum()))
     if radius_rad > LARGEST_RAD:
         return None
     irradiance = triple(((w @ about)[:, None] * arriving).sum(axis=0))
