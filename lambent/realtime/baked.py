@@ -15,7 +15,7 @@ from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
-from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -62,6 +62,7 @@ class BakedScene:
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
     unit: float = 1.0
+    sun: SunRecord | None = None  # whose direct light the light maps leave out
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe, else the nearest one, else the environment, else None."""
@@ -76,6 +77,10 @@ class BakedScene:
     def far_light(self) -> Probe | None:
         """The environment as a probe: infinitely far, so its centre does not matter."""
         return None if self.environment is None else Probe((0.0, 0.0, 0.0), self.environment)
+
+
+def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
+    return sun and sun.model_copy(update={"irradiance": triple(np.divide(sun.irradiance, unit))})
 
 
 def read_baked(store: Store) -> BakedScene:
@@ -125,6 +130,7 @@ def read_baked(store: Store) -> BakedScene:
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
         unit=unit,
+        sun=_in_units(contract.sun_beside(store), unit),
     )
 
 

@@ -21,8 +21,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "layers": {"texture": {"sample_type": "float", "view_dimension": "2d-array"}},
     "cube": {"texture": {"sample_type": "float", "view_dimension": "cube"}},
     "exact": {"texture": {**_UNFILTERED, "view_dimension": "2d"}},  # loaded, never filtered
+    "depth layers": {"texture": {"sample_type": "depth", "view_dimension": "2d-array"}},
     "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
 }
+
+
+LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
+SHADOW_MAP = "uniform", "depth layers", "exact layers"  # the sun, depths towards it, and their blocks
 
 
 class Layouts:
@@ -34,7 +39,7 @@ class Layouts:
         both = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
         self.frame = self._of("uniform", "sampler", visibility=both)
         self.material = self.of("uniform", "storage", "storage", "sampler", *["flat"] * len(CHANNELS))
-        self.light = self.of("layers")
+        self.light = self.of(*LIGHT)
         self.cube = self.of("cube")
         self.shown = self.of("flat", "sampler")
         self.empty = device.create_buffer(size=16, usage=wgpu.BufferUsage.STORAGE)  # a binding must hold something

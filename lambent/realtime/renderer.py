@@ -36,6 +36,7 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
 from lambent.realtime.passes.planar import PlanarPass
+from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.resources import SceneResources
@@ -72,7 +73,9 @@ class Renderer:
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
         display = TonemapPass(layouts), SmoothPass(layouts)
-        self._passes: tuple[Pass, ...] = (depth, planar, base, light, AccumulatePass(layouts), *display)
+        self._passes: tuple[Pass, ...] = (
+            depth, SunPass(layouts), planar, base, light, AccumulatePass(layouts), *display
+        )  # fmt: skip
         self._targets, self._timer = Targets(device), PassTimer(device)
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, self.resources.sampler)

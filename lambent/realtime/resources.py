@@ -19,6 +19,7 @@ from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.pipelines import VERTEX_FLOATS
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.structs import OBJECT_DTYPE
+from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import cube_texture, upload, with_alpha
 from lambent.store.contract import ObjectRecord
@@ -66,7 +67,6 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
-        self.light_group = layouts.group(layouts.light, self.light_view)
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
         self._environment = cube_texture(device, [environment])
         self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
@@ -86,13 +86,16 @@ class SceneResources:
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         whole = (r for r in records if r.name not in self.masked)
         self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.sun = sun_light(layouts, scene, self)
 
     @cached_property
     def noise_group(self) -> Any:
-        """Stands in for `light_group`: the noise of the light map."""
+        """Group 3 that shows the noise of the light map instead of its light, without a sun."""
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
-        return self._layouts.group(self._layouts.light, light_layers(self._layouts.device, *grey))
+        dark = SunLight(self._layouts)
+        view = light_layers(self._layouts.device, *grey)
+        return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
 def light_layers(device: Any, front: Floats | None, back: Floats | None, direction: Floats | None = None) -> Any:

@@ -4,7 +4,9 @@
     geometry/uv, uv2                       (V, 2) float32; uv2 in [0, 1] is the light map's
     geometry/faces                         (T, 3) uint32, sorted by object; ObjectRecord has the range of each
     light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; the centre of texel (row,
-                                           column) is at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
+                                           column) is at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip.
+                                           meta["sun"], may be absent: the SunRecord whose direct light is left out, for
+                                           a shadow map to add; its light from other surfaces is in the map
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before denoising; may be absent
@@ -132,6 +134,14 @@ class ObjectRecord(_Record):
     probe: bool = False  # wants probe/NAME/*
 
 
+class SunRecord(_Record):
+    """A disc in the sky: unit direction towards it, W/m^2 on a surface that faces it, angular radius."""
+
+    direction: Triple
+    irradiance: Triple
+    radius_rad: float = Field(ge=0, le=0.2)
+
+
 class TexturesRecord(_Record):
     """See scenes.scene.MaterialTextures: PART -> its uv transform; the texels are arrays."""
 
@@ -257,6 +267,22 @@ def radiance_unit(store: Store, name: str) -> float:
         expected = f"a number from 1 to {MOST_UNIT:g}"
         raise UserError("broken store", file=store.folder, field=f"{name}: unit", got=unit, expected=expected)
     return float(unit)
+
+
+def sun_beside(store: Store) -> SunRecord | None:
+    """The sun whose direct light the light map leaves out; None where it has all light, as earlier stores have."""
+    name = f"light_map/{SIDES[0]}"
+    said = store.artefact(name).meta.get("sun") if name in store else None
+    if said is None:
+        return None
+    try:
+        sun = SunRecord.model_validate(said)
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    numbers = np.array([*sun.direction, *sun.irradiance, sun.radius_rad])
+    if not np.isfinite(numbers).all() or abs(np.linalg.norm(sun.direction) - 1) > 1e-3:
+        raise UserError("broken store", file=store.folder, field=f"{name}: sun", got=str(said))
+    return sun
 
 
 def noise_name(side: str) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light.cache import LightMapCache
 from lambent.bake.probes.centre import encloses, flat_axis, places_above, probe_centre
 from lambent.bake.probes.division import HIDDEN, family
 from lambent.bake.probes.hidden import hidden_share, parallax_deg, seen_along, seen_from, spread
@@ -36,7 +35,7 @@ class ProbeSet:
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
         self._scene = self._builder.scene
         self._left_out: tuple[frozenset[str], Any] | None = None
-        self._cache = None if irradiance is None else LightMapCache(self._builder, irradiance, irradiance_back)
+        self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
 
     @cached_property
     def _solids(self) -> SolidTest:

@@ -102,8 +102,9 @@ class LightPass:
 
     def encode(self, context: FrameContext) -> Steps:
         """Draw the bands of the target, which becomes the frame's radiance."""
-        resources, format = context.resources, context.target.radiance.format
-        light = resources.noise_group if context.state.show == LIGHT_MAP_NOISE else resources.light_group
+        resources, format, layouts = context.resources, context.target.radiance.format, self._layouts
+        shows_noise = context.state.show == LIGHT_MAP_NOISE
+        light = resources.noise_group if shows_noise else layouts.group(layouts.light, *context.light)
         masked = resources.masked if context.blends_masks else set()
         fringes = [draw for draw in context.draws if draw.item.record.name in masked]
         draws, is_whole = context.draws, context.redrawn is None

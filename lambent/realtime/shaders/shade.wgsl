@@ -3,8 +3,11 @@
 #include "vertex.wgsl"
 #include "surface.wgsl"
 #include "dominant_direction.wgsl"
+#include "sun_record.wgsl"
 
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
+@group(3) @binding(1) var<uniform> sun: Sun;
+@group(3) @binding(2) var sun_seen: texture_2d<f32>; // share of its disc by pixel, of sun.wgsl
 
 const FRONT = 0u;     // irradiance on the side of the normal
 const BACK = 1u;      // on the other
@@ -54,16 +57,20 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     var s = shading_frame(v, select(-1.0, 1.0, front), view);
     let wo = normalize(vec3f(dot(view, s.t), dot(view, s.b), dot(view, s.n)));
 
+    let mesh = mesh_frame(v);
+    let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
+    let direct = sun.irradiance.rgb * textureLoad(sun_seen, vec2i(v.position.xy), 0).r;
     let e_front = light_map(FRONT, v.uv2);
     let e_back = light_map(BACK, v.uv2);
-    let e_here = select(e_back, e_front, front);
-    let e_beyond = select(e_front, e_back, front);
-    var e_bent = e_here;
+    var e_here = select(e_back, e_front, front);
+    let e_beyond = select(e_front, e_back, front) + max(-facing, 0.0) * direct;
+    var e_bent = e_here + max(facing, 0.0) * direct;
     if ((TEXTURES & 8u) != 0u && front) {
-        let mesh = mesh_frame(v);
         let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
-        e_bent *= bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
+        e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
+        e_bent += select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0) * direct;
     }
+    e_here += max(facing, 0.0) * direct;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
