@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -91,10 +92,13 @@ def command(
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
+    from lambent.store.contract import LAST_RUN, TIMINGS
 
     if output is None and not propose:
         raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
+    start = time.perf_counter()
     what = load_scene(scene)
+    loading = time.perf_counter() - start
     edited, changed = _edited(what, output, view or [], edit)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
@@ -115,9 +119,11 @@ def command(
             light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
-    seconds = store.documents.get("timings", {})
-    facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings}
-    rows = [(name, f"{value:.1f} s") for name, value in seconds.items()]
+    seconds, run = store.documents.get(TIMINGS, {}), {"loading": loading, **store.documents.get(LAST_RUN, {})}
+    run["other"] = time.perf_counter() - start - sum(value for step, value in run.items() if step != "other")
+    facts = {"store": output, "arrays": arrays, "seconds": seconds, "this_run": run, "warnings": what.warnings}
+    rows = [(name, f"{value:.1f} s") for name, value in {**seconds, **run}.items()]
+    rows.append(("this run", f"{sum(run.values()):.1f} s"))
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
 
 
