@@ -23,7 +23,7 @@ from lambent.core.geometry import cross_2d
 
 CELLS = 600  # at most, per size of the reflector, the root of its area
 FEWEST_CELLS = 32  # where a scene has very many reflectors
-CELLS_OF_ALL = 8 * CELLS**2  # plans of one scene together take no more: some 3 s
+CELLS_OF_ALL = 6 * CELLS**2  # plans of one scene together take no more: some 2 s
 MOST_CELLS = 2048  # along one side
 SPREAD = 4.0  # times the reflector's area: a rectangle around it that is larger has coarser cells
 HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, over the reflector, in shares of its size
@@ -69,6 +69,25 @@ def shared_cells(areas_m2: Sequence[float]) -> list[float]:
     return [float(count) for count in cells(low)]
 
 
+def may_have_walls(faces: Floats, normal: Floats, corners: Floats) -> bool:
+    """Whether a triangle crosses a plane at one of HEIGHTS over the rectangle around a reflector, or close to it."""
+    axes = np.stack(basis(normal), axis=1)
+    flat = faces @ axes
+    size = _size(flat)
+    low, high = flat.reshape(-1, 2).min(axis=0) - NEAR * size, flat.reshape(-1, 2).max(axis=0) + NEAR * size
+    height = corners @ normal - float((faces @ normal).mean())
+    for over in HEIGHTS:
+        cut = _cut(height - over * size, corners) @ axes
+        if ((cut.max(axis=1) >= low) & (cut.min(axis=1) <= high)).all(axis=1).any():
+            return True
+    return False
+
+
+def _size(flat: Floats) -> float:
+    """Root of the area of triangles (K, 3, 2)."""
+    return float(np.sqrt(np.abs(cross_2d(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])).sum() / 2))
+
+
 def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CELLS) -> FloorPlan | None:
     """Plan of a reflector of the triangles `faces` (K, 3, 3), all in a plane of unit normal (3,); None without walls.
 
@@ -78,7 +97,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     across, along = basis(normal)
     axes = np.stack([across, along], axis=1)
     flat = faces @ axes
-    size = float(np.sqrt(np.abs(cross_2d(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])).sum() / 2))
+    size = _size(flat)
     low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
     sides = high - low
     cell = max(size, float(np.sqrt(sides.prod() / SPREAD))) / cells
@@ -120,14 +139,17 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
+    if not (covered & standing).any():
+        return covered
     pieces, count = label(covered & ~standing)
-    inner = _eroded(pieces > 0)
+    rim = np.flatnonzero((pieces > 0) & ~_eroded(pieces > 0))
+    edge = np.flatnonzero(covered & ~_eroded(covered))
     cells = np.bincount(pieces.ravel(), minlength=count + 1)
-    border = np.bincount(pieces[~inner], minlength=count + 1)
-    at_edge = np.bincount(pieces[~_eroded(covered)], minlength=count + 1) > 0
+    border = np.bincount(pieces.ravel()[rim], minlength=count + 1)
+    at_edge = np.bincount(pieces.ravel()[edge], minlength=count + 1) > 0
     strip = at_edge & (2 * cells <= width * border)
     strip[0] = False
-    return np.asarray(covered & ~strip[pieces])
+    return np.asarray(covered & ~strip[pieces]) if strip.any() else covered
 
 
 def _eroded(covered: Flags) -> Flags:

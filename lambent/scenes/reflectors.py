@@ -13,7 +13,7 @@ be a whole object: the top of a table is found, its edge and its legs are not. `
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -27,7 +27,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.materials.document import Material
-from lambent.scenes.floor_plan import FloorPlan, floor_plan, shared_cells
+from lambent.scenes.floor_plan import FloorPlan, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
@@ -94,17 +94,19 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         mine = mine[np.isin(owner, parts)]
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
+    return tuple(sorted(_with_walls(large, scene), key=lambda r: -r.area_m2))
+
+
+def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
+    """The reflectors, those with walls on their edges with a floor plan."""
     corners = scene.corners
-    meshes = {o.name: o.mesh for o in candidates}
-    shares = zip(large, shared_cells([r.area_m2 for r in large]), strict=True)
-    return tuple(sorted((_with_walls(r, meshes, corners, n) for r, n in shares), key=lambda r: -r.area_m2))
-
-
-def _with_walls(found: Reflector, meshes: Mapping[str, Mesh], corners: Floats, cells: float) -> Reflector:
-    """The reflector with its floor plan; `corners` (F, 3, 3) are the triangles of the scene."""
-    n = np.array(found.plane[:3])
-    faces = np.concatenate([meshes[part.object].corners[part.faces] for part in found.parts])
-    return replace(found, plan=floor_plan(faces, n, corners, cells))
+    meshes = {o.name: o.mesh for o in scene.objects}
+    faces = [np.concatenate([meshes[part.object].corners[part.faces] for part in r.parts]) for r in found]
+    normals = [np.array(r.plane[:3]) for r in found]
+    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], corners)]
+    cells = shared_cells([found[i].area_m2 for i in walled])
+    plans = {i: floor_plan(faces[i], normals[i], corners, n) for i, n in zip(walled, cells, strict=True)}
+    return [replace(r, plan=plans.get(i)) for i, r in enumerate(found)]
 
 
 def is_glossy(material: Material) -> bool:
