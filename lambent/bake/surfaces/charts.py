@@ -22,7 +22,9 @@ from lambent.scenes.scene import Mesh, SceneObject
 PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
 SMALL = 12.0  # texels: a smaller chart may be merged with others
 SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
-LONGEST = 24.0  # texels: side of a merged chart
+ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
+LONGEST = 24.0  # texels: a merged chart with a longer side is halved even where that takes a little more...
+TRIED = 1.03  # ...up to this, because halves of halves may take less
 MIXED = 0.1  # texels that one texel is worth whose faces are mixed over a depth of one texel
 
 
@@ -153,44 +155,62 @@ def _in_metres(world: Floats, uv: Floats, label: Indices) -> Floats:
     return np.asarray(uv * scale[label][:, None])
 
 
-def texels_taken(corners: Floats) -> float:
-    """Texels of a rectangle around a chart (K, 3, 2), as it is packed."""
-    return float((np.maximum(np.ptp(corners.reshape(-1, 2), axis=0), 1) + 1).prod())
+def texels_taken(extents: Floats) -> Floats:
+    """Texels of rectangles (..., 2) as they are packed: sides are a texel long at least."""
+    return np.asarray((np.maximum(extents, 1) + 1).prod(axis=-1))
+
+
+def upright(corners: Floats) -> Floats:
+    """A chart (K, 3, 2) turned so that the rectangle around it takes fewest texels, of ANGLES and its longest edge."""
+    edges = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
+    longest = edges[(edges**2).sum(axis=1).argmax()]
+    turns = _turns(np.append(ANGLES, np.arctan2(longest[1], longest[0])))
+    taken = texels_taken(np.ptp(corners.reshape(-1, 2) @ turns, axis=1))
+    return np.asarray(corners @ turns[taken.argmin()])
+
+
+def _turns(angles: Floats) -> Floats:
+    """(N, 2, 2) rotations by -angles, of rows from the left."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
 def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list[Chart]:
     """Charts of an object, small ones merged where that takes fewer texels."""
-    small, kept = [], []
+    kept, small, lost, taken = [], [], [], 0.0
     for chart in charts:
         if not chart.corners.size:
-            small.append((chart, np.inf))
+            lost.append(chart.faces)
             continue
         edge = chart.corners - chart.corners[:, :1]
-        area, taken = float(np.abs(cross_2d(edge[:, 1], edge[:, 2])).sum() / 2), texels_taken(chart.corners)
-        if area < SMALL or area < SLIM * taken:
-            small.append((chart, taken))
+        area = float(np.abs(cross_2d(edge[:, 1], edge[:, 2])).sum() / 2)
+        here = float(texels_taken(np.ptp(chart.corners.reshape(-1, 2), axis=0)))
+        if area < SMALL or area < SLIM * here:
+            small.append(chart)
+            taken += here
         else:
             kept.append(chart)
-    if not small:
-        return kept
-    faces = np.concatenate([chart.faces for chart, _ in small])
-    merged = _by_direction(mesh, owner, faces, size_m[faces])
-    if sum(texels_taken(chart.corners) for chart in merged) < sum(taken for _, taken in small):
-        return kept + merged
-    return kept + [chart for chart, _ in small]
+    if small:
+        merged = _by_direction(mesh, owner, np.concatenate([chart.faces for chart in small]), size_m, 1)
+        extents = np.array([np.ptp(chart.corners.reshape(-1, 2), axis=0) for chart in merged])
+        kept += merged if texels_taken(extents).sum() < taken else small
+    if lost:
+        kept += _by_direction(mesh, owner, np.concatenate(lost), size_m, 2 + len(charts))
+    return kept
 
 
-def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats) -> list[Chart]:
-    corners = mesh.positions[mesh.faces[faces]].astype(float)
+def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
+    """Merged charts of some faces; vertices of different `first` differ. `size_m` (F,) is of all faces."""
+    corners, size_m = mesh.positions[mesh.faces[faces]].astype(float), size_m[faces]
     normals, areas = triangle_normals(corners), triangle_areas(corners)
     axis = np.abs(normals).argmax(axis=1)
     towards = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
-    charts, count = [], len(mesh.positions)
+    charts: list[Chart] = []
     for direction in np.unique(towards):
         for mine in _clusters(corners, areas, size_m, np.flatnonzero(towards == direction), direction // 2):
             flat = np.delete(corners[mine], direction // 2, axis=2) / _mean_size(areas[mine], size_m[mine])
-            number = mesh.faces[faces[mine]].astype(np.int64) + count * (1 + len(charts))
-            charts.append(Chart(owner, faces[mine], flat, -number))  # negative: none of a chart by xatlas
+            number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
+            charts.append(Chart(owner, faces[mine], upright(flat), -number))  # negative: none of a chart by xatlas
     return charts
 
 
@@ -200,13 +220,14 @@ def _mean_size(areas: Floats, size_m: Floats) -> float:
 
 def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, depth: int) -> list[Indices]:
     """Faces in groups that lie close together, each halved as long as that costs less."""
-    centres = corners.mean(axis=1)
+    centres, turns = corners.mean(axis=1), _turns(ANGLES)
 
     def cost(mine: Indices) -> tuple[float, float]:
         size = _mean_size(areas[mine], size_m[mine])
-        extent = np.ptp(corners[mine].reshape(-1, 3), axis=0) / size
-        sides = np.maximum(np.delete(extent, depth), 1)
-        return float((sides + 1).prod() + MIXED * areas[mine].sum() / size**2 * extent[depth]), float(sides.max())
+        points = corners[mine].reshape(-1, 3) / size
+        sides = np.ptp(np.delete(points, depth, axis=1) @ turns, axis=1)
+        mixed = areas[mine].sum() / size**2 * np.ptp(points[:, depth])
+        return float(texels_taken(sides).min() + MIXED * mixed), float(sides[0].max())
 
     left, found = [(faces, *cost(faces))], []
     while left:
@@ -218,7 +239,7 @@ def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, de
             if lower.any() and not lower.all():
                 halves = [(half, *cost(half)) for half in (mine[lower], mine[~lower])]
                 best = min(best, (halves[0][1] + halves[1][1], halves), key=lambda one: one[0])
-        if best[1] and (best[0] < price or side > LONGEST):
+        if best[1] and best[0] < (TRIED * price if side > LONGEST else price):
             left += best[1]
         else:
             found.append(mine)

@@ -53,7 +53,7 @@ def packed(charts: list[Floats], sizes: list[tuple[int, int]]) -> tuple[Indices,
 
 @numba.njit(cache=True)
 def _touched(corners: Floats, width: int, height: int, taken: NDArray[np.uint8]) -> None:
-    """Mark cells less than a texel, along rows and columns, from a triangle (F, 3, 2): they meet its square of 2 x 2."""
+    """Mark cells less than a texel from a triangle (F, 3, 2), along rows and columns: it meets their 2 x 2 squares."""
     for f in range(len(corners)):
         t = corners[f]
         low_x, high_x = min(t[0, 0], t[1, 0], t[2, 0]), max(t[0, 0], t[1, 0], t[2, 0])
