@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from lambent.bake.context import GEOMETRY, BakeContext
+from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.quality import QualityName
 from lambent.bake.surfaces.atlas import merged, object_records, unwrap
@@ -17,7 +18,7 @@ from lambent.store.textures import texture_records, write_textures
 
 KIND = "geometry"
 NEEDS = ()
-REVISION = 2
+REVISION = 3
 REFLECTORS = "reflectors"  # document: the key of everything that reflectors in the scene record depend on
 
 
@@ -37,7 +38,10 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    atlas = unwrap(context.scene, context.settings(KIND).texels, context.progress)
+    engine()  # before Mitsuba is imported
+    from lambent.bake.tracing.viewed import texel_sizes
+
+    atlas = unwrap(context.scene, context.settings(KIND).texels, context.progress, texel_sizes)
     meta = {"light_map_size": [atlas.width, atlas.height]}
     for name, array in merged(atlas).items():
         context.put(KIND, f"geometry/{name}", array, meta)
