@@ -19,6 +19,7 @@ from typing import cast
 from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
+from lambent.bake.cuts import cut_for_viewers
 from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
@@ -115,7 +116,7 @@ def bake(
         timed = Stopwatch(store)
         undivided = scene
         if "geometry" in order:
-            scene = divided(scene, store, progress, timed)
+            scene = cut_for_viewers(divided(scene, store, progress, timed), store, timed)
         store.set_document("changes", changes)
         write_source(store, scene)
         if not resume:

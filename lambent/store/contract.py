@@ -107,6 +107,7 @@ from lambent.store.store import MANIFEST, Store
 
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
+CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for which viewers
 TIMINGS = "timings"  # of every step, in seconds
 LAST_RUN = "last_run"  # those of the last bake alone, and "other"
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from lambent.bake.context import GEOMETRY, BakeContext
+from lambent.bake.cuts import longest_piece
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.quality import QualityName
@@ -41,7 +42,8 @@ def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
     from lambent.bake.tracing.viewed import texel_sizes
 
-    atlas = unwrap(context.scene, context.settings(KIND).texels, context.progress, texel_sizes)
+    texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)
+    atlas = unwrap(context.scene, texels, context.progress, texel_sizes, longest_m)
     meta = {"light_map_size": [atlas.width, atlas.height]}
     for name, array in merged(atlas).items():
         context.put(KIND, f"geometry/{name}", array, meta)

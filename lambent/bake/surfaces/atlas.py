@@ -33,14 +33,21 @@ class Atlas:
     height: int
 
 
-def unwrap(scene: Scene, resolution: int, progress: Progress = silent, sizes: Sizes | None = None) -> Atlas:
+def unwrap(
+    scene: Scene,
+    resolution: int,
+    progress: Progress = silent,
+    sizes: Sizes | None = None,
+    longest_m: float = np.inf,
+) -> Atlas:
     """Parametrise all objects of a scene into one light map.
 
     Its surface takes about `resolution` x `resolution` texels, the map some more. Texels have the `sizes` that a
-    function finds, of equal size on all objects without one, over their `light_map_scale`. The result is deterministic.
+    function finds, of equal size on all objects without one, over their `light_map_scale`. The size changes from one
+    part of an object to the next, none of which is longer than `longest_m`. The result is deterministic.
     """
     progress(0, 1, "unwrapping")
-    pieces = pieces_of(scene.objects)
+    pieces = pieces_of(scene.objects, longest_m)
     sizes_m = (sizes or even)(scene, pieces, resolution**2)
     charts = charts_of(scene.objects, pieces, sizes_m)
     local, measures = zip(*(snapped(chart.corners) for chart in charts), strict=True)

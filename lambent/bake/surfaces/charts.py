@@ -49,18 +49,22 @@ class Chart:
     vertices: Indices
 
 
-def pieces_of(objects: tuple[SceneObject, ...]) -> list[Piece]:
-    """All faces in spatially compact pieces of at most PIECE_FACES (halved at the median of the longest side)."""
+def pieces_of(objects: tuple[SceneObject, ...], longest_m: float = np.inf) -> list[Piece]:
+    """All faces in spatially compact pieces of at most PIECE_FACES (halved at the median of the longest side).
+
+    The middles of a piece's faces are no further apart than `longest_m`.
+    """
     pieces = []
     for owner, o in enumerate(objects):
         centres = o.mesh.positions[o.mesh.faces].mean(axis=1)
         left: list[Indices] = [np.arange(len(o.mesh.faces))]
         while left:
             part = left.pop()
-            if len(part) <= PIECE_FACES:
+            extent = np.ptp(centres[part], axis=0)
+            if len(part) <= PIECE_FACES and extent.max() <= longest_m:
                 pieces.append(Piece(owner, np.sort(part)))
                 continue
-            axis = np.argmax(np.ptp(centres[part], axis=0))
+            axis = np.argmax(extent)
             order = part[np.argsort(centres[part, axis], kind="stable")]
             left += [order[len(order) // 2 :], order[: len(order) // 2]]
     return pieces

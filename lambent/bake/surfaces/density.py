@@ -16,10 +16,10 @@ import numpy as np
 from lambent.core.arrays import Floats, Indices
 from lambent.scenes.scene import Scene
 
-SOFTER = 1 / 2  # in place of 2/3
-SPREAD = 3.0  # times the size of a typical texel that texels of unseen parts have, and seen ones at most and at least
+SOFTER = 1 / 3  # in place of 2/3
+SPREAD = 2.5  # times the size of a typical texel that texels of unseen parts have, and seen ones at most and at least
 AT_MOST = 1.5  # times a part's share of all that is seen: its share of texels
-UNSEEN = 0.02  # share of the texels that a part that is hardly seen may take
+UNSEEN = 0.1  # share of the texels that parts which are hardly seen may take, by area
 COARSE = 4.0  # times as large as a texel should be: what is worth a warning
 NOTABLE = 0.01  # share of all that is seen, below which an object gets no warning
 WARNINGS = 5
@@ -40,7 +40,7 @@ def sizes_seen(areas_m2: Floats, scales: Floats, views: Views, texels: int) -> F
     middle = order[np.searchsorted(np.cumsum(views.share[order]), views.share.sum() / 2).clip(0, len(order) - 1)]
     typical = density[middle]
     wanted = np.clip(density, typical / SPREAD**2, typical * SPREAD**2) * areas_m2 * scales**2
-    most = np.maximum(AT_MOST * views.share, UNSEEN) * scales**2 * texels
+    most = np.maximum(AT_MOST * views.share, UNSEEN * areas_m2 / areas_m2.sum()) * scales**2 * texels
     low, high = 0.0, 1e3 * texels / wanted.sum()
     for _ in range(60):
         factor = (low + high) / 2

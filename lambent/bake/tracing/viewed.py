@@ -7,6 +7,7 @@ them towards those places.
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from typing import Any
 
 import mitsuba as mi
@@ -26,8 +27,35 @@ log = logging.getLogger(__name__)
 RAYS = 1 << 18
 FEW = 64  # rays that meet a part: with fewer, points on it are looked from
 LOOKS = 256  # back from each of those
-WALK = 3.0  # times the median distance of what cameras see: places further off are not walked to
-NEAREST = 1 / 4  # of the median distance: viewers do not come closer
+NEAREST = 0.1  # of how far viewers see: what is closer is behind them, as the wall that a camera stands against
+
+
+@dataclass(frozen=True)
+class Viewers:
+    """Eyes (E, 3) of the viewers of a scene, and how far they see: nine tenths of their looks end within `reach_m`."""
+
+    eyes: Floats
+    reach_m: float
+
+
+def viewers_of(scene: Scene) -> Viewers | None:
+    """Eyes at the cameras and at free places in view of them, half each; None without cameras, or if they see nothing.
+
+    Places that are further away than cameras see are left out: rays that leave by a window end far outside.
+    """
+    cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
+    opaque = _opaque(scene)
+    if not cameras or not len(opaque):
+        return None
+    eyes = np.array([camera.position for camera in cameras], float)
+    traced = _traced(scene.corners.astype(float)[opaque])
+    _, distance = _seen(traced, eyes, RAYS // 16)
+    if not len(distance):
+        return None
+    reach = float(np.quantile(distance, 0.9))
+    places = viewing_places(scene, traced)
+    places = places[np.linalg.norm(places[:, None] - eyes, axis=2).min(axis=1) < reach]
+    return Viewers(np.concatenate([np.resize(eyes, (max(len(places), len(eyes)), 3)), places]), reach)
 
 
 def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
@@ -35,44 +63,40 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
 
     Objects that get far larger texels than viewers need are logged as warnings.
     """
-    faces_of_objects = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
-    piece_of = np.zeros(faces_of_objects[-1], np.int64)
-    for number, piece in enumerate(pieces):
-        piece_of[faces_of_objects[piece.owner] + piece.faces] = number
-    clear = np.repeat(
-        [scene.materials[o.material].transmits or _has_holes(scene, o.material) for o in scene.objects],
-        [len(o.mesh.faces) for o in scene.objects],
-    )
-    opaque = np.flatnonzero(~clear)
-    cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
-    if not cameras or not len(opaque):
+    viewers, opaque = viewers_of(scene), _opaque(scene)
+    if viewers is None:
         return even(scene, pieces, texels)
+    eyes, nearest = viewers.eyes, NEAREST * viewers.reach_m
+    first = np.cumsum([0] + [len(o.mesh.faces) for o in scene.objects])
+    faces = [first[piece.owner] + piece.faces for piece in pieces]
+    piece_of = np.zeros(first[-1], np.int64)
+    for number, mine in enumerate(faces):
+        piece_of[mine] = number
     corners = scene.corners.astype(float)
     traced = _traced(corners[opaque])
-    eyes = np.array([camera.position for camera in cameras], float)
-    _, distance = _seen(traced, eyes, RAYS // 16)
-    if not len(distance):
-        return even(scene, pieces, texels)
-    places = viewing_places(scene, traced)
-    away = np.linalg.norm(places[:, None] - eyes, axis=2).min(axis=1)
-    places = places[away < WALK * np.median(distance)]
-    eyes = np.concatenate([np.resize(eyes, (max(len(places), len(eyes)), 3)), places])
     face, distance = _seen(traced, eyes, RAYS)
+    face, distance = face[distance > nearest], distance[distance > nearest]
+    if not len(face):
+        return even(scene, pieces, texels)
     areas = areas_of(scene, pieces)
-    nearest = NEAREST * float(np.median(distance))
     part = piece_of[opaque[face]]
     hits = np.bincount(part, minlength=len(pieces))
-    weight = np.bincount(part, 1 / np.maximum(distance, nearest), len(pieces)) / RAYS / np.maximum(areas, 1e-30)
+    weight = np.bincount(part, 1 / distance, len(pieces)) / RAYS / np.maximum(areas, 1e-30)
     share = hits / len(face)
     rare = np.flatnonzero(hits < FEW)
-    faces = [faces_of_objects[pieces[i].owner] + pieces[i].faces for i in rare]
-    weight[rare], solid_angle = _looked_back(traced, [corners[mine] for mine in faces], eyes, nearest)
+    weight[rare], solid_angle = _looked_back(traced, [corners[faces[i]] for i in rare], eyes, nearest)
     share[rare] = areas[rare] * solid_angle * RAYS / len(face)
     sizes = sizes_seen(areas, scales_of(scene, pieces), Views(weight, share), texels)
     owner = np.array([piece.owner for piece in pieces])[part]
-    for warning in coarse_objects(scene, owner, sizes[part], np.maximum(distance, nearest)):
+    for warning in coarse_objects(scene, owner, sizes[part], distance):
         log.warning(warning)
     return sizes
+
+
+def _opaque(scene: Scene) -> Indices:
+    """Numbers of all triangles through which nothing is seen."""
+    clear = [scene.materials[o.material].transmits or _has_holes(scene, o.material) for o in scene.objects]
+    return np.flatnonzero(~np.repeat(clear, [len(o.mesh.faces) for o in scene.objects]))
 
 
 def _has_holes(scene: Scene, material: str) -> bool:
@@ -117,10 +141,12 @@ def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: flo
     points, normals = points_on_triangles(corners, face, rng), triangle_normals(corners)[face]
     eye = eyes[rng.integers(len(eyes), size=len(face))]
     offset = eye - points
-    distance = np.maximum(np.linalg.norm(offset, axis=1), nearest)
+    distance = np.linalg.norm(offset, axis=1)
+    distance = np.maximum(distance, 1e-9)
     cosine = (offset * normals).sum(axis=1) / distance
     normals *= np.where(cosine < 0, -1.0, 1.0)[:, None]
     ray = towards(traced, *(values.astype(np.float32) for values in (points, normals, eye)))
-    seen = np.where(np.array(traced.ray_test(ray)), 0.0, np.abs(cosine).clip(0, 1)) / (4 * np.pi)
+    hidden = np.array(traced.ray_test(ray)) | (distance <= nearest)
+    seen = np.where(hidden, 0.0, np.abs(cosine).clip(0, 1)) / (4 * np.pi)
     by_cube, by_square = ((seen / distance**power).reshape(-1, LOOKS).mean(axis=1) for power in (3, 2))
     return by_cube, by_square
