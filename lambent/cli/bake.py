@@ -99,6 +99,7 @@ def command(
     start = time.perf_counter()
     what = load_scene(scene)
     loading = time.perf_counter() - start
+    _check_lit(what)
     edited, changed = _edited(what, output, view or [], edit)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
@@ -125,6 +126,14 @@ def command(
     rows = [(name, f"{value:.1f} s") for name, value in {**seconds, **run}.items()]
     rows.append(("this run", f"{sum(run.values()):.1f} s"))
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
+
+
+def _check_lit(scene: Scene) -> None:
+    """`UserError` where no picture of the scene could show anything: after its bake that is too late."""
+    shines = scene.environment is not None or scene.lights or any(any(o.emission) for o in scene.objects)
+    if not shines or not scene.cameras:
+        lacks, section = ("nothing gives light", "[environment]") if not shines else ("no camera", "[[cameras]]")
+        raise UserError(lacks, field=scene.name, hint=f"add {section} to its scene.toml")
 
 
 def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:

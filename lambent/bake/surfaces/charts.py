@@ -224,7 +224,7 @@ def _mean_size(areas: Floats, size_m: Floats) -> float:
 
 def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, depth: int) -> list[Indices]:
     """Faces in groups that lie close together, each halved as long as that costs less."""
-    centres, turns = corners.mean(axis=1), _turns(ANGLES)
+    centres, turns = (corners.min(axis=1) + corners.max(axis=1)) / 2, _turns(ANGLES)
 
     def cost(mine: Indices) -> tuple[float, float]:
         size = _mean_size(areas[mine], size_m[mine])

@@ -55,7 +55,7 @@ def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
     def edges(faces: Indices) -> Indices:
         """(F, 3) numbers of the edges opposite to corner 2, 0, 1, whatever vertices they have."""
         ends = np.sort(np.stack([place[faces], place[np.roll(faces, -1, axis=1)]], axis=-1), axis=-1)
-        return np.asarray(ends[..., 0] * (place.max() + 1) + ends[..., 1])
+        return np.asarray((ends[..., 0] << 32) + ends[..., 1])
 
     faces = mesh.faces.astype(np.int64)
     corners = mesh.corners.astype(float)

@@ -41,8 +41,8 @@ def sizes_seen(areas_m2: Floats, scales: Floats, views: Views, texels: int) -> F
     typical = density[middle]
     wanted = np.clip(density, typical / SPREAD**2, typical * SPREAD**2) * areas_m2 * scales**2
     most = np.maximum(AT_MOST * views.share, UNSEEN * areas_m2 / areas_m2.sum()) * scales**2 * texels
-    low, high = 0.0, 1e3 * texels / wanted.sum()
-    for _ in range(60):
+    low, high = 0.0, texels / wanted[wanted > 0].min()
+    for _ in range(100):
         factor = (low + high) / 2
         low, high = (factor, high) if np.minimum(factor * wanted, most).sum() < texels else (low, factor)
     return np.asarray(np.sqrt(areas_m2 / np.maximum(np.minimum(low * wanted, most), 1e-9)))

@@ -8,7 +8,7 @@ recognise(head), which tells a scene by its first bytes.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from importlib.resources import files
@@ -28,6 +28,7 @@ from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
 TOML = ".toml"
+TOLD = 2  # objects that are named one by one in warnings of one kind
 
 
 def load_scene(path_or_builtin: str | Path) -> Scene:
@@ -46,7 +47,21 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     """
     scene, text = _load(path_or_builtin), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    return replace(scene, warnings=(*scene.warnings, *size_warnings(scene)), origin=origin)
+    return replace(scene, warnings=(*counted(scene.warnings), *size_warnings(scene)), origin=origin)
+
+
+def counted(warnings: Sequence[str]) -> list[str]:
+    """Warnings, those that more than TOLD objects share as one with their number, where the first of them was."""
+    shared: dict[str, list[str]] = {}
+    for warning in warnings:
+        name, _, what = warning.partition(": ")
+        shared.setdefault(what, []).append(name)
+    told = dict.fromkeys(
+        warning if not (what := warning.partition(": ")[2]) or len(shared[what]) <= TOLD
+        else f"{len(shared[what])} objects: {what} ({', '.join(shared[what][:TOLD])}, ...)"
+        for warning in warnings
+    )  # fmt: skip
+    return list(told)
 
 
 def _load(path_or_builtin: str | Path) -> Scene:
