@@ -3,8 +3,8 @@
 xatlas parametrises. Its time is quadratic in the size of a smooth chart, and it overruns its memory on a chart of
 80,000 triangles: large meshes are cut into pieces first. A cut costs a seam, nothing else.
 
-Charts of a few texels are mostly border. Those of one object are taken together by the six directions that faces look
-to, and projected along them: faces of one merged chart share texels where one lies behind another.
+Charts of a few texels are mostly border. Flat ones of one object are merged by the six directions that faces look
+to, projected along them: faces of one merged chart share texels where one lies behind another.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ import numpy as np
 import xatlas
 
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import normalize
 from lambent.core.errors import UserError
-from lambent.core.geometry import cross_2d, triangle_areas, triangle_normals
+from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.scenes.scene import Mesh, SceneObject
 
 PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
 SMALL = 12.0  # texels: a smaller chart may be merged with others
+FLAT_DEG = 25.0  # between its normals and their mean, as long as a chart is merged
 SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
 ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
 LONGEST = 24.0  # texels: a merged chart with a longer side is halved even where that takes a little more...
@@ -189,7 +191,7 @@ def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list
         edge = chart.corners - chart.corners[:, :1]
         area = float(np.abs(cross_2d(edge[:, 1], edge[:, 2])).sum() / 2)
         here = float(texels_taken(np.ptp(chart.corners.reshape(-1, 2), axis=0)))
-        if area < SMALL or area < SLIM * here:
+        if (area < SMALL or area < SLIM * here) and _is_flat(mesh, chart.faces):
             small.append(chart)
             taken += here
         else:
@@ -201,6 +203,12 @@ def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list
     if lost:
         kept += _by_direction(mesh, owner, np.concatenate(lost), size_m, 2 + len(charts))
     return kept
+
+
+def _is_flat(mesh: Mesh, faces: Indices) -> bool:
+    """Whether all these faces look almost one way: on rounded things, seams along six directions would be seen."""
+    vectors = area_vectors(mesh.positions[mesh.faces[faces]].astype(float))
+    return bool((normalize(vectors) @ normalize(vectors.sum(axis=0)) > np.cos(np.radians(FLAT_DEG))).all())
 
 
 def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
