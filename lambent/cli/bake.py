@@ -14,7 +14,7 @@ from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.methods import LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
-from lambent.cli.console import Json, progress_bar, say, show, table
+from lambent.cli.console import CreaseAngle, Json, progress_bar, say, show, table
 from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
@@ -81,6 +81,7 @@ def command(
         int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
     ] = None,
     cluster: Annotated[str | None, typer.Option(help="Of interreflections: address of a Dask scheduler.")] = None,
+    crease_angle: CreaseAngle = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
@@ -97,7 +98,7 @@ def command(
     if output is None and not propose:
         raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
     start = time.perf_counter()
-    what = load_scene(scene)
+    what = load_scene(scene, crease_angle)
     loading = time.perf_counter() - start
     _check_lit(what)
     edited, changed = _edited(what, output, view or [], edit)

@@ -19,6 +19,7 @@ from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
+CREASE_ANGLE = "crease_angle"  # document: degrees, or null where the scene's normals are as its files have them
 SURROUNDINGS = "surroundings"  # document: the image that lights views instead of the scene's environment, if any
 SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
 log = logging.getLogger(__name__)
@@ -48,6 +49,7 @@ def write_source(store: Store, scene: Scene) -> None:
     if place is not None and not place.startswith("builtin:"):
         place = Path(os.path.relpath(place, store.folder)).as_posix()
     store.set_document(SOURCE, place)
+    store.set_document(CREASE_ANGLE, scene.crease_deg)
 
 
 def scene_of(store: Store, given: str | None = None) -> Scene:
@@ -64,7 +66,8 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     place = given or store.documents.get(SOURCE)
     if not isinstance(place, str):
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
-    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
+    crease_deg = store.documents.get(CREASE_ANGLE)
+    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place, crease_deg)
     if SCENE not in store.documents:  # baked for edited views alone
         return scene
     record = scene_record(store)

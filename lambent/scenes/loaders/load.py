@@ -21,6 +21,7 @@ from lambent.core.inputs import foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.meshes.creases import leaning_warnings, with_creases
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject
@@ -31,7 +32,7 @@ TOML = ".toml"
 TOLD = 2  # objects that are named one by one in warnings of one kind
 
 
-def load_scene(path_or_builtin: str | Path) -> Scene:
+def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> Scene:
     """The scene of a file, or a built-in one.
 
     Parameters
@@ -39,6 +40,8 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     path_or_builtin : str or Path
         "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light
         and a camera, where such a file has none, are added.
+    crease_deg : float, optional
+        Normals that lean far from their faces become smooth only where faces meet at less than this angle, 0 to 180.
 
     Raises
     ------
@@ -47,7 +50,11 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     """
     scene, text = _load(path_or_builtin), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    return replace(scene, warnings=(*counted(scene.warnings), *size_warnings(scene)), origin=origin)
+    angle = scene.crease_deg if crease_deg is None else crease_deg
+    if angle is not None:
+        scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
+    notes = leaning_warnings(scene.objects) if angle is None else []
+    return replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
 
 
 def counted(warnings: Sequence[str]) -> list[str]:

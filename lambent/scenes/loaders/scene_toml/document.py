@@ -79,6 +79,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),
+        crease_deg=document.crease_angle,
     )
 
 
