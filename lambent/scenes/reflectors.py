@@ -165,7 +165,8 @@ class _Faces:
         near = np.sort(np.asarray(self._by_normal.query_ball_point(plane[:3], chord), int))
         near = near[free[near] & (self.tilt[near] > flat)]
         near = near[self.normal[near] @ plane[:3] > flat]
-        return near[np.abs(self.corners[near] @ plane[:3] + plane[3]).max(axis=1, initial=0) <= FLAT_M]
+        within = np.abs(self.corners[near] @ plane[:3] + plane[3]).max(axis=1, initial=0) <= FLAT_M
+        return np.asarray(near[within])
 
     @cached_property
     def _by_normal(self) -> cKDTree:

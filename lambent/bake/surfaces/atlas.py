@@ -77,7 +77,7 @@ def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
 def even(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
     """Texels of one size on all pieces (N,), over the `light_map_scale` of their objects."""
     areas, scales = areas_of(scene, pieces), scales_of(scene, pieces)
-    return np.sqrt((areas * scales**2).sum() / texels) / scales
+    return np.asarray(np.sqrt((areas * scales**2).sum() / texels) / scales)
 
 
 def _split(mesh: Mesh, charts: list[tuple[Chart, Floats]]) -> tuple[Mesh, Floats]:
@@ -87,8 +87,14 @@ def _split(mesh: Mesh, charts: list[tuple[Chart, Floats]]) -> tuple[Mesh, Floats
         number[chart.faces], uv2[chart.faces] = chart.vertices, corners
     _, first, faces = np.unique(number, return_index=True, return_inverse=True)
     source = mesh.faces.reshape(-1)[first]
-    arrays = (array[source] for array in (mesh.positions, mesh.normals, mesh.tangents, mesh.uv))
-    return Mesh(*arrays, faces.reshape(-1, 3).astype(np.uint32)), uv2.reshape(-1, 2)[first]
+    split = Mesh(
+        mesh.positions[source],
+        mesh.normals[source],
+        mesh.tangents[source],
+        mesh.uv[source],
+        faces.reshape(-1, 3).astype(np.uint32),
+    )
+    return split, uv2.reshape(-1, 2)[first]
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:

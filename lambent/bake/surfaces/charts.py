@@ -144,7 +144,7 @@ def _in_metres(world: Floats, uv: Floats, label: Indices) -> Floats:
     total = np.bincount(label, length.sum(axis=1))[label][:, None]
 
     def summed(values: Floats) -> Floats:
-        return np.bincount(label, (values / np.maximum(total, 1e-300)).sum(axis=1))
+        return np.asarray(np.bincount(label, (values / np.maximum(total, 1e-300)).sum(axis=1)), float)
 
     uu, uv_, vv = summed(run[..., 0] ** 2), summed(run[..., 0] * run[..., 1]), summed(run[..., 1] ** 2)
     ul, vl = summed(run[..., 0] * length), summed(run[..., 1] * length)

@@ -88,9 +88,14 @@ def _with_middles(mesh: Mesh, a: Indices, b: Indices) -> tuple[Mesh, Indices]:
     def between(values: Floats) -> Floats:
         return np.asarray((values[pairs[:, 0]] + values[pairs[:, 1]]) / 2)
 
-    added = (
-        between(mesh.positions), normalize(between(mesh.normals)), normalize(between(mesh.tangents)), between(mesh.uv)
-    )  # fmt: skip
-    kept = (mesh.positions, mesh.normals, mesh.tangents, mesh.uv)
-    arrays = (np.concatenate([old, new]).astype(old.dtype) for old, new in zip(kept, added, strict=True))
-    return Mesh(*arrays, mesh.faces), len(mesh.positions) + index.reshape(-1)
+    def longer(old: Floats, new: Floats) -> Floats:
+        return np.concatenate([old, new]).astype(old.dtype)
+
+    longer_mesh = Mesh(
+        longer(mesh.positions, between(mesh.positions)),
+        longer(mesh.normals, normalize(between(mesh.normals))),
+        longer(mesh.tangents, normalize(between(mesh.tangents))),
+        longer(mesh.uv, between(mesh.uv)),
+        mesh.faces,
+    )
+    return longer_mesh, len(mesh.positions) + index.reshape(-1)

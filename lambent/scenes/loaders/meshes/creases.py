@@ -60,7 +60,8 @@ def creased(mesh: Mesh, angle_deg: float) -> Mesh:
     other = order[first[place[own]] + step]
     near = (faces[own // 3] * faces[other // 3]).sum(axis=1) >= np.cos(np.radians(angle_deg)) - 1e-6
     near |= own == other
-    total = np.stack([np.bincount(own[near], vectors[other[near] // 3, axis], len(place)) for axis in range(3)], axis=1)
+    sums = [np.bincount(own[near], vectors[other[near] // 3, axis], len(place)) for axis in range(3)]
+    total = np.stack(sums, axis=1).astype(float)
     normals = normalize(total)
     normals[(normals == 0).all(axis=1)] = faces[np.flatnonzero((normals == 0).all(axis=1)) // 3]
     vertex = mesh.faces.reshape(-1).astype(float)
