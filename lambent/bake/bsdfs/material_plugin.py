@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import functools
 import json
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -181,20 +180,6 @@ def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
     length = dr.sqrt(t.x * t.x + t.y * t.y)
     brushed &= length > 1e-6
     return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
-
-
-@dataclass(frozen=True)
-class Turned:
-    """A frame turned about n by the angle of this cosine and sine; its methods are those of mi.Frame3f."""
-
-    c: Any
-    s: Any
-
-    def to_local(self, w: Any) -> tuple[Any, Any, Any]:
-        return self.c * w[0] + self.s * w[1], self.c * w[1] - self.s * w[0], w[2]
-
-    def to_world(self, w: Any) -> tuple[Any, Any, Any]:
-        return self.c * w[0] - self.s * w[1], self.c * w[1] + self.s * w[0], w[2]
 
 
 def _masked(material: Material, on: list[bool]) -> Material:
