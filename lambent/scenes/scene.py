@@ -231,6 +231,7 @@ class Scene:
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
+    crease_deg: float | None = None  # of the hard edges that its normals were made anew for
     origin: str | None = None  # "builtin:NAME" or the absolute path that it was loaded from; None if made in memory
 
     @property

@@ -89,8 +89,8 @@ the band, and the factor of the tail. Coefficients of bands are `Curve.band_mean
 of a tail scattered as they did in the bake, over their albedos then.
 
 The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
-objects. Times are the document "timings". Every array is absent, partial or complete (`Store.availability`); of a
-partial one, `Store.read_partial` gives what is there.
+objects. Times are the documents "timings" and "last_run". Every array is absent, partial or complete
+(`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """
 
 from __future__ import annotations
@@ -111,7 +111,9 @@ from lambent.store.store import MANIFEST, Store
 
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
-TIMINGS = "timings"
+CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for which viewers
+TIMINGS = "timings"  # of every step, in seconds
+LAST_RUN = "last_run"  # those of the last bake alone, and "other"
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first

@@ -169,7 +169,7 @@ def test_geometry_can_be_scaled(tmp_path: Path) -> None:
     head = HEAD.replace('"builtin:box"', '{ file = "builtin:box", scale = 0.01 }')
     scene = load_scene(written(tmp_path, MATERIALS, head))
     assert scene.bounds[1][1] == pytest.approx(0.0101, abs=1e-6)
-    assert "is its unit the metre?" in scene.warnings[0]
+    assert any("is its unit the metre?" in warning for warning in scene.warnings)
 
 
 def test_the_same_geometry_twice_gets_names_of_its_own(tmp_path: Path) -> None:

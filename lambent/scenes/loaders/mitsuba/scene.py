@@ -89,7 +89,7 @@ class _Scene:
         )
 
     def _notes(self) -> list[str]:
-        return self._warnings + self._reading.notes + self._reading.images.notes
+        return [*self._warnings, *self._reading.notes, *self._reading.images.notes, *self._reading.files.notes]
 
     def _add_shape(self, shape: Plugin, world: Floats) -> None:
         if shape.type == "instance":

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.camera import overview
 from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
 from lambent.core.geometry import triangle_areas
@@ -21,7 +22,7 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
-from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.contents import DAYLIGHT, Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
@@ -42,6 +43,7 @@ from lambent.scenes.scene import (
     ReflectorRule,
     Scene,
     SceneObject,
+    bounds_of,
 )
 
 _DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
@@ -57,7 +59,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         Where the file is not TOML, has an unknown key or an impossible value, or names what is not there.
     """
     document, files = _parse(path), SceneFiles(path)
-    contents = [_geometry(entry, path, files, read_geometry) for entry in document.geometry]
+    there, missing = _there(document, path, files)
+    contents = [_geometry(entry, path, files, read_geometry) for entry in there]
     for source in (s for c in contents for s in c.sources):
         files.use(source)
     environment = _environment(document, path, files) or next((c.environment for c in contents if c.environment), None)
@@ -71,6 +74,10 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     if isinstance(environment, ImageEnvironment):
         files.use(environment.file)
     cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
+    lights = (*(light for c in contents for light in c.lights), *_lights(document, path, files))
+    notes = (*whole.warnings, *unfit, *missing)
+    if environment is None and not lights and not any(any(o.emission) for o in objects):
+        environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
     _check_names([c.name for c in cameras], path, "cameras")
     _check_names([p.name for p in document.paths], path, "paths")
     return Scene(
@@ -78,18 +85,32 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         objects=objects,
         materials=materials,
         environment=environment,
-        lights=(*(light for c in contents for light in c.lights), *_lights(document, path, files)),
-        cameras=cameras,
+        lights=lights,
+        cameras=cameras or (overview(*bounds_of(objects)),),
         paths=tuple(section.path() for section in document.paths),
         exposure_ev=document.exposure,
         sources=tuple(files.sources),
-        warnings=(*whole.warnings, *unfit),
+        warnings=(*notes, *files.notes),
         textures={name: t for name, t in whole.textures.items() if name not in described},
         measured=_measured(document, materials, path, files),
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),
+        crease_deg=document.crease_angle,
     )
+
+
+def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[str | GeometrySection], list[str]]:
+    """The geometry files that are there, and a note of each that is not; a `UserError` where none is."""
+    names = [entry if isinstance(entry, str) else entry.file for entry in document.geometry]
+    gone = [
+        name for name in names
+        if not name.startswith("builtin:") and not files.path(name, path, "geometry").is_file()
+    ]  # fmt: skip
+    if len(gone) == len(names):
+        raise UserError(f"names no file that is there: {', '.join(gone)}", file=path, field="geometry")
+    there = [entry for entry, name in zip(document.geometry, names, strict=True) if name not in gone]
+    return there, [f"geometry {name} is not there: left out" for name in gone]
 
 
 def _parse(path: Path) -> SceneDocument:
@@ -236,7 +257,7 @@ def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Envi
         return None if section is None else section.environment()
     file = files.path(section.file, path, "environment.file")
     if not file.is_file():
-        raise UserError("file not found", file=path, field="environment.file", got=section.file)
+        raise UserError(f"file not found: {section.file}", file=path, field="environment.file")
     return ImageEnvironment(file, section.scale, section.rotation_deg, section.layout, section.up)
 
 
