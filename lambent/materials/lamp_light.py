@@ -19,7 +19,7 @@ from lambent.materials.document import Lobe
 from lambent.materials.lobes import fresnel
 
 GGX_WIDER = 1.7
-HORIZON = 1.7  # deviations of its heights by which a lamp reaches above and below its middle
+HORIZON = 1.2  # of the sum of both vectors' heights: how far a lamp reaches above and below its middle
 COS_MIN, REACH_MIN = 1e-3, 1e-5
 
 
@@ -35,7 +35,7 @@ def lamp_response(lobe: Lobe, wo: Floats, w: Floats, axes: Floats) -> Floats:
     turned = np.array([-1.0, -1.0, 1.0]) if lobe.retro else np.ones(3)
     turned = turned * ([1, 1, -1] if lobe.side == "transmission" else 1)
     wi, axes = w * turned, axes * turned
-    reach = np.maximum(HORIZON * np.linalg.norm(axes[..., 2], axis=-1), REACH_MIN)
+    reach = HORIZON * np.abs(axes[..., 2]).sum(axis=-1) + REACH_MIN
     up = np.clip((wi[..., 2] + reach) / (2 * reach), 0, 1)  # share above the horizon
     cos_i = np.maximum(np.where(wi[..., 2] < reach, (wi[..., 2] + reach) / 2, wi[..., 2]), COS_MIN)
     cos_o = np.maximum(wo[..., 2], COS_MIN)
@@ -48,7 +48,7 @@ def lamp_response(lobe: Lobe, wo: Floats, w: Floats, axes: Floats) -> Floats:
     length2 = (total * total).sum(axis=-1)
     along = (axes[..., :2] * total[..., None, :2]).sum(axis=-1) + rise * total[..., 2:]
     tilt = 3 * along / length2[..., None] - rise * (4 * per_z - ((1 - lobe.alpha) / cos_i)[..., None])
-    tilt = tilt / np.sqrt(1 + tilt * tilt)  # more is not log-linear
+    tilt = tilt.clip(-1, 1)  # more is not log-linear
     slope = slope + (tilt[..., None] * ja).sum(axis=-2)
     wider = 2 * (GGX_WIDER if lobe.distribution == "ggx" else 1.0)
     xx = lobe.mx**2 + wider * (ja[..., 0] ** 2).sum(axis=-1)

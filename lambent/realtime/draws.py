@@ -54,6 +54,12 @@ class Draw:
         return "cleaned" if self.table == "lamps" else self.integrator.cube
 
     @property
+    def _layers(self) -> dict[str, float]:
+        if self.table != "lamps":
+            return {}
+        return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
+
+    @property
     def object_group(self) -> Any:
         return self.item.group(self.cube, self.look_up, self.table)
 
@@ -66,6 +72,7 @@ class Draw:
             "TEXTURES": self.textures,
             **self.look_up.constants(self.item.light.probe),
             **self.integrator.constants,
+            **self._layers,
         }
 
 

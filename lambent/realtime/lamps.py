@@ -10,8 +10,9 @@ The table that the shader reads has the rows
 and per lamp
     mean place about the probe's centre, m, or direction; 1 where it is a place
     excess flux, W/m^2 on a surface at the probe's centre that faces the lamp; its group
-    two principal deviations of its places or directions; of places the first w is |p|^3/|n.p|
-with n the normal of the plane of both deviations: seen from x, the flux is that times |n.(p - x)|/|p - x|^3.
+    two principal deviations a, b of its places or directions; of places their w are e^3/|n.p| and a.a + b.b
+Seen from x a place p has e^2 = |p - x|^2 + a.a + b.b, which bounds what is touched, and n = a x b: the flux changes with
+|n.(p - x)|/e^3, as a surface of that normal does.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
 from lambent.core.directions import normalize
-from lambent.core.lamps import Lamp, corners, find_lamps, moments
+from lambent.core.lamps import MOST, Lamp, corners, find_lamps, moments
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import Probe
 from lambent.realtime.cube_mips import finite, smooth_chain
@@ -32,7 +33,7 @@ from lambent.realtime.incident import LookUp
 
 GROUPS = 4
 GROUP_RATIO = 1.25  # of radii, from which on two lamps may be in two groups
-FIRST, LAST = 1.0, 1.6  # widths of a lobe, in radii of a group, between which the group leaves
+FIRST, LAST = 0.54, 0.62  # widths of a lobe, in radii of a group, between which the group leaves
 NONE = 1e9
 HEAD_ROWS, LAMP_ROWS = 2, 4
 
@@ -61,6 +62,10 @@ class ProbeLamps:
         """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change."""
         return self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
 
+    def mixes(self, material: Material, textured: bool) -> bool:
+        """Whether a lobe may be between two of the cube maps."""
+        return textured or any(groups_out(lobe, self.radii) % 1 > 0 for lobe in material.lobes)
+
     def chain(self) -> list[Floats]:
         """Levels (6 (groups + 1), n, n, 3): cube maps with 0, 1, ... groups taken out, one after the other."""
         cubes = [self.radiance]
@@ -73,14 +78,17 @@ class ProbeLamps:
         return [np.concatenate(levels) for levels in zip(*map(smooth_chain, cubes), strict=True)]
 
     def table(self, probe: Probe, look_up: LookUp) -> NDArray[np.float32]:
-        """(HEAD_ROWS + LAMP_ROWS lamps, 4) rows as above, lamps where the look-up finds them."""
+        """(HEAD_ROWS + LAMP_ROWS MOST, 4) rows as above, lamps where the look-up finds them."""
         counts = [np.count_nonzero(self.group <= number) for number in range(GROUPS)]
         rows = [np.array([self.radii, counts])]
         n = self.radiance.shape[1]
         rows += [
             placed(lamp, int(group), n, probe, look_up) for lamp, group in zip(self.lamps, self.group, strict=True)
         ]
-        return np.concatenate(rows).astype(np.float32)
+        table = np.zeros((HEAD_ROWS + LAMP_ROWS * MOST, 4), np.float32)
+        filled = np.concatenate(rows)
+        table[: len(filled)] = filled
+        return table
 
 
 def group_of(radii: list[float]) -> NDArray[np.intp]:
@@ -94,7 +102,7 @@ def group_of(radii: list[float]) -> NDArray[np.intp]:
 
 def groups_out(lobe: Lobe, radii: Floats) -> float:
     """How many groups have left the cube map for a lobe; fractions are shares of the last (groups_out of lamps.wgsl)."""
-    share = np.clip((min(lobe.mx, lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
+    share = np.clip((np.sqrt(lobe.mx * lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
     return float(np.sum(share * share * (3 - 2 * share)))
 
 
@@ -109,11 +117,13 @@ def placed(lamp: Lamp, group: int, n: int, probe: Probe, look_up: LookUp) -> Flo
     mean, covariance = moments(points, weight[near] if is_near else weight)
     value, vector = np.linalg.eigh(covariance)
     axes = (vector * np.sqrt(np.maximum(value, 0))).T[:0:-1]
-    scale = 0.0
+    scale = extent2 = 0.0
     if is_near:
-        facing = abs(float(mean @ vector[:, 0]))
-        scale = float(np.linalg.norm(mean)) ** 3 / max(facing, 0.05 * float(np.linalg.norm(mean)))
+        length = float(np.linalg.norm(mean))
+        facing = np.linalg.norm(np.cross(*axes)) * max(abs(float(mean @ vector[:, 0])), 0.05 * length)
+        extent2 = float((axes * axes).sum())
+        scale = (length**2 + extent2) ** 1.5 / max(facing, 1e-12)
     else:
         mean = mean / np.linalg.norm(mean)
     flux = lamp.flux.sum(axis=0)
-    return np.array([[*mean, is_near], [*flux, group], [*axes[0], scale], [*axes[1], 0]])
+    return np.array([[*mean, is_near], [*flux, group], [*axes[0], scale], [*axes[1], extent2]])

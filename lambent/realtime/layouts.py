@@ -42,7 +42,7 @@ class Layouts:
 
     def object(self, look_up: tuple[str, ...], cube: str = "cube") -> Any:
         """Layout of group 2 with the bindings of a look-up of incident light; `cube` is the kind of the probe's light."""
-        return self.of("uniform", cube, "storage", *look_up)
+        return self.of("uniform", cube, "uniform" if cube == "cubes" else "storage", *look_up)
 
     def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:
         """Layout of bindings of these `KINDS`, for the stages of `visibility`."""

@@ -80,7 +80,7 @@ class ProbeLight:
     def _new_table(self, use: str, look_up: LookUp) -> Any:
         if use == "aim":
             return self.aims.buffer
-        return self._layouts.buffer("STORAGE", self.lamps.table(self.probe, look_up))
+        return self._layouts.buffer("UNIFORM", self.lamps.table(self.probe, look_up))
 
     @cached_property
     def cheapest(self) -> LookUp:

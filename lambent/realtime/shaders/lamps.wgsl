@@ -6,16 +6,18 @@
 #include "lamp_light.wgsl"
 
 @group(2) @binding(1) var cleaned_cubes: texture_cube_array<f32>; // without 0, 1, ... groups of lamps
-@group(2) @binding(2) var<storage, read> lamps: array<vec4f>;
+@group(2) @binding(2) var<uniform> lamps: array<vec4f, 66>;
+
+override LAYERS: u32 = 2u; // 1 where no lobe is between two cube maps, which the loop need not allow for
 
 const LAMP_HEAD = 2u;
 const LAMP_ROWS = 4u;
-const FIRST_OUT = 1.0;
-const LAST_OUT = 1.6;
+const FIRST_OUT = 0.54;
+const LAST_OUT = 0.62;
 
-// How many groups have left the cube map for a lobe; fractions are shares of the last.
+// How many groups have left the cube map for a lobe; fractions are shares of the last (lamps.py).
 fn groups_out(lobe: LambentLobe) -> f32 {
-    let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), min(lobe.mx, lobe.my) / lamps[0]);
+    let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), sqrt(lobe.mx * lobe.my) / lamps[0]);
     return dot(share, vec4f(1.0));
 }
 
@@ -24,31 +26,26 @@ fn lamp_visibility(s: Surface, to_lamp: vec3f) -> f32 {
     return s.occlusion;
 }
 
-fn to_local(s: Surface, w: vec3f) -> vec3f {
-    return vec3f(dot(w, s.t), dot(w, s.b), dot(w, s.n));
-}
-
 fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
-    if (out <= 0.0) { return vec3f(0.0); }
-    let count = u32(lamps[1][u32(ceil(out)) - 1u]);
+    let count = select(0u, u32(lamps[1][u32(max(ceil(out), 1.0)) - 1u]), out > 0.0);
+    let sides = on_side(lobe, vec3f(1.0));
+    let to_local = transpose(mat3x3f(sides.x * s.t, sides.y * s.b, sides.z * s.n));
     var sum = vec3f(0.0);
     for (var k = 0u; k < count; k++) {
         let row = LAMP_HEAD + k * LAMP_ROWS;
         let place = lamps[row];
         let flux = lamps[row + 1u];
         let first = lamps[row + 2u];
-        let second = lamps[row + 3u].xyz;
+        let second = lamps[row + 3u];
         let to = place.xyz - place.w * s.x;
-        let extent2 = place.w * (dot(first.xyz, first.xyz) + dot(second, second)); // bounds a lamp that is touched
-        let per_t = inverseSqrt(dot(to, to) + extent2);
-        let w = normalize(to);
-        let normal = cross(first.xyz, second);
-        let facing = abs(dot(normal, to)) * inverseSqrt(max(dot(normal, normal), 1e-30));
-        let nearer = select(1.0, first.w * facing * per_t * per_t * per_t, place.w > 0.0);
-        let a = on_side(lobe, to_local(s, rejection(first.xyz, w) * per_t));
-        let b = on_side(lobe, to_local(s, rejection(second, w) * per_t));
-        let light = lambent_lamp_response(lobe, wo, on_side(lobe, to_local(s, w)), a, b);
-        sum += clamp(out - flux.w, 0.0, 1.0) * nearer * lamp_visibility(s, w) * flux.rgb * light;
+        let per_t = inverseSqrt(dot(to, to) + second.w); // a bit short, as the mean direction of what is near should be
+        let wi = (to_local * to) * per_t;
+        let facing = first.w * abs(dot(cross(first.xyz, second.xyz), to)) * per_t * per_t * per_t;
+        let a = rejection((to_local * first.xyz) * per_t, wi);
+        let b = rejection((to_local * second.xyz) * per_t, wi);
+        let light = lambent_lamp_response(lobe, wo, wi, a, b);
+        let share = clamp(out - flux.w, 0.0, 1.0) * select(1.0, facing, place.w > 0.0);
+        sum += share * lamp_visibility(s, to) * flux.rgb * light;
     }
     return sum;
 }
@@ -64,17 +61,16 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let lobe = here.lobe;
     let first = index * (SAMPLES + FACTOR_ROWS);
     let out = groups_out(lobe);
-    let layer = floor(out);
+    let layer = u32(out);
     let mixed = fract(out);
-    let layers = select(1u, 2u, mixed > 0.0);
     var sum = vec3f(0.0);
-    for (var i = 0u; i < layers; i++) {
-        let share = select(1.0 - mixed, mixed, i == 1u);
+    for (var i = 0u; i < LAYERS; i++) {
+        let share = select(select(1.0 - mixed, mixed, i == 1u), 1.0, LAYERS == 1u);
         for (var k = 0u; k < SAMPLES; k++) {
             let q = samples[first + k];
             let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
             if (!at.seen) { continue; }
-            let light = cleaned_light(s, on_side(lobe, at.wi), half_log2_omega(q, at, here), u32(layer) + i);
+            let light = cleaned_light(s, on_side(lobe, at.wi), half_log2_omega(q, at, here), min(layer + i, textureNumLayers(cleaned_cubes) - 1u));
             sum += share * q.w * gain(lobe, at.wi, wo, at.h) * light;
         }
     }
