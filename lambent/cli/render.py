@@ -41,8 +41,11 @@ def command(
     ] = None,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
     integrator: Annotated[
-        str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
-    ] = "rings",
+        str,
+        typer.Option(
+            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer."
+        ),
+    ] = "lamps",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
     exposure: Annotated[float | None, typer.Option(help="In EV. [default: the scene's]")] = None,
     view: Annotated[
@@ -62,7 +65,7 @@ def command(
         str,
         typer.Option(
             help="How flat mirrors and floors are drawn: auto, off (from their probes), or as the integrator knows: "
-            "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
+            "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,

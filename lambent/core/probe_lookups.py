@@ -35,7 +35,9 @@ def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
 def distances_to_planes(w: Floats, planes: Floats) -> Floats:
     """(M,) distances from the probe's centre along unit w (M, 3) to the first of its planes (P, 4); inf for none."""
     height = planes[:, 3]
-    nearness = np.divide(-(w @ planes[:, :3].T), height, out=np.zeros((len(w), len(planes))), where=height > PLANE_ACTIVE_M)
+    nearness = np.divide(
+        -(w @ planes[:, :3].T), height, out=np.zeros((len(w), len(planes))), where=height > PLANE_ACTIVE_M
+    )
     nearest = nearness.max(axis=1, initial=0.0)
     return np.divide(1.0, nearest, out=np.full(len(w), np.inf), where=nearest > NEARNESS_MIN)
 

@@ -92,16 +92,18 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
         material, textures = state.materials.get(name, resources.scene.record.materials[name]), buffers.textures
         lobes = len(material.lobes) if wanted.specular else 0
         how = wanted if lobes else INTEGRATORS["diffuse"]
-        n = how.rows or (state.samples(material, textures.rough) if lobes else 1)
         anisotropic = any(lobe.mx != lobe.my for lobe in material.lobes)
         bits = bits_that_show(textures.bits, lobes, anisotropic)
-        found[name] = (material, how, n, buffers.group(material, how, n), bits)
+        found[name] = (material, how, bits)
     draws = []
     for item in resources.objects:
-        material, how, n, group, bits = found[item.record.material]
-        light = item.light
+        material, how, bits = found[item.record.material]
+        buffers, light = resources.materials[item.record.material], item.light
         look_up = light.look_up(state.lookups.get(item.record.name, state.lookup)) if how.specular else light.cheapest
         table = lamp_use(how, light, look_up, material, bits)
+        alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
+        n = how.rows or (state.samples(material, buffers.textures.rough, alone) if how.specular else 1)
+        group = buffers.group(material, how, n)
         planar = how.specular and item.record.name in reflecting
         draws.append(Draw(item, material, how, n, look_up, group, bits, table, planar))
     return draws

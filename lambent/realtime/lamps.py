@@ -55,12 +55,18 @@ class ProbeLamps:
         """(GROUPS,) largest radius of each group."""
         radii = np.full(GROUPS, NONE)
         for number in range(self.groups):
-            radii[number] = max(lamp.radius_rad for lamp, of in zip(self.lamps, self.group, strict=True) if of == number)
+            radii[number] = max(
+                lamp.radius_rad for lamp, of in zip(self.lamps, self.group, strict=True) if of == number
+            )
         return radii
 
     def serve(self, material: Material, textured: bool) -> bool:
         """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change."""
         return self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
+
+    def all_out(self, material: Material, textured: bool) -> bool:
+        """Whether no lamp is in the cube map of any lobe."""
+        return not textured and all(groups_out(lobe, self.radii) == self.groups for lobe in material.lobes)
 
     def mixes(self, material: Material, textured: bool) -> bool:
         """Whether a lobe may be between two of the cube maps."""
