@@ -1,9 +1,8 @@
 """Lamps of a cube map: connected bright texels, and the cube map without them.
 
-A lamp is what is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. What
-is found leaves the map, its texels get the median of the ring around them, and the search is made again: when the sun
-is gone, the window it shone through is a lamp of its own. The recipe is of an experiment on measured environments; see
-docs/decisions.md.
+A lamp is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. It
+leaves the map, its texels get the median of the ring around them, and the search is made again: when the sun is gone, the
+window it shone through is a lamp of its own. Large lamps are cut, so that all are small beside wide lobes.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
-from lambent.core.cubemap import directions_at, face_directions, texel_solid_angles
+from lambent.core.cubemap import directions_at, texel_solid_angles
 from lambent.core.directions import normalize
 
 BRIGHT = 4.0  # times the mean radiance

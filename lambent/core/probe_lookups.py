@@ -39,7 +39,7 @@ def distances_to_planes(w: Floats, planes: Floats) -> Floats:
         -(w @ planes[:, :3].T), height, out=np.zeros((len(w), len(planes))), where=height > PLANE_ACTIVE_M
     )
     nearest = nearness.max(axis=1, initial=0.0)
-    return np.divide(1.0, nearest, out=np.full(len(w), np.inf), where=nearest > NEARNESS_MIN)
+    return np.asarray(np.divide(1.0, nearest, out=np.full(len(w), np.inf), where=nearest > NEARNESS_MIN))
 
 
 def inverse_depth(distance: Floats) -> Floats:

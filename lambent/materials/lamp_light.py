@@ -1,12 +1,13 @@
 """A lobe under one small lamp, in closed form: lamp_light.wgsl is its twin for shaders, tested for parity.
 
-A lamp is a mean direction w and two vectors a, b, the principal deviations of its directions. f cos_i is a smooth factor g
-times the density P = D h_z^4 of slopes s = (h_x, h_y)/h_z. With H = w + o not normalised,
+A lamp is a mean direction w and two vectors a, b, the principal deviations of its directions. f cos_i is a smooth
+factor g times the density P = D h_z^4 of slopes s = (h_x, h_y)/h_z. With H = w + o not normalised,
     s = H_xy/H_z,  J a = (a_xy - s a_z)/H_z,  g = tint |H|^3/(2 H_z^4) cos_i^(1 - alpha)/cos_o^alpha.
 A Gaussian P of the matrix diag(mx^2, my^2), averaged over a Gaussian lamp, is a Gaussian of the matrix
     M = diag(mx^2, my^2) + 2 sum (J a)(J a)^T:
-the lobe is widened and keeps its integral. Of a GGX lobe, which has no variance, `GGX_WIDER` times that is closest. Where
-log g changes by q_a and q_b over a and b, the mean of g P is that at w, with s + q_a J a + q_b J b, times exp((q_a^2 +
+the lobe is widened and keeps its integral. Of a GGX lobe, which has no variance, `GGX_WIDER` times that is closest.
+Where log g changes by q_a and q_b over a and b, the mean of g P is that at w, with s + q_a J a + q_b J b,
+times exp((q_a^2 +
 q_b^2)/2); this completes the square. Of a lamp that sets, the part above the horizon counts.
 """
 

@@ -14,7 +14,6 @@ from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources
 from lambent.realtime.textures import WIDENING, bits_that_show
 
-
 LampUse = Literal["", "aim", "lamps"]  # samples aim at lamps, or lamps are outside of the cube map
 
 
@@ -101,9 +100,10 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
         buffers, light = resources.materials[item.record.material], item.light
         look_up = light.look_up(state.lookups.get(item.record.name, state.lookup)) if how.specular else light.cheapest
         table = lamp_use(how, light, look_up, material, bits)
-        alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
+        planar = how.specular and item.record.name in reflecting
+        # the buffer of a planar reflector has its lamps
+        alone = table == "lamps" and not planar and light.lamps.all_out(material, bool(bits & WIDENING))
         n = how.rows or (state.samples(material, buffers.textures.rough, alone) if how.specular else 1)
         group = buffers.group(material, how, n)
-        planar = how.specular and item.record.name in reflecting
         draws.append(Draw(item, material, how, n, look_up, group, bits, table, planar))
     return draws

@@ -11,8 +11,8 @@ and per lamp
     mean place about the probe's centre, m, or direction; 1 where it is a place
     excess flux, W/m^2 on a surface at the probe's centre that faces the lamp; its group
     two principal deviations a, b of its places or directions; of places their w are e^3/|n.p| and a.a + b.b
-Seen from x a place p has e^2 = |p - x|^2 + a.a + b.b, which bounds what is touched, and n = a x b: the flux changes with
-|n.(p - x)|/e^3, as a surface of that normal does.
+Seen from x a place p has e^2 = |p - x|^2 + a.a + b.b, which bounds what is touched, and n = a x b: the flux changes
+with |n.(p - x)|/e^3, as a surface of that normal does.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def group_of(radii: list[float]) -> NDArray[np.intp]:
 
 
 def groups_out(lobe: Lobe, radii: Floats) -> float:
-    """How many groups have left the cube map for a lobe; fractions are shares of the last (groups_out of lamps.wgsl)."""
+    """Groups that have left the cube map for a lobe; fractions are shares of the last (groups_out of lamps.wgsl)."""
     share = np.clip((np.sqrt(lobe.mx * lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
     return float(np.sum(share * share * (3 - 2 * share)))
 

@@ -41,7 +41,7 @@ class Layouts:
         self.empty = device.create_buffer(size=16, usage=wgpu.BufferUsage.STORAGE)  # a binding must hold something
 
     def object(self, look_up: tuple[str, ...], cube: str = "cube") -> Any:
-        """Layout of group 2 with the bindings of a look-up of incident light; `cube` is the kind of the probe's light."""
+        """Layout of group 2 with the bindings of a look-up of incident light; `cube`: the kind of the probe's light."""
         return self.of("uniform", cube, "uniform" if cube == "cubes" else "storage", *look_up)
 
     def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:

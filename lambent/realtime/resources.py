@@ -40,7 +40,7 @@ class ObjectResources:
         self.group = cache(self._new_group)
 
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
-        """Group 2 with that cube map and what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
+        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))

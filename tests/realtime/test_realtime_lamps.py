@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.core.cubemap import face_directions
 from lambent.core.directions import normalize
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Lobe
 from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.incident import look_ups
@@ -100,9 +101,8 @@ def test_negative_and_unbounded_texels(device) -> None:
 @pytest.mark.parametrize("rest", [0.0, 0.02])
 def test_a_quarter_of_the_sky(device, rest: float) -> None:
     """As large as a lamp can be: cut in pieces, or left in the cube map."""
-    renderer = Renderer(
-        device, unbaked_scene({"ball": sphere(0.6)}, material((LOBES["rough"],)), lit((np.ones(3), 1.04, 1.0), rest=rest))
-    )  # fmt: skip
+    cube = lit((np.ones(3), 1.04, 1.0), rest=rest)
+    renderer = Renderer(device, unbaked_scene({"ball": sphere(0.6)}, material((LOBES["rough"],)), cube))
     state = replace(STATE, camera=BALL, width=48, height=48, n=7)
     assert np.sqrt(np.mean((renderer.image(state) - renderer.converged(replace(state, n=64), 1024)) ** 2)) < 0.03
 
@@ -122,7 +122,7 @@ def test_nothing_pops_while_a_roughness_is_dragged(device) -> None:
     out = [groups_out(Lobe(mx=m, my=m), radii) for m in steps]
     assert out[0] == 0 and out[-1] == 2
     images = [shown(m) for m in steps]
-    change = np.array([np.abs(b - a).mean() for a, b in zip(images, images[1:], strict=False)])
+    change = np.array([np.abs(b - a).mean() for a, b in itertools.pairwise(images)])
     usual = np.array([np.median(change[max(i - 6, 0) : i + 7]) for i in range(len(change))])
     whole = np.abs(shown(0.062 * radii[0] / 0.1) - images[0]).mean()
     assert (change < 4 * usual + 0.02 * whole).all()

@@ -40,7 +40,7 @@ class LookUp(Protocol):
         """Whether the probe has what the look-up needs."""
 
     def distances(self, probe: Probe, w: Floats) -> Floats:
-        """(M,) metres from the probe's centre to what the look-up knows along unit directions w (M, 3); inf for nothing."""
+        """(M,) metres from the probe's centre to what is known along unit directions w (M, 3); inf for nothing."""
 
     def constants(self, probe: Probe) -> dict[str, int]:
         """Values of the shader's `override` constants."""
