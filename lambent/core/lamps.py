@@ -1,8 +1,8 @@
 """Lamps of a cube map: connected bright texels, and the cube map without them.
 
 A lamp is brighter than `BRIGHT` times the mean of all directions and holds at least `LEAST_SHARE` of the light. It
-leaves the map, its texels get the median of the ring around them, and the search is made again: when the sun is gone, the
-window it shone through is a lamp of its own. Large lamps are cut, so that all are small beside wide lobes.
+leaves the map, its texels get the median of the ring around them, and the search is made again: when the sun is gone,
+the window it shone through is a lamp of its own. Large lamps are cut, so that all are small beside wide lobes.
 """
 
 from __future__ import annotations
