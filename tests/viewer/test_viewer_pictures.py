@@ -175,7 +175,7 @@ def test_side_by_side_with_the_reference(renderer, state):
     figures = state.comparison.figures
     assert len(pictures.views) == 2 and figures.of >= 8
     assert 20 < figures.psnr_db < 80
-    assert state.comparison.divider.a_label == "rings" and "qmc" in state.comparison.divider.b_label
+    assert state.comparison.divider.a_label == "lamps" and "qmc" in state.comparison.divider.b_label
     state.navigation.camera = SIDE
     drawn(pictures, state, dt_s=0.01)
     assert state.comparison.figures is None, "figures of another place are not shown"
