@@ -186,7 +186,7 @@ def test_side_by_side_with_the_reference(renderer, state):
 
 def test_an_integrator_agrees_with_itself(renderer, state):
     pictures = Pictures(renderer, state)
-    state.comparison.mode, state.comparison.integrator = "error map", "rings"
+    state.comparison.mode, state.comparison.integrator = "error map", "lamps"
     drawn(pictures, state, 4)
     assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
     assert (pictures.images["picture A"][..., :3] == 0).all()
