@@ -43,8 +43,11 @@ def command(
     ] = None,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
     integrator: Annotated[
-        str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
-    ] = "rings",
+        str,
+        typer.Option(
+            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer."
+        ),
+    ] = "lamps",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
     exposure: Annotated[
         float | None, typer.Option(help="In EV: stops on radiance. [default: the scene's, else metered]")
@@ -72,7 +75,7 @@ def command(
         str,
         typer.Option(
             help="How flat mirrors and floors are drawn: auto, off (from their probes), or as the integrator knows: "
-            "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
+            "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
     projection: Annotated[

@@ -81,7 +81,7 @@ class FrameState:
     camera: Camera
     width: int = 1680
     height: int = 1050
-    integrator: str = "rings"
+    integrator: str = "lamps"
     n: int | None = None
     exposure_ev: float = 0.0
     view_transform: str = "filmic"
@@ -127,9 +127,14 @@ class FrameState:
         """Whether edges of the display image are blended where it comes from one frame."""
         return self.antialias and not self.is_false_coloured
 
-    def samples(self, material: Material, roughness: float = 1.0) -> int:
-        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
-        return self.n or (QMC_N if integrator(self.integrator).progressive else automatic_n(material, roughness))
+    def samples(self, material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
+        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document.
+
+        `without_lamps`: all lamps are outside of the cube map that is sampled.
+        """
+        if integrator(self.integrator).progressive:
+            return self.n or QMC_N
+        return self.n or automatic_n(material, roughness, without_lamps)
 
 
 def quantity_of(show: str) -> Quantity:

@@ -17,7 +17,7 @@ from lambent.realtime.integrators import Cube
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.pipelines import VERTEX_FLOATS
-from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.probe_light import ProbeLight, kind_of
 from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.textures import TextureCache
@@ -40,17 +40,17 @@ class ObjectResources:
         self.record, self.light, self._layouts, self._unit = record, light, layouts, unit
         self.group = cache(self._new_group)
 
-    def _new_group(self, cube: Cube, look_up: LookUp, aimed: bool = False) -> Any:
-        """Group 2 with that cube map and what the look-up reads, `aimed` with the table of the probe's lamps."""
+    def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
+        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
         data["emission"][0, :3] = np.array(self.record.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         uniform = self._layouts.buffer("UNIFORM", data)
-        table = self.light.lamps.buffer if aimed else self._layouts.empty
-        layout = self._layouts.object(look_up.BINDINGS)
-        return self._layouts.group(layout, uniform, self.light.view(cube), table, *self.light.resources(look_up))
+        lamps = self.light.table(table, look_up) if table else self._layouts.empty
+        layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
+        return self._layouts.group(layout, uniform, self.light.view(cube), lamps, *self.light.resources(look_up))
 
 
 class SceneResources:

@@ -60,7 +60,7 @@ class Settings:
 
     width: int = 1280
     height: int = 720
-    integrator: str = "rings"
+    integrator: str = "lamps"
     samples: int | None = None
     exposure_ev: float | None = None
     view: str = "filmic"

@@ -14,6 +14,7 @@ from lambent.realtime.incident import shader_of
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import draw_seen, set_geometry
 from lambent.realtime.pipelines import pipeline, screen_pipeline
+from lambent.realtime.probe_light import kind_of
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
 
@@ -82,7 +83,7 @@ class Shading:
                 code = assemble(*shaders[0], given={"look_up.wgsl": shader_of(draw.look_up)})
                 self._modules[shaders] = layouts.device.create_shader_module(code=code)
             light = self._reflections if self._is_reflecting(draw) else self._light
-            groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS), light]
+            groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS, kind_of(draw.cube)), light]
             self._pipelines[key] = pipeline(
                 layouts.device, self._modules[shaders], stage.entry, groups, formats, constants=constants,
                 compare="greater" if stage.blended else "equal", blend=_OVER if stage.blended else None,

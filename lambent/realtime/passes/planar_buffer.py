@@ -127,8 +127,10 @@ class PlanarBufferPass:
     def mirrored(self, context: FrameContext) -> Iterator[FrameContext]:
         """The mirrored frames of a frame, one after the other; `uniform` has the record of each."""
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
-        rings, diffuse = INTEGRATORS["rings"], INTEGRATORS["diffuse"]
-        draws = [d.by(rings if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
+        wanted = INTEGRATORS[context.state.integrator]
+        few = INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"]  # published ones, as they were
+        diffuse = INTEGRATORS["diffuse"]
+        draws = [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
         for index, view in enumerate(context.views):
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
