@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from lambent.core.camera import Camera, pixel_rays
+from lambent.core.cubemap import face_directions
 from lambent.core.directions import basis, normalize
 from lambent.core.sequences import hammersley
-from lambent.materials.document import Material
+from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
@@ -45,9 +47,15 @@ def floor(half: float = 4.0) -> Mesh:
     return patch((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half))
 
 
-def scene(meshes: dict[str, Mesh], radius_deg: float, material: Material | None = None, **record: Any) -> BakedScene:
-    """Under the sun alone: light maps are black."""
-    environment = np.zeros((6, 4, 4, 3), np.float32)
+def scene(
+    meshes: dict[str, Mesh],
+    radius_deg: float,
+    material: Material | None = None,
+    environment: Floats | None = None,
+    **record: Any,
+) -> BakedScene:
+    """Under the sun alone: light maps are black, if the environment is."""
+    environment = np.zeros((6, 4, 4, 3), np.float32) if environment is None else environment
     dark = unbaked_scene(meshes, material or Material(name="grey", kd=0.5), environment)
     sun = SunRecord(direction=tuple(TOWARDS), irradiance=IRRADIANCE, radius_rad=np.radians(radius_deg))
     return replace(dark, sun=sun, record=dark.record.model_copy(update={"cameras": (DOWN,), **record}))
@@ -139,6 +147,27 @@ def test_sheet_that_transmits_shows_the_sun_from_behind(device: Any) -> None:
         sheet = Material(name="sheet", kd=(0.3,) * 3, kt_d=(kt_d,) * 3)
         baked = scene({"sheet": floor(1.0)}, 0.27, sheet)
         assert np.allclose(drawn(device, baked, behind, 1, show="diffuse"), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("integrator", ["lamps", "qmc"])
+def test_the_sun_is_mirrored_where_it_shines_alone(device: Any, integrator: str) -> None:
+    """A glossy floor under the opening: the sun of its probe as without the plate in light, and not in shadow."""
+    glossy = Material(name="glossy", lobes=(Lobe(k=1.0, mx=0.25, my=0.25, r0=0.9),))
+    cube = np.zeros((6, 64, 64, 3), np.float32)
+    directions = normalize(face_directions(64))
+    cube[directions @ TOWARDS > np.cos(np.radians(1.0))] = 1000.0
+    mirror = Camera(name="mirror", position=(-1.2, 1.9, -0.8), target=(-0.65, 0.0, -0.45), fov_y_deg=60.0)
+    images = []
+    for meshes in ({"floor": floor()}, {"floor": floor(), "plate": plate()}):
+        renderer = Renderer(device, scene(meshes, 0.27, glossy, cube))
+        frame = FrameState(mirror, SIZE, SIZE, show="specular", antialias=False, integrator=integrator, planar="off")
+        images.append(renderer.converged(frame, 64) if integrator == "qmc" else renderer.image(frame))
+    bare, covered = (image[..., 0] for image in images)
+    share = traced(places(mirror), 0.27)
+    lit, dark = (binary_erosion(share == of, iterations=3) for of in (1, 0))  # at rest, pixels have an extent
+    assert lit.sum() > 100 and dark.sum() > 1000 and bare[lit].mean() > 0.1
+    np.testing.assert_allclose(covered[lit], bare[lit], rtol=1e-3, atol=1e-3 * bare.max())
+    assert covered[dark].max() < 1e-3 * bare.max() < bare[dark].max()
 
 
 def test_frames_without_a_sun_are_dark_and_noise_knows_none(device: Any) -> None:

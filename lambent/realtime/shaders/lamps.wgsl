@@ -21,11 +21,6 @@ fn groups_out(lobe: LambentLobe) -> f32 {
     return dot(share, vec4f(1.0));
 }
 
-// Share of a lamp that reaches the pixel.
-fn lamp_visibility(s: Surface, to_lamp: vec3f) -> f32 {
-    return s.occlusion;
-}
-
 fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
     let count = select(0u, u32(lamps[1][u32(max(ceil(out), 1.0)) - 1u]), out > 0.0);
     let sides = on_side(lobe, vec3f(1.0));
@@ -45,7 +40,7 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
         let b = rejection((to_local * second.xyz) * per_t, wi);
         let light = lambent_lamp_response(lobe, wo, wi, a, b);
         let share = clamp(out - flux.w, 0.0, 1.0) * select(1.0, facing, place.w > 0.0);
-        sum += share * lamp_visibility(s, to) * flux.rgb * light;
+        sum += share * select(reaching(s, to), s.occlusion, place.w > 0.0) * flux.rgb * light;
     }
     return sum;
 }

@@ -17,6 +17,15 @@ const DIRECTION = 2u; // dominant direction of front light, world space; 0 where
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
 
+const SUN_REACH = 2.5; // texels of a probe around the sun's disc, within which it is seen in the probe
+
+// Share of a probe's light from a direction (of the probe) that reaches a pixel; of the sun, what the pixel sees of it.
+fn reaching(s: Surface, w: vec3f) -> f32 {
+    let off = sun.towards.w + SUN_REACH * exp2(-object.centre.w);
+    let is_sun = (sun.irradiance.w > 0.0) & (dot(w, sun.towards.xyz) * inverseSqrt(dot(w, w)) > 1.0 - 0.5 * off * off);
+    return select(s.occlusion, textureLoad(sun_seen, vec2i(s.pixel), 0).r, is_sun);
+}
+
 // Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
 // progressive series.
 fn mesh_frame(v: Varyings) -> mat3x3f {
