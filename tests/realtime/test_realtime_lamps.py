@@ -132,7 +132,7 @@ def test_numpy_and_the_shader_take_out_as_many_groups() -> None:
     radii = np.array([0.02, 0.09, 0.3, 1e9])
     m = np.geomspace(0.005, 0.4, 200)
     source = assemble("lamps.wgsl", given={"look_up.wgsl": "", "surface.wgsl": ""})
-    own = source[source.index("const FIRST_OUT") : source.index("// Share of a lamp")]
+    own = source[source.index("const FIRST_OUT") : source.index("fn lamps_light")]
     wide = "fn wide(m: f32) -> LambentLobe { var lobe = LOBE; lobe.mx = m; lobe.my = 2.0 * m; return lobe; }"
     declarations = own + declared(Lobe(mx=0.1, my=0.2)) + wide
     tables = {"lamps": radii[None]}
