@@ -135,7 +135,7 @@ def test_saved_views_can_be_rendered(lambent, refused, store, tmp_path):
         (("-o", "a.mp4", "--path", "tuor"), "did you mean 'tour'?"),
         (("-o", "a.png", "--integrator", "ring"), "did you mean 'rings'?"),
         (("-o", "a.png", "--planar", "marchd"), "did you mean 'marched'?"),
-        (("-o", "a.png", "--planar", "thesis"), "rings does not draw reflectors so"),
+        (("-o", "a.png", "--planar", "thesis"), "does not draw reflectors so"),
         (("-o", "a.png", "--integrator", "path", "--planar", "off"), "the path tracer traces reflectors"),
         (("-o", "a.png", "--samples", "0"), "--samples"),
         (("-o", "a.png", "--integrator", "path"), "name it with --scene"),
