@@ -16,6 +16,7 @@
                                            the irradiance it would give, coefficients of 1, x, y, z, xy, yz, 3zz - 1,
                                            xz, xx - yy of the normal; scale its light by the light map's share of that,
                                            at most 1
+                                           An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
@@ -108,6 +109,7 @@ from lambent.store.store import MANIFEST, Store
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
 TIMINGS = "timings"
+SHARED_PROBES = "shared_probes"  # document: its key, and "owners", by object that shows the probe of another
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
@@ -127,7 +129,7 @@ class ObjectRecord(_Record):
     face_count: int
     emission: Triple = (0.0, 0.0, 0.0)
     bounds: tuple[Triple, Triple]
-    probe: bool = False  # wants probe/NAME/*
+    probe: bool = False  # wants probe/NAME/*, its own or a shared one
 
 
 class TexturesRecord(_Record):
@@ -246,6 +248,15 @@ def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
     """What a probe alone would give (see the head), where the light map is to scale it; else nothing."""
     name = probe_name(object_name, "radiance")
     return numbers_of(store, name, "seen_irradiance", 9) if store.artefact(name).meta.get("seen_irradiance") else ()
+
+
+def shared_probes(store: Store) -> dict[str, str]:
+    """By each object that wants a probe and has none, the one whose probe it shows; nothing in earlier stores."""
+    said = store.documents.get(SHARED_PROBES, {})
+    found = said.get("owners", {}) if isinstance(said, dict) else None
+    if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):
+        raise UserError("broken store", file=store.folder, field=SHARED_PROBES, got=str(said)[:80], hint="bake again")
+    return found
 
 
 def noise_name(side: str) -> str:
