@@ -3,10 +3,12 @@
 A probe serves another object as far as its centre sees what viewers see mirrored there. Rays from viewers are mirrored
 in points all over each object, and two shares of them are wrong in a neighbour's probe: those whose hits other things
 hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
-is served where both together stay below a limit. That is HIDDEN for objects LARGE and more, and rises with the inverse
-root of the size, as viewers who come closest see it. Groups are found greedily, the largest first.
+is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
+inverse root of the size above and below. No object that is LARGE shares another's probe, nor one whose centre is
+further off than NEAR of what is mirrored: look-ups from far away are turned wrongly. Groups are found greedily, the
+largest first.
 
-Objects that fill a few pixels from everywhere, or that nobody sees, have no probe: they show the nearest.
+Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from lambent.bake.probes.centre import outside
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.probes.hidden import SHORT, spread
 from lambent.bake.probes.selection import viewers_of
-from lambent.bake.tracing.rays import cosine_directions, leaving, rays_from
+from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize, reflect
@@ -32,7 +34,8 @@ from lambent.core.geometry import triangle_areas
 
 POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
-LARGE = 0.1  # radians
+MEDIUM, LARGE = 0.1, 0.3  # radians
+NEAR = 0.5  # of the median distance of what is mirrored
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
 SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
 CLOSEST = 0.05  # quantile of the distances of viewers
@@ -45,39 +48,44 @@ class Looked:
     """What viewers see mirrored in N objects, at POINTS points of each.
 
     `hits` (N, POINTS, 3) with the object met there, `met` (N, POINTS), NOTHING where there is none; `valid` (N, POINTS)
-    where a viewer sees the point; `size` (N,) of the objects in radians.
+    where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median viewer and for
+    close ones; `reach` (N,) median metres to hits.
     """
 
     hits: Floats
     met: NDArray[np.int64]
     valid: NDArray[np.bool_]
     size: Floats
+    largest: Floats
+    reach: Floats
 
 
 def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[str]) -> dict[str, str]:
     """By each object of `names` that goes without a probe, the one whose probe it shows.
 
-    `whole` is the Mitsuba scene of the builder, `places` (m, 3) are those of viewers; without, all directions count,
-    and all objects are large. Objects whose probe the scene places keep theirs.
+    `whole` is the Mitsuba scene of the builder, `places` (m, 3) are those of viewers; without any, none is shared.
+    Objects whose probe the scene places keep theirs.
     """
     scene, names = builder.scene, list(names)
-    if len(names) < 2:
+    if len(names) < 2 or not len(places):
         return {}
     meshes = [scene.object(name).mesh for name in names]
     centres = np.stack([outside(mesh, np.mean(scene.bounds, axis=0), whole) for mesh in meshes])
     looked = _looked(builder, whole, places, names)
     given = np.array([name in scene.probe_centres or name in scene.probe_planes for name in names])
-    shown = given | ((looked.valid.sum(axis=1) >= SEEN) & (looked.size >= FEW))
+    shown = given | ((looked.valid.sum(axis=1) >= SEEN) & (looked.largest >= FEW))
     if not shown.any():
-        shown[np.argmax(looked.size)] = True
+        shown[np.argmax(looked.largest)] = True
     worth = np.flatnonzero(shown)
     near = np.argsort(np.linalg.norm(centres[worth, None] - centres[worth], axis=2), axis=1)[:, : NEIGHBOURS + 1]
     pairs = np.stack([np.repeat(worth, near.shape[1]), worth[near].ravel()], axis=1)
     clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
     alone = np.array([any(scene.object(name).emission) for name in names])  # left out, a lamp would be missed
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    limits = np.clip(HIDDEN * np.sqrt(LARGE / np.maximum(looked.size, 1e-9)), HIDDEN, 1)
+    one, other = pairs.T
+    close = np.linalg.norm(centres[one] - centres[other], axis=1) < NEAR * looked.reach[one]
+    pairs = pairs[(one != other) & close & (looked.size[one] < LARGE)]
+    limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
     lost = _lost(looked, len(names))
     owner = _grouped(worth, pairs, _wrong(builder, whole, names, centres, looked, pairs), lost, limits)
     own = np.unique(owner[worth])
@@ -93,24 +101,21 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     width = np.sqrt(
         [triangle_areas(mesh.corners).sum() / 4 for mesh in meshes]
     )  # mean shadow of a convex body (Cauchy)
-    valid, size = np.ones((count, POINTS), bool), np.full(count, LARGE)
-    directions = cosine_directions(normals)
-    if len(places):
-        found, eyes = viewers_of(points, normals, places, whole, np.random.default_rng(0))
-        view = normalize(np.where(found[:, None], eyes - points, normals))
-        clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
-        directions = np.where(clear[:, None], -view, reflect(view, normals))
-        valid = found.reshape(count, POINTS)
-        distance = np.where(found, np.linalg.norm(eyes - points, axis=1), np.nan).reshape(count, POINTS)
-        closest = [
-            np.quantile(d[seen], CLOSEST) if seen.any() else np.inf for d, seen in zip(distance, valid, strict=True)
-        ]
-        size = width / np.array(closest)
-    ray = leaving(whole, points, normals, directions)
-    t, met = _first(whole, ray, _numbers(builder, names))
+    found, eyes = viewers_of(points, normals, places, whole, np.random.default_rng(0))
+    view = normalize(np.where(found[:, None], eyes - points, normals))
+    clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
+    directions = np.where(clear[:, None], -view, reflect(view, normals))
+    t, met = _first(whole, leaving(whole, points, normals, directions), _numbers(builder, names))
     far = SKY * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
-    hits = points + directions * np.where(np.isfinite(t), t, far)[:, None]
-    return Looked(hits.reshape(count, POINTS, 3), met.reshape(count, POINTS), valid, size)
+    t = np.where(np.isfinite(t), t, far)
+    valid, distance = (a.reshape(count, POINTS) for a in (found, np.linalg.norm(eyes - points, axis=1)))
+    seen = [
+        np.quantile(d[v], (CLOSEST, 0.5)) if v.any() else (np.inf,) * 2 for d, v in zip(distance, valid, strict=True)
+    ]
+    largest, size = width / np.array(seen).T
+    hits = (points + directions * t[:, None]).reshape(count, POINTS, 3)
+    reach = np.median(t.reshape(count, POINTS), axis=1)
+    return Looked(hits, met.reshape(count, POINTS), valid, size, largest, reach)
 
 
 def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
