@@ -35,7 +35,7 @@ from lambent.core.geometry import triangle_areas
 POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
 MEDIUM, LARGE = 0.1, 0.3  # radians
-NEAR = 0.5  # of the median distance of what is mirrored
+NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, and the quantile of that
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
 SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
 CLOSEST = 0.05  # quantile of the distances of viewers
@@ -49,7 +49,7 @@ class Looked:
 
     `hits` (N, POINTS, 3) with the object met there, `met` (N, POINTS), NOTHING where there is none; `valid` (N, POINTS)
     where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median viewer and for
-    close ones; `reach` (N,) median metres to hits.
+    close ones; `reach` (N,) metres to far hits.
     """
 
     hits: Floats
@@ -114,7 +114,7 @@ def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str])
     ]
     largest, size = width / np.array(seen).T
     hits = (points + directions * t[:, None]).reshape(count, POINTS, 3)
-    reach = np.median(t.reshape(count, POINTS), axis=1)
+    reach = np.quantile(t.reshape(count, POINTS), REACH, axis=1)
     return Looked(hits, met.reshape(count, POINTS), valid, size, largest, reach)
 
 
