@@ -93,9 +93,10 @@ def _owners(context: BakeContext) -> dict[str, str]:
     """By each object without a probe, the one whose it shows; found again only where geometry or materials changed."""
     scene, names, store = context.scene, _objects(context), context.store
     given = [sorted(scene.probe_centres), sorted(scene.probe_planes)]
-    clear = [scene.materials[scene.object(name).material].transmits for name in names]
+    worn = [scene.materials[scene.object(name).material] for name in names]
+    look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
     lamps = [o.name for o in scene.objects if any(o.emission)]
-    key = key_of(SHARED_PROBES, 1, names, clear, given, lamps, *geometry_inputs(scene))
+    key = key_of(SHARED_PROBES, 1, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
     if not isinstance(said, dict) or said.get("key") != key:
         owners = _shared(context, names) if len(names) > 1 else {}

@@ -4,9 +4,9 @@ A probe serves another object as far as its centre sees what viewers see mirrore
 in points all over each object, and two shares of them are wrong in a neighbour's probe: those whose hits other things
 hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
 is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
-inverse root of the size above and below. No object that is LARGE shares another's probe, nor one whose centre is
-further off than NEAR of what is mirrored: look-ups from far away are turned wrongly. Groups are found greedily, the
-largest first.
+inverse root of the size above and below. No object larger than SMALL and its lobe's roughness, which blurs as much,
+shares another's probe, nor one whose centre is further off than NEAR of what is mirrored: look-ups from far away are
+turned wrongly. Groups are found greedily, the largest first.
 
 Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest.
 """
@@ -34,7 +34,7 @@ from lambent.core.geometry import triangle_areas
 
 POINTS = 256  # on each object
 NEIGHBOURS = 12  # whose probes are tried for it
-MEDIUM, LARGE = 0.1, 0.3  # radians
+MEDIUM, SMALL = 0.1, 0.06  # radians
 NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, and the quantile of that
 FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
 SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
@@ -82,9 +82,11 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
     alone = np.array([any(scene.object(name).emission) for name in names])  # left out, a lamp would be missed
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
+    lobes = [scene.materials[scene.object(name).material].lobes for name in names]
+    blur = np.array([max(((lobe.mx * lobe.my) ** 0.5 for lobe in mine), default=0.0) for mine in lobes])
     one, other = pairs.T
     close = np.linalg.norm(centres[one] - centres[other], axis=1) < NEAR * looked.reach[one]
-    pairs = pairs[(one != other) & close & (looked.size[one] < LARGE)]
+    pairs = pairs[(one != other) & close & (looked.size[one] < SMALL + blur[one])]
     limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
     lost = _lost(looked, len(names))
     owner = _grouped(worth, pairs, _wrong(builder, whole, names, centres, looked, pairs), lost, limits)
