@@ -111,8 +111,8 @@ def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
         return
     for camera in record.cameras[:places]:
         aside = STEP_M * np.asarray(camera_axes(camera)[0])
-        moved = (triple(np.asarray(at) + aside) for at in (camera.position, camera.target))
-        yield camera, replace(camera, **dict(zip(("position", "target"), moved, strict=True)))
+        position, target = (triple(np.asarray(at) + aside) for at in (camera.position, camera.target))
+        yield camera, replace(camera, position=position, target=target)
 
 
 def _at_rest(renderer: Renderer, state: FrameState, count: int) -> Iterator[Floats]:

@@ -29,7 +29,7 @@ POINTS = 512  # all over the object
 SPREAD = 16  # directions from each
 LEAST = 16  # points in view: with fewer, nothing is known
 DEPTH = 4  # surfaces on a path
-SAMPLES = 16  # paths per texel of a probe
+SAMPLES = 8  # paths per texel of a probe
 
 
 @dataclass(frozen=True)
