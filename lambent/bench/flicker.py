@@ -14,11 +14,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bench.reprojection import Surfaces, reprojected
+from lambent.bench.reprojection import reprojected
 from lambent.core import metrics
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, camera_axes
@@ -32,6 +32,9 @@ from lambent.scenes.camera_paths import path_length, sample_path
 from lambent.store.contract import SceneRecord
 from lambent.store.store import Store
 from lambent.viewer.pacing import prior_share
+
+if TYPE_CHECKING:
+    from lambent.bake.reference.surfaces import Surfaces
 
 NAME = "flicker"
 STEP_M = 0.02  # half a metre a second at 25 frames
@@ -66,11 +69,16 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
 
 def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
     """One row per case; FLIP's mean is over all pairs of frames, the worst tile of all of them."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.reference import surfaces as traced  # imports Mitsuba, whose variant `engine` has set
+
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene
     if not record.cameras:
         raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
-    surfaces = Surfaces(scene.positions, scene.faces)
+    surfaces = traced.Surfaces(scene.positions, scene.faces)
     state = FrameState(record.cameras[0], effort.width, effort.height, exposure_ev=record.exposure_ev)
     steps = list(_steps(record, effort.places))
     rows = []

@@ -2,42 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.camera import Camera, clip_from_world, pixel_rays
-from lambent.store.contract import FAR
+
+if TYPE_CHECKING:
+    from lambent.bake.reference.surfaces import Surfaces
 
 NEAR_M = 1e-3
 HIDDEN = 2e-3  # share of the distance by which a point may lie behind what the other camera sees there
-
-
-class Surfaces:
-    """Triangles of a scene, for rays from its cameras."""
-
-    def __init__(self, positions: Floats, faces: NDArray[np.uint32]) -> None:
-        """`positions` (V, 3), `faces` (T, 3)."""
-        from lambent.bake.engine import engine
-
-        engine()
-        import mitsuba as mi
-
-        mesh = mi.Mesh("all", len(positions), len(faces))
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = mi.Float(np.asarray(positions, np.float32).ravel())
-        parameters["faces"] = mi.UInt32(np.asarray(faces, np.uint32).ravel())
-        parameters.update()
-        dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # without, Mitsuba warns
-        self._scene: Any = mi.load_dict({"type": "scene", "all": mesh, "dark": dark})
-
-    def distance(self, origin: Floats, directions: Floats) -> Floats:
-        """Metres (n,) from a point (3,) along unit directions (n, 3), FAR where there is nothing."""
-        from lambent.bake.tracing.rays import distances, rays_from
-
-        return np.minimum(distances(self._scene, rays_from(origin, directions)), FAR)
 
 
 def reprojected(picture: Floats, before: Camera, after: Camera, surfaces: Surfaces) -> tuple[Floats, Flags]:

@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
+from lambent.bake.engine import engine
 from lambent.bake.quality import quality_named
 from lambent.bench import flicker
-from lambent.bench.reprojection import Surfaces, reprojected
+from lambent.bench.reprojection import reprojected
 from lambent.core.camera import Camera, pixel_rays
 from lambent.realtime.renderer import Renderer
 from lambent.scenes import load_scene
 from lambent.scenes.geometry import merge, patch
+from lambent.scenes.scene import Mesh
 
 BEFORE = Camera("before", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0))
 AFTER = Camera("after", (0.13, 0.05, 1.9), (0.1, 0.0, 0.0))
+
+
+def surfaces(mesh: Mesh) -> Any:
+    engine()
+    from lambent.bake.reference.surfaces import Surfaces
+
+    return Surfaces(mesh.positions, mesh.faces)
 
 
 def stripes(camera: Camera, width: int = 96, height: int = 64) -> np.ndarray:
@@ -31,7 +41,7 @@ def stripes(camera: Camera, width: int = 96, height: int = 64) -> np.ndarray:
 
 def test_a_pattern_stays_on_its_wall() -> None:
     wall = patch((-5, -5, 0), (10, 0, 0), (0, 10, 0))
-    moved, seen = reprojected(stripes(BEFORE), BEFORE, AFTER, Surfaces(wall.positions, wall.faces))
+    moved, seen = reprojected(stripes(BEFORE), BEFORE, AFTER, surfaces(wall))
     assert 0.8 < seen.mean() < 1, "a margin comes into view"
     assert np.abs(moved - stripes(AFTER))[seen].max() < 2e-3
     assert np.abs(stripes(BEFORE) - stripes(AFTER)).mean() > 0.05
@@ -39,9 +49,9 @@ def test_a_pattern_stays_on_its_wall() -> None:
 
 def test_what_was_hidden_is_not_taken_from_what_hid_it() -> None:
     both = merge([patch((-5, -5, 0), (10, 0, 0), (0, 10, 0)), patch((-0.2, -0.2, 1), (0.4, 0, 0), (0, 0.4, 0))])
-    _, seen = reprojected(stripes(BEFORE), BEFORE, AFTER, Surfaces(both.positions, both.faces))
+    _, seen = reprojected(stripes(BEFORE), BEFORE, AFTER, surfaces(both))
     alone = patch((-5, -5, 0), (10, 0, 0), (0, 10, 0))
-    _, without = reprojected(stripes(BEFORE), BEFORE, AFTER, Surfaces(alone.positions, alone.faces))
+    _, without = reprojected(stripes(BEFORE), BEFORE, AFTER, surfaces(alone))
     assert 0.01 < (without & ~seen).mean() < 0.2
 
 
