@@ -90,8 +90,13 @@ def sharing(owners: Mapping[str, str], name: str) -> tuple[str, ...]:
 
 
 def _owners(context: BakeContext) -> dict[str, str]:
-    """By each object without a probe, the one whose it shows; found again only where geometry or materials changed."""
+    """By each object without a probe, the one whose it shows; found again only where geometry or materials changed.
+
+    Nothing before the geometry is baked, which viewers are then looked for in.
+    """
     scene, names, store = context.scene, _objects(context), context.store
+    if context.stale("geometry"):
+        return {}
     given = [sorted(scene.probe_centres), sorted(scene.probe_planes)]
     worn = [scene.materials[scene.object(name).material] for name in names]
     look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
