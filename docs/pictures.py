@@ -17,11 +17,12 @@ import numpy as np
 from PIL import Image
 
 from lambent.core.colour import filmic, srgb_encode
+from lambent.core.exposure import exposure_of
 from lambent.core.images import read_encoded, read_image, to_bytes
 
 PICTURES = Path(__file__).parent / "pictures"
 LIMIT_BYTES = 300_000
-EXPOSURE_EV = 4.7  # of the built-in room
+EXPOSURE_EV = exposure_of(11.1)  # of the built-in room
 SCENES = {
     "teatray": (512, 512),
     "earrings": (512, 512),

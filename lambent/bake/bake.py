@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -20,9 +19,11 @@ from typing import cast
 from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
+from lambent.bake.cuts import cut_for_viewers
 from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
+from lambent.bake.timing import Stopwatch
 from lambent.bake.view import View
 from lambent.bake.workers import InProcess, Workers
 from lambent.core.discovery import known, modules_in
@@ -31,7 +32,6 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.scenes.textures import prepared
-from lambent.store.contract import TIMINGS
 from lambent.store.source import changed_inputs, inputs_of, write_source
 from lambent.store.store import Store
 
@@ -93,6 +93,7 @@ def bake(
     UserError
         Where an option is unknown, the scene has no objects, or no path tracing engine works.
     """
+    start = time.perf_counter()
     kinds, quality = found(), quality_named(quality)
     for kind in quality.changes:
         known("kind of artefact", kind, kinds)
@@ -112,23 +113,25 @@ def bake(
     methods = chosen(before, light_map=light_map, probes=probes)
     with Store.create(store_path, inputs_of(scene)) as store:
         store.set_document(METHODS, methods)
+        timed = Stopwatch(store)
         undivided = scene
         if "geometry" in order:
-            scene = divided(scene, store, progress)
+            scene = cut_for_viewers(divided(scene, store, progress, timed), store, timed)
         store.set_document("changes", changes)
         write_source(store, scene)
         if not resume:
             store.forget_all()
         context = BakeContext(
             scene, store, kinds, quality, methods, seed, progress, undivided, tuple(views), editables or {},
-            environment, bounces or Bounces(), workers or InProcess(),
+            environment, bounces or Bounces(), workers or InProcess(), timed,
         )  # fmt: skip
         for kind in order:
             if context.stale(kind):
-                with _timed(context, kind):
+                with timed(kind, continued=bool(context.begun(kind))):
                     kinds[kind].bake(context)
             if describe := getattr(kinds[kind], "describe", None):
                 describe(context)
+        timed.finish(start)
     return store
 
 
@@ -156,15 +159,3 @@ def in_order(kinds: Mapping[str, Artefact], wanted: Collection[str]) -> list[str
         return list(TopologicalSorter(dict(sorted(needs.items()))).static_order())
     except CycleError as error:
         raise UserError("artefacts need each other in a circle", got=" -> ".join(error.args[1])) from error
-
-
-@contextmanager
-def _timed(context: BakeContext, kind: str) -> Iterator[None]:
-    """Note the seconds of a kind in the document "timings", added to those of an interrupted bake that it continues."""
-    store, start = context.store, time.perf_counter()
-    before = store.documents.get(TIMINGS, {}).get(kind, 0.0) if context.begun(kind) else 0.0
-    try:
-        yield
-    finally:
-        seconds = round(before + time.perf_counter() - start, 3)
-        store.set_document(TIMINGS, {**store.documents.get(TIMINGS, {}), kind: seconds})

@@ -23,6 +23,7 @@ from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
 from lambent.bake.surfaces.atlas import Atlas, separated
+from lambent.bake.timing import Timed, untimed
 from lambent.bake.view import View
 from lambent.bake.workers import InProcess, Workers
 from lambent.core.progress import Progress, silent
@@ -56,7 +57,7 @@ class BakeContext:
     `scene` has its textures as they are stored, and objects in the parts that have probes of their own; `undivided` has
     them whole, as views show them. `editables` are terms of materials that are not those of their documents;
     `bounces` says what interreflections are baked for, and `environment` lights the views instead of the scene's own.
-    `workers` do jobs that other processes can do.
+    `workers` do jobs that other processes can do. `timed(step)` notes what a step takes that is no kind of artefact.
     """
 
     scene: Scene
@@ -72,6 +73,7 @@ class BakeContext:
     environment: ImageEnvironment | None = None
     bounces: Bounces = field(default_factory=Bounces)
     workers: Workers = field(default_factory=InProcess)
+    timed: Timed = untimed
     _keys: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def settings(self, kind: str) -> Any:

@@ -15,8 +15,10 @@ from lambent.core.environment_layouts import layout_of
 from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.interiors import lat_long_image
-from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene
+from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.textures import digest, parts
+
+DAYLIGHT = "clear_sky 1"  # the model that daylight is calibrated to: raise where it changes
 
 
 def key_of(what: str, revision: int, *inputs: object) -> str:
@@ -27,8 +29,21 @@ def key_of(what: str, revision: int, *inputs: object) -> str:
             result.update(f"{one.dtype} {one.shape}".encode())
             result.update(np.ascontiguousarray(one).tobytes())
         else:
-            result.update(json.dumps(one, sort_keys=True, default=str).encode())
+            result.update(json.dumps(one, sort_keys=True, default=_nested).encode())
     return result.hexdigest()
+
+
+def _nested(value: object) -> object:
+    """What JSON takes of an input within another; an array's text would leave out its middle."""
+    if isinstance(value, np.ndarray):
+        return key_of("array", 1, value)
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, frozenset | set):
+        return sorted(map(str, value))  # their order changes from process to process
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"no key of {type(value).__name__}: it has no text that is the same in every process")
 
 
 def geometry_inputs(scene: Scene) -> list[object]:
@@ -83,4 +98,6 @@ def environment_inputs(environment: Environment | None) -> object:
         values = {name: value for name, value in values.items() if plain.get(name) != value}
     elif isinstance(environment, ComputedEnvironment):
         values = {**values, "image": key_of("computed", 1, lat_long_image(environment.name))}
+    elif isinstance(environment, SunSky):
+        values = {**values, "model": DAYLIGHT}
     return [type(environment).__name__, values]

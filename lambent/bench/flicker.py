@@ -79,7 +79,11 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     if not record.cameras:
         raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
     surfaces = traced.Surfaces(scene.positions, scene.faces)
-    state = FrameState(record.cameras[0], effort.width, effort.height, exposure_ev=record.exposure_ev)
+    state = FrameState(record.cameras[0], effort.width, effort.height)
+    exposure_ev = record.exposure_ev
+    if exposure_ev is None:
+        exposure_ev = metrics.display_exposure(renderer.image(state))
+    state = replace(state, exposure_ev=exposure_ev)
     steps = list(_steps(record, effort.places))
     rows = []
 

@@ -39,7 +39,7 @@ from lambent.core.errors import UserError
 from lambent.core.files import folder_bytes
 from lambent.core.progress import Progress, silent, tracked
 from lambent.editing.interreflection.picture import FrozenPicture
-from lambent.editing.interreflection.stored import Interreflections, interreflections
+from lambent.editing.interreflection.stored import Interreflections, PartLight, interreflections
 from lambent.editing.interreflection.whole import WholePicture
 from lambent.editing.operators import Region
 from lambent.editing.session import Session
@@ -225,19 +225,19 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
             "samples_per_second": round(rate), "thesis_samples": case.published,
             "thesis_seconds": round(case.published * points / rate), "stored_mib": round(_stored(room.store) / MIB, 1),
             "memory_mib": round(held_bytes(light) / MIB, 1),
-            "share_not_zero": round(sum(len(term.codes) for _, term in terms) / max(1, room_for), 4),
+            "share_not_zero": round(sum(len(term.values) for _, term in terms) / max(1, room_for), 4),
             **_times(room, light, effort), **_errors(small, room, effort),
         }  # fmt: skip
 
 
 def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, Any]:
-    """Freezing of each material, and frames of a drag of one."""
+    """Freezing of each material for edits of its sharpest curve, and frames of a drag of one."""
     whole, freezing = room.picture(light), {}
     whole.draw()
     for name in light.parts:
         if name not in room.fixed:
             began = time.perf_counter()
-            FrozenPicture(light, room.start, name, whole.direct.canvas)
+            FrozenPicture(light, room.start, name, whole.direct.canvas, {_sharpest(light.parts[name])})
             freezing[name] = time.perf_counter() - began
     material, frames = room.case.material, []
     curve = next(name for name in room.start[material].curves if "highlight" in name)
@@ -256,6 +256,13 @@ def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, An
         "frozen_mib": round(held_bytes(whole) / MIB, 1),
         "frame_ms": round(statistics.median(frames[2:]), 2), "frame_worst_ms": round(max(frames[2:]), 2),
     }  # fmt: skip
+
+
+def _sharpest(part: PartLight) -> str:
+    """The curve that has the most bands."""
+    pairs = zip(part.start.terms, part.terms, strict=True)
+    counts = [one for term, light in pairs for one in zip(light.counts, term.factors, strict=True)]
+    return max(counts, key=lambda one: one[0])[1].curve
 
 
 def _drag(room: _Room, material: str, curve: str) -> Iterator[Editable]:

@@ -27,7 +27,7 @@ from lambent.realtime.renderer import Renderer
 from lambent.realtime.unbaked import CAMERA, unbaked_scene
 
 NAME = "quality"
-INTEGRATORS = ("rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum")
+INTEGRATORS = ("lamps", "rings", "lobe-4.24", "lobe-4.25", "fis", "split-sum")
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +14,7 @@ from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.methods import LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
-from lambent.cli.console import Json, progress_bar, say, show, table
+from lambent.cli.console import CreaseAngle, Json, progress_bar, say, show, table
 from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
 
@@ -80,21 +81,31 @@ def command(
         int | None, typer.Option(min=1, help="Of interreflections: processes of this machine that share the work.")
     ] = None,
     cluster: Annotated[str | None, typer.Option(help="Of interreflections: address of a Dask scheduler.")] = None,
+    crease_angle: CreaseAngle = None,
     json: Json = False,
 ) -> None:
     """Bake light maps, environment and probes of a scene. Ctrl-C keeps what is finished; run it again to go on.
 
     Example: lambent bake builtin:room -o room.store --quality preview
+
     Example: lambent bake builtin:teatray -o tray.store --only transport --view front:512x512
+
     Example: lambent bake builtin:cornell -o box.store --only transport --only interreflection --view front:450x450
+
     Example: lambent bake builtin:cornell --view front:450x450 --samples 4096 --propose
     """
     from lambent.bake.bake import bake
     from lambent.scenes import load_scene
+    from lambent.scenes.clear_sky import daylight_in_words
+    from lambent.scenes.scene import SunSky
+    from lambent.store.contract import LAST_RUN, TIMINGS
 
     if output is None and not propose:
         raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
-    what = load_scene(scene)
+    start = time.perf_counter()
+    what = load_scene(scene, crease_angle)
+    loading = time.perf_counter() - start
+    _check_lit(what)
     edited, changed = _edited(what, output, view or [], edit)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
@@ -115,10 +126,22 @@ def command(
             light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
         )  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
-    seconds = store.documents.get("timings", {})
-    facts = {"store": output, "arrays": arrays, "seconds": seconds, "warnings": what.warnings}
-    rows = [(name, f"{value:.1f} s") for name, value in seconds.items()]
+    daylight = [("daylight", daylight_in_words(what.environment))] if isinstance(what.environment, SunSky) else []
+    seconds, run = store.documents.get(TIMINGS, {}), {"loading": loading, **store.documents.get(LAST_RUN, {})}
+    run["other"] = time.perf_counter() - start - sum(value for step, value in run.items() if step != "other")
+    facts = {"store": output, "arrays": arrays, "seconds": seconds, "this_run": run, "warnings": what.warnings}
+    rows = [*daylight, *((name, f"{value:.1f} s") for name, value in {**seconds, **run}.items())]
+    rows.append(("this run", f"{sum(run.values()):.1f} s"))
+    facts |= dict(daylight)
     show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
+
+
+def _check_lit(scene: Scene) -> None:
+    """`UserError` where no picture of the scene could show anything: after its bake that is too late."""
+    shines = scene.environment is not None or scene.lights or any(any(o.emission) for o in scene.objects)
+    if not shines or not scene.cameras:
+        lacks, section = ("nothing gives light", "[environment]") if not shines else ("no camera", "[[cameras]]")
+        raise UserError(lacks, field=scene.name, hint=f"add {section} to its scene.toml")
 
 
 def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:

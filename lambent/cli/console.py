@@ -23,6 +23,12 @@ Between = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 
+CreaseAngle = Annotated[
+    float | None,
+    typer.Option(
+        "--crease-angle", min=0, max=180, help="Of a scene: edges of more degrees are hard where normals lean."
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist, even the input.")]
 
 

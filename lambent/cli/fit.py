@@ -9,6 +9,7 @@ import typer
 
 from lambent.cli.console import Between, Force, Json, progress_bar, say, show, table, words
 from lambent.core.errors import UserError
+from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 
 if TYPE_CHECKING:
     from lambent.materials.document import Material
@@ -27,9 +28,8 @@ def command(
     ] = "gradient",
     metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
     distribution: Annotated[
-        Literal["beckmann", "ggx", "best"],
-        typer.Option(help="Of the microfacets: ggx has long tails; best tries both."),
-    ] = "beckmann",
+        DistributionChoice, typer.Option(help="Of the microfacets: ggx has long tails; best tries both.")
+    ] = DISTRIBUTION,
     coupled: Annotated[bool, typer.Option("--coupled", help="Diffuse reflection falls as Fresnel rises.")] = False,
     keep_albedo: Annotated[
         bool, typer.Option("--keep-albedo", help="Hold the albedo over the angle of incidence to the table's.")

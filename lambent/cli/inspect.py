@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lambent.cli.console import Between, Force, Json, show, table, words
+from lambent.cli.console import Between, CreaseAngle, Force, Json, show, table, words
 from lambent.cli.convert import is_document
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_head
@@ -24,6 +24,7 @@ def command(
     file: Annotated[str, typer.Argument(help="Measured table, material, scene, store, image; or builtin:room.")],
     plot: Annotated[Path | None, typer.Option(help="Draw a table or material (.png, .pdf, .svg).")] = None,
     reconstruction: Between = "auto",
+    crease_angle: CreaseAngle = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -38,7 +39,11 @@ def command(
     inspect = inspector_of(file)
     if reconstruction != "auto" and inspect is not inspect_table:
         raise UserError("only a measured table is looked up so", file=file, field="--reconstruction")
-    if inspect is inspect_table:
+    if crease_angle is not None and inspect is not inspect_scene:
+        raise UserError("only a scene has creases", file=file, field="--crease-angle")
+    if crease_angle is not None and plot is None:
+        facts = plain(inspect_scene(file, crease_angle))
+    elif inspect is inspect_table:
         facts = plain(inspect_table(file, plot, reconstruction))
     elif plot is None:
         facts = plain(inspect(file))
@@ -110,11 +115,13 @@ def inspect_material(file: str, plot: Path | None = None) -> Facts:
     }
 
 
-def inspect_scene(file: str) -> Facts:
+def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
     """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
+    from lambent.scenes.clear_sky import daylight_in_words
+    from lambent.scenes.scene import SunSky
 
-    scene = load_scene(file)
+    scene = load_scene(file, crease_deg)
     low, high = scene.bounds
     return {
         "is": "scene",
@@ -123,6 +130,7 @@ def inspect_scene(file: str) -> Facts:
         "triangles": sum(len(o.mesh.faces) for o in scene.objects),
         "materials": sorted(scene.materials),
         "environment": type(scene.environment).__name__ if scene.environment else "none",
+        **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
         "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
         "cameras": [camera.name for camera in scene.cameras],
         "paths": [path.name for path in scene.paths],

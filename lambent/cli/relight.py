@@ -27,7 +27,7 @@ def command(
     up: Annotated[Axis, typer.Option(help="Axis of the world that the picture's up points along.")] = "+y",
     scale: Annotated[float, typer.Option(min=0.0, help="Times the picture's radiance.")] = 1.0,
     turn: Annotated[float, typer.Option(help="Degrees about +y that the environment is turned by.")] = 0.0,
-    exposure: Annotated[float, typer.Option(help="In EV, of PNG.")] = 0.0,
+    exposure: Annotated[float | None, typer.Option(help="In EV, of PNG. [default: metered]")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -36,6 +36,7 @@ def command(
     Example: lambent relight room.store --environment grace.hdr --turn 90 -o grace.png
     """
     from lambent.core.colour import shown
+    from lambent.core.exposure import metered
     from lambent.core.images import WRITABLE, to_bytes, write_image, write_shown
     from lambent.core.outputs import check_output
     from lambent.editing.relit_view import RelitView
@@ -52,7 +53,8 @@ def command(
     view.draw()
     image = view.image()
     if output.suffix.lower() == ".png":
-        write_shown(output, to_bytes(shown(image, "filmic", exposure)))
+        exposure_ev = exposure if exposure is not None else metered(image) or 0.0
+        write_shown(output, to_bytes(shown(image, "filmic", exposure_ev)))
     else:
         write_image(output, image)
     facts = {"written": output, "camera": record.camera.name, "size": [record.width, record.height]}

@@ -14,12 +14,14 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from lambent.core.false_colour import Range
 
+MEASURED = {"luminance": "full", "illuminance": "light-map"}  # the part of the light that has it
 SHOWN_BY = (
     "store",
     "output",
     "edit",
     "surfaces",
     "exposure",
+    "ev100",
     "view",
     "false_range",
     "linear",
@@ -41,28 +43,39 @@ def command(
     ] = None,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
     integrator: Annotated[
-        str, typer.Option(help="rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer.")
-    ] = "rings",
+        str,
+        typer.Option(
+            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer."
+        ),
+    ] = "lamps",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
-    exposure: Annotated[float | None, typer.Option(help="In EV. [default: the scene's]")] = None,
+    exposure: Annotated[
+        float | None, typer.Option(help="In EV: stops on radiance. [default: the scene's, else metered]")
+    ] = None,
+    ev100: Annotated[
+        float | None, typer.Option("--ev100", help="The same as EV100, 15 in the sun, 8 in a room by night.")
+    ] = None,
     view: Annotated[
         str, typer.Option(help="How PNG and MP4 show light: filmic, neutral, linear, or false-colour (cd/m2).")
     ] = "filmic",
     false_range: Annotated[
-        str | None, typer.Option("--range", help="LOW:HIGH of false-colour, in cd/m2. [default: by the first image]")
+        str | None,
+        typer.Option("--range", help="LOW:HIGH of false colours, cd/m2 or lx. [default: by the first image]"),
     ] = None,
     linear: Annotated[bool, typer.Option("--linear", help="False colours at even steps, not decades.")] = False,
     part: Annotated[
         str,
         typer.Option(
-            "--show", help="full, diffuse, specular, light-map: irradiance, in lx, or noise: its standard error, %."
+            "--show",
+            help="full, diffuse, specular, light-map: irradiance, or noise: its standard error, %. In false colours: "
+            "luminance (cd/m2) or illuminance of surfaces (lx).",
         ),
     ] = "full",
     planar: Annotated[
         str,
         typer.Option(
             help="How flat mirrors and floors are drawn: auto, off (from their probes), or as the integrator knows: "
-            "interleaved, marched or fixed (rings), thesis (lobe-4.24, lobe-4.25), fis."
+            "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
     projection: Annotated[
@@ -89,14 +102,24 @@ def command(
     """Render a still or a film: EXR and HDR keep radiance, PNG and MP4 show it through a view transform.
 
     Example: lambent render room.store --camera entrance -o entrance.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
+    from lambent.core.exposure import exposure_of
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
 
+    if ev100 is not None:
+        if exposure is not None:
+            raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
+        exposure = exposure_of(ev100)
+    if part in MEASURED:
+        if view not in ("filmic", "false-colour"):
+            raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
+        part, view = MEASURED[part], "false-colour"
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
@@ -129,7 +152,9 @@ def command(
         else:
             done = render.still(store, output, camera, settings, scene=scene, note=note, progress=progress)
     size = f"{done.width}x{done.height}"
-    show(asdict(done), f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {done.seconds:.1f} s", json)
+    exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
+    text = f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {exposed}{done.seconds:.1f} s"
+    show(asdict(done), text, json)
 
 
 def parse_range(text: str, *, log: bool) -> Range:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from lambent.core.directions import Floats, normalize
 from lambent.core.plain import Triple, triple
 
+FARTHEST_M = 1e9  # from the origin: in float32, squares of more would be infinite
 OVERVIEW_FROM = np.array([0.5, 0.35, 0.8])
 OVERVIEW_FOV_Y_DEG = 45.0
 

@@ -29,6 +29,7 @@ SPECTRUM_BYTES = 1 << 20
 PICTURE_BYTES = 2 << 30
 TEXTURE_BYTES = 1 << 30
 VIEWS_BYTES = 64 << 20
+IES_BYTES = 16 << 20
 
 
 @dataclass(frozen=True)
@@ -63,4 +64,5 @@ XML_TEXT = Ceiling("parameters make it too long", 1 << 20, "characters")
 XML_PLUGINS = Ceiling("scene refers to itself too often", 400_000, "plugins")
 XML_NESTING = Ceiling("is nested too deep", 32, "plugins within plugins")
 SERIALIZED_VERTICES = Ceiling("mesh is too large", 60_000_000, "vertices")
+IES_ANGLES = Ceiling("photometry is too large", 4096, "angles")
 WAVELENGTHS = Ceiling("spectrum is too long", 4096, "wavelengths")

@@ -6,6 +6,7 @@ All functions take and return arrays (..., 3) and keep the dtype of floating inp
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 
@@ -15,11 +16,22 @@ XYZ_TO_RGB = np.linalg.inv(RGB_TO_XYZ)
 WHITE_XYZ = RGB_TO_XYZ.sum(axis=1)
 _LAB_EDGE = 6 / 29
 HALF_MAX = 65504.0  # the largest half float; brighter light is clipped to it
+MOST_UNIT = 2.0**24  # of light that is stored as half floats
 
 
 def luminance(rgb: Floats) -> Floats:
     """Y (...) of linear RGB (..., 3)."""
     return np.asarray(rgb @ RGB_TO_XYZ[1].astype(rgb.dtype))
+
+
+def in_halves(light: Floats) -> tuple[NDArray[np.float16], float]:
+    """Light (...) >= 0 as half floats and their unit, the least power of two, at least 1, in which it has room.
+
+    The sun shows 7e6 W/(sr m^2), a hundred times the largest half float.
+    """
+    brightest = min(float(light.max(initial=0.0)), HALF_MAX * MOST_UNIT)
+    unit = 2.0 ** np.ceil(np.log2(max(brightest / HALF_MAX, 1.0)))
+    return np.minimum(light / unit, HALF_MAX).astype(np.float16), float(unit)
 
 
 def rgb_to_xyz(rgb: Floats) -> Floats:

@@ -32,6 +32,16 @@ def planes_lookup(x: Floats, w: Floats, planes: Floats) -> Floats:
     return np.where(nearness > NEARNESS_MIN, x + w / np.maximum(nearness, NEARNESS_MIN), w)
 
 
+def distances_to_planes(w: Floats, planes: Floats) -> Floats:
+    """(M,) distances from the probe's centre along unit w (M, 3) to the first of its planes (P, 4); inf for none."""
+    height = planes[:, 3]
+    nearness = np.divide(
+        -(w @ planes[:, :3].T), height, out=np.zeros((len(w), len(planes))), where=height > PLANE_ACTIVE_M
+    )
+    nearest = nearness.max(axis=1, initial=0.0)
+    return np.asarray(np.divide(1.0, nearest, out=np.full(len(w), np.inf), where=nearest > NEARNESS_MIN))
+
+
 def inverse_depth(distance: Floats) -> Floats:
     """(6, N, N, 1) 1/max(|x|, |y|, |z|), 1/m, of the points at `distance` (6, N, N): linear over planes."""
     length = np.linalg.norm(face_directions(distance.shape[1]), axis=-1)

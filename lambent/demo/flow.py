@@ -26,7 +26,7 @@ from typing import Any
 from lambent.bake.bake import bake
 from lambent.bake.quality import Quality, quality_named
 from lambent.bake.reference.goniophotometer import measure
-from lambent.core.camera import Camera
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.colour import srgb_decode
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
@@ -44,7 +44,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.render import write_frames
 from lambent.scenes import load_scene
-from lambent.scenes.camera_paths import camera_at
+from lambent.scenes.camera_paths import camera_at, path_length
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
@@ -55,12 +55,13 @@ SPECIMEN_OF = {  # material of the room -> specimen that is measured for it
     "varnished_wood": "varnished wood",
     "frosted_glass": "frosted glass",
 }
+PACE_M_S = 1.2  # of the film: somebody who looks around
 STILLS = 8
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Sizes of a demo: images in pixels, film in seconds, samples per pixel of the compared view.
+    """Sizes of a demo: images in pixels, frames of the film per second, samples per pixel of the compared view.
 
     `tuples` of each table are fitted, all where None; `still_frames` are averaged to a still, `moving_frames` to the
     view in motion, so that its edges can be compared.
@@ -71,7 +72,6 @@ class Effort:
     still: tuple[int, int]
     still_frames: int
     film: tuple[int, int]
-    film_seconds: float
     film_fps: int
     compared: tuple[int, int]
     path_spp: int
@@ -86,8 +86,18 @@ DRAFT = quality_named("preview").changed(
     environment={"texels": 128},
     probe={"texels": 64, "samples": 8},
 )
-FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (720, 450), 5.0, 20, (840, 525), 48, 256)
-QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 3.0, 10, (420, 262), 32, 128, 4)
+FULL = Effort(quality_named("preview"), None, (1680, 1050), 2, (720, 450), 20, (840, 525), 48, 256)
+QUICK = Effort(DRAFT, 3_000, (960, 600), 1, (480, 300), 10, (420, 262), 32, 128, 4)
+
+
+def cameras(path: CameraPath, count: int) -> list[Camera]:
+    """`count` cameras along a path, at even steps of time."""
+    return [camera_at(path, k / (count - 1) * path.seconds) for k in range(count)]
+
+
+def walked(path: CameraPath, fps: int) -> list[Camera]:
+    """Cameras of a film that walks a path at `PACE_M_S`."""
+    return cameras(path, max(2, round(path_length(path) / PACE_M_S * fps)))
 
 
 class Flow:
@@ -169,12 +179,9 @@ class Flow:
     def walk(self) -> None:
         """Stills along the walk and the film of it, from the frame code of the window."""
         effort, renderer = self.effort, self._renderer
-        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev
+        path, exposure_ev = renderer.scene.record.paths[0], renderer.scene.record.exposure_ev or 0.0
 
-        def cameras(count: int) -> list[Camera]:
-            return [camera_at(path, k / (count - 1) * path.seconds) for k in range(count)]
-
-        views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(STILLS)]
+        views = [FrameState(camera, *effort.still, exposure_ev=exposure_ev) for camera in cameras(path, STILLS)]
         renderer.display_image(views[0])  # the first frame also builds the pipelines
         with self._timed("stills"):
             for number, view in enumerate(views, 1):
@@ -191,7 +198,7 @@ class Flow:
             return renderer.display_image(replace(frame, camera=camera))
 
         with self._timed("film"):
-            shown = cameras(round(effort.film_seconds * effort.film_fps))
+            shown = walked(path, effort.film_fps)
             write_frames(self.out / "walk.mp4", shown, draw, effort.film, effort.film_fps, self.progress)
 
     def compare(self, scene: Scene) -> None:

@@ -146,7 +146,7 @@ class SessionDocument(_Strict):
     @model_validator(mode="after")
     def _can_be_drawn(self) -> SessionDocument:
         if not is_usable(self.camera):
-            raise ValueError("the camera is not finite, or sees no angle")
+            raise ValueError("the camera is not within 1e9 m, or sees no angle")
         if self.size[0] * self.size[1] > MOST_PIXELS:
             raise ValueError(f"a picture has at most {MOST_PIXELS} pixels, not {self.size[0]} x {self.size[1]}")
         return self

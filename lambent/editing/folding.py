@@ -7,17 +7,13 @@ The result is transport of one curve, in the wavelets that `IncrementalPicture` 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.wavelets import TAPS
+from lambent.editing.packed_light import add_light
 from lambent.editing.products import Halves, half_of_float
 
 TOGETHER = 16  # points whose rows stay in the first-level cache, in another set of it each
@@ -67,39 +63,6 @@ def folded(
     return out.view(np.float16), scale
 
 
-@intrinsic
-def _add_light(_typing, sums, at, means, of, bits):  # type: ignore[no-untyped-def]
-    """sums[at:at + 4] += means[of:of + 4] times a colour of `core.shared_exponent`, the channels side by side.
-
-    In flat numbers of contiguous arrays. numba does not find this by itself: an entry takes a third of the time.
-    """
-    word, channels = ir.IntType(32), 4
-    whole, real = ir.VectorType(word, channels), ir.VectorType(ir.FloatType(), channels)
-
-    def each(*numbers: int) -> ir.Constant:
-        return ir.Constant(whole, list(numbers if len(numbers) == channels else numbers * channels))
-
-    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        def place(k: int) -> Any:
-            data = context.make_array(signature.args[k])(context, builder, args[k]).data
-            return builder.bitcast(builder.gep(data, [args[k + 1]]), real.as_pointer())
-
-        nothing = ir.Constant(whole, ir.Undefined)
-        bits = builder.insert_element(nothing, args[4], ir.Constant(word, 0))
-        bits = builder.shuffle_vector(bits, nothing, each(0))
-        mantissas = builder.and_(builder.lshr(bits, each(0, 9, 18, 27)), each(511, 511, 511, 0))
-        exponent = builder.add(builder.lshr(bits, each(27)), each(103))  # as in `products.unit_of`
-        unit = builder.bitcast(builder.shl(exponent, each(23)), real)
-        to = place(0)
-        mean, before = builder.load(place(2), align=4), builder.load(to, align=4)
-        light = builder.fmul(builder.uitofp(mantissas, real), unit)
-        added = builder.fmul(light, mean, flags=["contract"])
-        builder.store(builder.fadd(before, added, flags=["contract"]), to, align=4)
-        return context.get_dummy_value()
-
-    return types.void(sums, types.intp, means, types.intp, types.uint32), generate
-
-
 @numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
 def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-untyped-def]
     """`places` are the bits of a pair's number that are bands of the edited curve, and of the idle one: shift, mask."""
@@ -114,7 +77,7 @@ def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-un
             for n in range(spans[first + i, 0], spans[first + i, 1]):
                 pair += steps[n]
                 j, k = pair >> shift & mask, pair >> idle_shift & idle_mask
-                _add_light(rows, (j * TOGETHER + i) * 4, means, k * 4, values[n])  # type: ignore[call-arg]
+                add_light(rows, (j * TOGETHER + i) * 4, means, k * 4, values[n])  # type: ignore[call-arg]
         write_wavelets(out, first, rows, before, taps)
 
 

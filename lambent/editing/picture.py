@@ -110,8 +110,9 @@ class EditedPicture:
         """Let the picture go to a material as it is edited now; frames do so by `step`, or at once by `draw`.
 
         Of two curves in a term, the one that changes becomes active. Raises `TransportNeeded`, and leaves the picture
-        as it is, where the transport serves no such edit.
+        as it is, where the transport serves no such edit, and `UserError` where no pixel shows the material.
         """
+        known("material in view", material, self._parts)
         part, terms = self._parts[material], self._terms[material]
         if not same_quotients(part.start, edited):
             before = {term.name: (term.quotient, term.factors, term.side) for term in part.start.terms}
@@ -124,7 +125,8 @@ class EditedPicture:
             term.show(edited.curves, now)
 
     def activate(self, material: str, curve: str) -> None:
-        """Make a curve the active one of its terms, before it is dragged."""
+        """Make a curve the active one of its terms, before it is dragged. Errors as of `show`."""
+        known("material in view", material, self._parts)
         known("curve", curve, self._parts[material].start.curves)
         for term in self._terms[material]:
             term.activate(curve)

@@ -15,9 +15,11 @@ from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
-from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
+
+ENVIRONMENT = "environment/radiance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,11 @@ class Probe:
 
 @dataclass(frozen=True, eq=False)
 class BakedScene:
-    """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name."""
+    """Geometry (as in store.contract), light maps (H, W, 3), environment (6, N, N, 3) and probes by object name.
+
+    All light is in units of `unit` W/(sr m^2) or W/m^2, so that what the sun shows has room in half floats; that of the
+    record, and probes' `irradiance`, is not. Pictures are in W/(sr m^2).
+    """
 
     record: SceneRecord
     positions: Floats
@@ -56,6 +62,8 @@ class BakedScene:
     noise: Floats | None = None  # (H, W), relative standard error of the light map
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
+    unit: float = 1.0
+    sun: SunRecord | None = None  # whose direct light the light maps leave out
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe or the one it shares, else the nearest one, else the environment, else None."""
@@ -73,10 +81,16 @@ class BakedScene:
         return None if self.environment is None else Probe((0.0, 0.0, 0.0), self.environment)
 
 
+def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
+    return sun and sun.model_copy(update={"irradiance": triple(np.divide(sun.irradiance, unit))})
+
+
 def read_baked(store: Store) -> BakedScene:
     """Everything the renderer shows of a store. Only the geometry and the scene record must be there."""
     record = contract.scene_record(store)
     missing: list[str] = []
+    cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in record.objects)) if n in store]
+    unit = max((contract.radiance_unit(store, name) for name in cubes), default=1.0)
 
     def light(name: str, why: str | None) -> Floats | None:
         if name not in store:
@@ -86,7 +100,8 @@ def read_baked(store: Store) -> BakedScene:
         values, bad = finite(store.read(name))
         if bad:
             missing.append(f"{name}: {bad} values are negative or not finite and were set to 0")
-        return values
+        own = contract.radiance_unit(store, name) if name in cubes else 1.0
+        return values if own == unit else values * np.float32(own / unit)
 
     def noise(side: str) -> Floats | None:
         name = noise_name(side)
@@ -109,7 +124,7 @@ def read_baked(store: Store) -> BakedScene:
         **read_geometry(store),
         irradiance=light("light_map/irradiance", "diffuse light is black"),
         irradiance_back=light("light_map/irradiance_back", back),
-        environment=light("environment/radiance", None),
+        environment=light(ENVIRONMENT, None),
         probes=probes,
         missing=tuple(missing),
         textures=read_textures(store, record),
@@ -117,6 +132,8 @@ def read_baked(store: Store) -> BakedScene:
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
+        unit=unit,
+        sun=_in_units(contract.sun_beside(store), unit),
     )
 
 

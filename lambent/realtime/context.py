@@ -39,6 +39,9 @@ class FrameContext:
     shown: Any = None  # view that the display image is drawn into, if any
     radiance: Any = None  # texture of linear light, as the passes before left it
     prior: Any = None  # texture of the last frame of few samples, where it is shown beside a progressive mean
+    base: Any = None  # texture of the last frame of few samples, where this one is drawn over it
+    redrawn: frozenset[str] | None = None  # materials whose objects alone are drawn over `base`
+    light: tuple[Any, ...] = ()  # of group 3: light maps, the sun, and what pixels see of it
     reflections: Any = None  # group 3 of draws that have pixels on planar reflectors
 
     @property

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from lambent.materials.document import Material
 from lambent.realtime.frame_state import SHOW, FrameState
 from lambent.realtime.incident import LookUp
-from lambent.realtime.integrators import INTEGRATORS, Integrator
+from lambent.realtime.integrators import INTEGRATORS, Cube, Integrator
+from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources
 from lambent.realtime.textures import WIDENING, bits_that_show
+
+LampUse = Literal["", "aim", "lamps"]  # samples aim at lamps, or lamps are outside of the cube map
 
 
 @dataclass(frozen=True)
@@ -25,13 +28,14 @@ class Draw:
     look_up: LookUp
     material_group: Any
     textures: int = 0  # bits of the textures to read, see realtime.textures
-    aims: bool = False  # samples at the lamps of its probe
+    table: LampUse = ""  # what it does with the lamps of its probe
     planar: bool = False  # has pixels on planar reflectors
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
-        """The same object by another integrator, for a pass that neither aims nor reads reflections."""
+        """The same object by another integrator that does not aim, for a pass that does not read reflections."""
         group = resources.materials[self.item.record.material].group(self.material, how, n)
-        return replace(self, integrator=how, n=n, material_group=group, aims=False, planar=False)
+        table = lamp_use(how, self.item.light, self.look_up, self.material, self.textures)
+        return replace(self, integrator=how, n=n, material_group=group, table=table, planar=False)
 
     @property
     def lobes(self) -> int:
@@ -40,11 +44,23 @@ class Draw:
     @property
     def shader(self) -> str:
         """File of the integrator's shader."""
-        return self.integrator.aimed if self.aims and self.integrator.aimed else self.integrator.shader
+        how = self.integrator
+        return {"aim": how.aimed, "lamps": how.lamps}.get(self.table) or how.shader
+
+    @property
+    def cube(self) -> Cube:
+        """Which cube map of the probe it reads."""
+        return "cleaned" if self.table == "lamps" else self.integrator.cube
+
+    @property
+    def _layers(self) -> dict[str, float]:
+        if self.table != "lamps":
+            return {}
+        return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
 
     @property
     def object_group(self) -> Any:
-        return self.item.group(self.integrator.cube, self.look_up, self.aims)
+        return self.item.group(self.cube, self.look_up, self.table)
 
     @property
     def constants(self) -> dict[str, float]:
@@ -55,7 +71,16 @@ class Draw:
             "TEXTURES": self.textures,
             **self.look_up.constants(self.item.light.probe),
             **self.integrator.constants,
+            **self._layers,
         }
+
+
+def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> LampUse:
+    """What an integrator does with the lamps of a probe for a material; `textures` are the bits of those that show."""
+    widened = bool(textures & WIDENING)
+    if how.aimed and look_up.AIMS and light.aims.is_aimed_at(material, widened):
+        return "aim"
+    return "lamps" if how.lamps and light.lamps.serve(material, widened) else ""
 
 
 def draws_of(state: FrameState, resources: SceneResources, reflecting: Collection[str] = ()) -> list[Draw]:
@@ -66,16 +91,19 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
         material, textures = state.materials.get(name, resources.scene.record.materials[name]), buffers.textures
         lobes = len(material.lobes) if wanted.specular else 0
         how = wanted if lobes else INTEGRATORS["diffuse"]
-        n = how.rows or (state.samples(material, textures.rough) if lobes else 1)
         anisotropic = any(lobe.mx != lobe.my for lobe in material.lobes)
         bits = bits_that_show(textures.bits, lobes, anisotropic)
-        found[name] = (material, how, n, buffers.group(material, how, n), bits)
+        found[name] = (material, how, bits)
     draws = []
     for item in resources.objects:
-        material, how, n, group, bits = found[item.record.material]
-        light = item.light
+        material, how, bits = found[item.record.material]
+        buffers, light = resources.materials[item.record.material], item.light
         look_up = light.look_up(state.lookups.get(item.record.name, state.lookup)) if how.specular else light.cheapest
-        aims = bool(how.aimed) and look_up.AIMS and light.lamps.is_aimed_at(material, bool(bits & WIDENING))
+        table = lamp_use(how, light, look_up, material, bits)
         planar = how.specular and item.record.name in reflecting
-        draws.append(Draw(item, material, how, n, look_up, group, bits, aims, planar))
+        # the buffer of a planar reflector has its lamps
+        alone = table == "lamps" and not planar and light.lamps.all_out(material, bool(bits & WIDENING))
+        n = how.rows or (state.samples(material, buffers.textures.rough, alone) if how.specular else 1)
+        group = buffers.group(material, how, n)
+        draws.append(Draw(item, material, how, n, look_up, group, bits, table, planar))
     return draws

@@ -71,6 +71,9 @@ class FrameState:
         Share, in the display image of a progressive series, of the last frame of few samples that was displayed.
     antialias : bool
         Edges of the display image are blended, or, when accumulating, frames are jittered.
+    over : bool
+        Draw over the last displayed frame of few samples, and draw only the objects whose materials have changed since.
+        Where anything else but the size or planar reflections has changed, the frame is drawn whole.
     jitter_px : tuple of float
         Where light is looked up in each pixel: right of and below its centre, within (-.5, .5).
     """
@@ -78,7 +81,7 @@ class FrameState:
     camera: Camera
     width: int = 1680
     height: int = 1050
-    integrator: str = "rings"
+    integrator: str = "lamps"
     n: int | None = None
     exposure_ev: float = 0.0
     view_transform: str = "filmic"
@@ -92,6 +95,7 @@ class FrameState:
     accumulate: int | None = None
     prior: float = 0.0
     antialias: bool = True
+    over: bool = False
     jitter_px: tuple[float, float] = (0.0, 0.0)
 
     def check(self) -> None:
@@ -123,9 +127,14 @@ class FrameState:
         """Whether edges of the display image are blended where it comes from one frame."""
         return self.antialias and not self.is_false_coloured
 
-    def samples(self, material: Material, roughness: float = 1.0) -> int:
-        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document."""
-        return self.n or (QMC_N if integrator(self.integrator).progressive else automatic_n(material, roughness))
+    def samples(self, material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
+        """Samples per lobe of a material in this frame; `roughness` is a factor on that of the document.
+
+        `without_lamps`: all lamps are outside of the cube map that is sampled.
+        """
+        if integrator(self.integrator).progressive:
+            return self.n or QMC_N
+        return self.n or automatic_n(material, roughness, without_lamps)
 
 
 def quantity_of(show: str) -> Quantity:

@@ -18,7 +18,8 @@ from lambent.realtime import patterns
 from lambent.realtime.albedo import TABLE_ROWS, albedo_table, normalised_rings_table
 
 # Levels by smooth_chain or mip_chain of cube_mips.py, or prefiltered by roughness. Published estimates keep theirs.
-Cube = Literal["smooth", "box", "prefiltered"]
+# `cleaned` is an array of smooth ones, without lamps (lamps.py).
+Cube = Literal["smooth", "box", "prefiltered", "cleaned"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +34,11 @@ class Integrator:
     specular: bool = True
     progressive: bool = False  # unbiased: frames may be averaged, all of the same few samples
     aimed: str | None = None  # shader for a probe whose lamps stand out: part of the samples aims at them
+    lamps: str | None = None  # shader for a probe with lamps that are smaller than a lobe: they leave the cube map
 
 
 INTEGRATORS: dict[str, Integrator] = {
+    "lamps": Integrator("rings.wgsl", normalised_rings_table, lamps="lamps.wgsl"),
     "rings": Integrator("rings.wgsl", normalised_rings_table),
     "lobe-4.24": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 24}, cube="box"),
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),

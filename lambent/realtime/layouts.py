@@ -20,9 +20,15 @@ KINDS: dict[str, dict[str, Any]] = {
     "flat": {"texture": {"sample_type": "float", "view_dimension": "2d"}},
     "layers": {"texture": {"sample_type": "float", "view_dimension": "2d-array"}},
     "cube": {"texture": {"sample_type": "float", "view_dimension": "cube"}},
+    "cubes": {"texture": {"sample_type": "float", "view_dimension": "cube-array"}},
     "exact": {"texture": {**_UNFILTERED, "view_dimension": "2d"}},  # loaded, never filtered
+    "depth layers": {"texture": {"sample_type": "depth", "view_dimension": "2d-array"}},
     "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
 }
+
+
+LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
+SHADOW_MAP = "uniform", "depth layers", "exact layers"  # the sun, depths towards it, and their blocks
 
 
 class Layouts:
@@ -34,14 +40,14 @@ class Layouts:
         both = wgpu.ShaderStage.FRAGMENT | wgpu.ShaderStage.VERTEX
         self.frame = self._of("uniform", "sampler", visibility=both)
         self.material = self.of("uniform", "storage", "storage", "sampler", *["flat"] * len(CHANNELS))
-        self.light = self.of("layers")
+        self.light = self.of(*LIGHT)
         self.cube = self.of("cube")
         self.shown = self.of("flat", "sampler")
         self.empty = device.create_buffer(size=16, usage=wgpu.BufferUsage.STORAGE)  # a binding must hold something
 
-    def object(self, look_up: tuple[str, ...]) -> Any:
-        """Layout of group 2 with the bindings of a look-up of incident light."""
-        return self.of("uniform", "cube", "storage", *look_up)
+    def object(self, look_up: tuple[str, ...], cube: str = "cube") -> Any:
+        """Layout of group 2 with the bindings of a look-up of incident light; `cube`: the kind of the probe's light."""
+        return self.of("uniform", cube, "uniform" if cube == "cubes" else "storage", *look_up)
 
     def _of(self, *kinds: str, visibility: int = wgpu.ShaderStage.FRAGMENT) -> Any:
         """Layout of bindings of these `KINDS`, for the stages of `visibility`."""

@@ -223,8 +223,12 @@ def border(lobe: Lobe) -> Floats:
     return float(radius(1 - BORDER_MASS, lobe.distribution == "ggx")) * np.array([lobe.mx, lobe.my])
 
 
-def automatic_n(material: Material, roughness: float = 1.0) -> int:
-    """Samples per lobe that a material needs: the more, the wider its widest lobe; `roughness` is a factor on it."""
+def automatic_n(material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
+    """Samples per lobe that a material needs: the more, the wider its widest lobe; `roughness` is a factor on it.
+
+    Where no lamps are left in the light that is sampled, fewer are as good (docs/performance.md).
+    """
     m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
-    return next((n for limit, n in steps if m <= limit), 19)
+    n = next((n for limit, n in steps if m <= limit), 19)
+    return min(n, 3 if n <= 11 else 5) if without_lamps else n

@@ -76,6 +76,7 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
     "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
 }
+PLANAR["lamps"] = PLANAR["rings"]  # the buffer has its lamps; what it does not hold comes from the whole probe
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
 

@@ -14,6 +14,7 @@ from lambent.realtime.baked import Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 from lambent.realtime.incident import LookUp, look_up_of
 from lambent.realtime.integrators import Cube
+from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.prefilter import prefiltered_cube
 from lambent.realtime.uploads import cube_texture
@@ -21,8 +22,13 @@ from lambent.realtime.uploads import cube_texture
 DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 
 
-class LampTable:
-    """The table of a probe's lamps (aim.py), and their prominence, 0 to 1."""
+def kind_of(cube: Cube) -> str:
+    """Kind (`layouts.KINDS`) of the binding of a cube map."""
+    return "cubes" if cube == "cleaned" else "cube"
+
+
+class AimTable:
+    """The table of a probe's lamps that samples aim by (aim.py), and their prominence, 0 to 1."""
 
     def __init__(self, layouts: Layouts, radiance: Floats) -> None:
         table = aim_table(finite(radiance)[0])
@@ -43,26 +49,38 @@ class ProbeLight:
     def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
         self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
         self._texture = cache(self._new_texture)
+        self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
         self.resources = cache(lambda look_up: look_up.resources(layouts.device, self.probe))  # of a LookUp
 
     def view(self, cube: Cube) -> Any:
         """View of a cube map of the probe's radiance."""
-        return self._texture(cube).create_view(dimension="cube")
+        return self._texture(cube).create_view(dimension="cube-array" if cube == "cleaned" else "cube")
 
     def half_log2_texels(self, cube: Cube) -> float:
         """Half the log2 of texels, as large as a look-up blurs, per unit area of the cube [-1, 1]^3 (N^2/4 in 4.17)."""
-        blur = np.log2(SMOOTH_AREA) / 2 if cube == "smooth" else 0
+        blur = np.log2(SMOOTH_AREA) / 2 if cube in ("smooth", "cleaned") else 0
         return float(np.log2(self.probe.radiance.shape[1] / 2) - blur)
 
     def _new_texture(self, cube: Cube) -> Any:
         if cube == "prefiltered":
             return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
+        if cube == "cleaned":
+            return cube_texture(self._layouts.device, self.lamps.chain())
         chain = smooth_chain if cube == "smooth" else mip_chain
         return cube_texture(self._layouts.device, chain(finite(self.probe.radiance)[0]))
 
     @cached_property
-    def lamps(self) -> LampTable:
-        return LampTable(self._layouts, self.probe.radiance)
+    def aims(self) -> AimTable:
+        return AimTable(self._layouts, self.probe.radiance)
+
+    @cached_property
+    def lamps(self) -> ProbeLamps:
+        return ProbeLamps(self.probe.radiance)
+
+    def _new_table(self, use: str, look_up: LookUp) -> Any:
+        if use == "aim":
+            return self.aims.buffer
+        return self._layouts.buffer("UNIFORM", self.lamps.table(self.probe, look_up))
 
     @cached_property
     def cheapest(self) -> LookUp:

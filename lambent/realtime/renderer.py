@@ -26,14 +26,17 @@ from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.draws import draws_of
-from lambent.realtime.frame_state import QMC_N, SHOW, FrameState, frame_data
+from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
+from lambent.realtime.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
+from lambent.realtime.passes.base import BasePass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
 from lambent.realtime.passes.planar import PlanarPass
+from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.resources import SceneResources
@@ -66,16 +69,19 @@ class Renderer:
         self._clusters: Clusters = (
             beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
         )
-        depth = DepthPass(layouts)
+        depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
         display = TonemapPass(layouts), SmoothPass(layouts)
-        self._passes: tuple[Pass, ...] = (depth, planar, light, AccumulatePass(layouts), *display)
+        self._passes: tuple[Pass, ...] = (
+            depth, SunPass(layouts), planar, base, light, AccumulatePass(layouts), *display
+        )  # fmt: skip
         self._targets, self._timer = Targets(device), PassTimer(device)
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
         self._frame_group = layouts.group(layouts.frame, self._frame_buffer, self.resources.sampler)
         self._done = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST)
         self._few: Any = None  # radiance of the last displayed frame of few samples
+        self._few_state: FrameState | None = None
         self._counts: dict[str, Any] = {}
         self._gpu_ms: dict[str, float] | None = None  # of a frame in slices
         self._frames = 0  # that were begun
@@ -124,13 +130,34 @@ class Renderer:
         self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
         return context.radiance
 
+    def outline(self) -> Outline:
+        """What draws outlines of the scene's objects."""
+        return Outline(self._layouts, self.resources, self._clusters)
+
+    def redrawn(self, state: FrameState) -> frozenset[str] | None:
+        """Materials whose objects alone a frame would draw with `FrameState.over`; None where it is drawn whole."""
+        before = self._few_state
+        if before is None or replace(state, **_redrawable(before)) != replace(before, over=state.over):
+            return None
+        given = self.scene.record.materials
+        return frozenset(
+            name for name in given if state.materials.get(name, given[name]) != before.materials.get(name, given[name])
+        )
+
     def finish(self) -> None:
         """Return when the GPU is done with all frames."""
         self.device.queue.read_buffer(self._done)
 
     def image(self, state: FrameState) -> Floats:
         """Linear radiance (height, width, 3) float32, row 0 on top."""
-        return np.asarray(pixels(self.device, self.draw(state)), np.float32)
+        return self.in_units(pixels(self.device, self.draw(state)), state)
+
+    def in_units(self, texels: NDArray[Any], state: FrameState) -> NDArray[np.float32]:
+        """W/(sr m^2), or what else the state shows, of texels of the texture of radiance that `draw` left."""
+        return np.asarray(texels, np.float32) * np.float32(self._unit(state))
+
+    def _unit(self, state: FrameState) -> float:
+        return 1.0 if state.show == LIGHT_MAP_NOISE else self.scene.unit
 
     def display_image(self, state: FrameState) -> NDArray[np.uint8]:
         """(height, width, 3) uint8 after exposure, view transform and sRGB encoding, row 0 on top."""
@@ -168,7 +195,7 @@ class Renderer:
             if index % 16 == 15:
                 self.finish()
                 progress((index + 1) * per_frame, frames * per_frame, "samples per pixel")
-        return np.asarray(pixels(self.device, radiance), np.float32)
+        return self.in_units(pixels(self.device, radiance), state)
 
     @property
     def statistics(self) -> dict[str, Any]:
@@ -183,7 +210,7 @@ class Renderer:
         for one in self._passes:
             yield from one.encode(context)
         if context.is_passing:
-            self._few = context.radiance
+            self._few, self._few_state = context.radiance, context.state
         self._counts = {
             "integrator": context.state.integrator,
             "width": context.state.width,
@@ -199,6 +226,8 @@ class Renderer:
         state.check()
         self._frames += 1
         data = frame_data(state, self.scene.record.bounds)
+        for factor in (data["exposure"], data["scale"][3:]):  # light is in the scene's units
+            factor *= self._unit(state)
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         views = self._planar_views(state, data)
         draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})
@@ -210,6 +239,8 @@ class Renderer:
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few
+        if passing and state.over:
+            context.base, context.redrawn = self._few, self.redrawn(state)
         return context
 
     def _planar_views(self, state: FrameState, data: Record) -> list[PlanarView]:
@@ -230,6 +261,11 @@ def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:
     places = hammersley(count)
     for x, y in (places - places.mean(axis=0)).tolist():
         yield replace(state, accumulate=None, antialias=False, jitter_px=(x, y))
+
+
+def _redrawable(state: FrameState) -> dict[str, Any]:
+    """The fields in which a frame may differ from one that it is drawn over."""
+    return {name: getattr(state, name) for name in ("materials", "planar", "width", "height")}
 
 
 def _mean(images: Iterable[Floats]) -> Floats:

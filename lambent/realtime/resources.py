@@ -17,8 +17,9 @@ from lambent.realtime.integrators import Cube
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.pipelines import VERTEX_FLOATS
-from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.probe_light import ProbeLight, kind_of
 from lambent.realtime.structs import OBJECT_DTYPE
+from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import cube_texture, upload, with_alpha
 from lambent.store.contract import ObjectRecord
@@ -35,21 +36,21 @@ def device_needs(scene: BakedScene) -> dict[str, int]:
 class ObjectResources:
     """One object: its range of the index buffer, its light and its bind groups."""
 
-    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight) -> None:
-        self.record, self.light, self._layouts = record, light, layouts
+    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float) -> None:
+        self.record, self.light, self._layouts, self._unit = record, light, layouts, unit
         self.group = cache(self._new_group)
 
-    def _new_group(self, cube: Cube, look_up: LookUp, aimed: bool = False) -> Any:
-        """Group 2 with that cube map and what the look-up reads, `aimed` with the table of the probe's lamps."""
+    def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
+        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
-        data["emission"][0, :3] = self.record.emission
-        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = probe.irradiance
+        data["emission"][0, :3] = np.array(self.record.emission) / self._unit
+        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         uniform = self._layouts.buffer("UNIFORM", data)
-        table = self.light.lamps.buffer if aimed else self._layouts.empty
-        layout = self._layouts.object(look_up.BINDINGS)
-        return self._layouts.group(layout, uniform, self.light.view(cube), table, *self.light.resources(look_up))
+        lamps = self.light.table(table, look_up) if table else self._layouts.empty
+        layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
+        return self._layouts.group(layout, uniform, self.light.view(cube), lamps, *self.light.resources(look_up))
 
 
 class SceneResources:
@@ -66,7 +67,6 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
-        self.light_group = layouts.group(layouts.light, self.light_view)
         environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
         self._environment = cube_texture(device, [environment])
         self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
@@ -76,7 +76,7 @@ class SceneResources:
             probe = scene.probe_of(record)
             if probe not in lights:
                 lights[probe] = ProbeLight(layouts, probe, self.sampler, known)
-            self.objects.append(ObjectResources(layouts, record, lights[probe]))
+            self.objects.append(ObjectResources(layouts, record, lights[probe], scene.unit))
         textures = TextureCache(device)
         self.materials = {
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
@@ -86,13 +86,16 @@ class SceneResources:
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         whole = (r for r in records if r.name not in self.masked)
         self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.sun = sun_light(layouts, scene, self)
 
     @cached_property
     def noise_group(self) -> Any:
-        """Stands in for `light_group`: the noise of the light map."""
+        """Group 3 that shows the noise of the light map instead of its light, without a sun."""
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
-        return self._layouts.group(self._layouts.light, light_layers(self._layouts.device, *grey))
+        dark = SunLight(self._layouts)
+        view = light_layers(self._layouts.device, *grey)
+        return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
 def light_layers(device: Any, front: Floats | None, back: Floats | None, direction: Floats | None = None) -> Any:

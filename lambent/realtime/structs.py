@@ -11,11 +11,12 @@ from lambent.realtime.shader_source import assemble
 Record = NDArray[np.void]
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
-    "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
+    "Sun": "sun_record", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",
 }  # fmt: skip
 STRUCTS = {
     name: wgsl_dtype(name, assemble(f"{file}.wgsl", given={"look_up.wgsl": ""}))[0] for name, file in _DECLARED.items()
 }
 FRAME_DTYPE, MATERIAL_DTYPE, OBJECT_DTYPE = STRUCTS["Frame"], STRUCTS["Material"], STRUCTS["Object"]
 PLACED_LOBE_DTYPE, PREFILTER_DTYPE = STRUCTS["PlacedLobe"], STRUCTS["Prefilter"]
+SUN_DTYPE = STRUCTS["Sun"]
 MIRRORED_VIEW_DTYPE, PLAN_DTYPE = STRUCTS["MirroredView"], STRUCTS["Plan"]

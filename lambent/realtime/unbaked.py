@@ -13,6 +13,7 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
+from lambent.core.colour import HALF_MAX
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.plain import Triple, triple
@@ -100,8 +101,9 @@ def with_diffuse_light(scene: BakedScene) -> BakedScene:
 
 def irradiance(environment: Floats, normals: Floats) -> Floats:
     """(V, 3) in W/m^2 at unit normals (V, 3) under an environment (6, N, N, 3); summed over a coarser cube."""
-    cube = next(level for level in mip_chain(finite(environment)[0]) if level.shape[1] <= COARSE)
+    unit = max(1.0, float(np.max(environment)) / HALF_MAX)  # a sun is brighter than half floats
+    cube = next(level for level in mip_chain(finite(environment / unit)[0]) if level.shape[1] <= COARSE)
     n = cube.shape[1]
-    light = (cube * texel_solid_angles(n)[..., None]).reshape(-1, 3)
+    light = (unit * cube * texel_solid_angles(n)[..., None]).reshape(-1, 3)
     cosines = np.maximum(normals @ normalize(face_directions(n)).reshape(-1, 3).T, 0)
     return np.asarray(cosines @ light, np.float32)

@@ -19,7 +19,7 @@ from lambent.editing.interreflection.whole import ALL_HITS, WholePicture, whole_
 from lambent.editing.session import Session
 from lambent.editing.stored import NotBaked
 from lambent.render.images import Images, Settings
-from lambent.render.output import DEFAULT, Rendered, exposed, write_still
+from lambent.render.output import DEFAULT, Rendered, displayed_as, exposed, write_still
 from lambent.store.contract import transport_lights
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
@@ -75,8 +75,9 @@ def edited_still(
             error.message, file=error.file, field=error.field, got=error.got, expected=error.expected,
             hint=f"run `{_bake_command(opened, wanted, Path(session))}`",
         ) from error  # fmt: skip
-    write_still(Edited(picture, settings), file, wanted.document.camera)
-    return Rendered(file, width, height, EDITED, 1, time.perf_counter() - began)
+    drawn = Edited(picture, settings)
+    write_still(drawn, file, wanted.document.camera)
+    return Rendered(file, width, height, EDITED, 1, time.perf_counter() - began, **displayed_as(file, drawn))
 
 
 def _bake_command(store: Store, wanted: Session, session: Path) -> str:

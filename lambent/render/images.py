@@ -13,6 +13,7 @@ from lambent.core.camera import Camera
 from lambent.core.colour import shown
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
@@ -38,7 +39,8 @@ class Settings:
         Per pixel where the integrator converges ("path": 64 by default, "qmc": 256), otherwise per lobe (by default
         chosen from each material's roughness).
     exposure_ev : float, optional
-        Stops, -64 to 64, for displayed images; by default the scene's.
+        Stops, -64 to 64, for displayed images; by default the scene's, or, where it has none, what the first image asks
+        for (`core.exposure.metered`), kept for the rest.
     view : str
         View transform of displayed images, one of `VIEWS`; "false-colour" shows luminance in cd/m^2.
     scale : Range, optional
@@ -58,7 +60,7 @@ class Settings:
 
     width: int = 1280
     height: int = 720
-    integrator: str = "rings"
+    integrator: str = "lamps"
     samples: int | None = None
     exposure_ev: float | None = None
     view: str = "filmic"
@@ -94,7 +96,8 @@ class Images(ABC):
     quantity: Quantity = LUMINANCE
 
     def __init__(self, settings: Settings) -> None:
-        self.settings, self._scale = settings, settings.scale
+        self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed
+        self.exposure_ev = settings.exposure_ev  # None until an image was displayed
 
     @abstractmethod
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
@@ -104,7 +107,13 @@ class Images(ABC):
         """(height, width, 3) encoded as a display gets it: after exposure and view transform, or in false colours."""
         radiance = self.radiance(camera, progress)
         if not self.settings.is_false_coloured:
-            return to_bytes(shown(radiance, self.settings.view, self.settings.exposure_ev or 0.0))
+            return to_bytes(shown(radiance, self.settings.view, self.exposed(radiance)))
         values = photometric(radiance, self.quantity)
-        self._scale = self._scale or fitting_range(values, log=self.settings.log)
-        return with_scale(to_bytes(false_colour(values, self._scale)), self._scale, self.quantity.unit)
+        self.scale = self.scale or fitting_range(values, log=self.settings.log)
+        return with_scale(to_bytes(false_colour(values, self.scale)), self.scale, self.quantity.unit)
+
+    def exposed(self, radiance: Floats) -> float:
+        """The exposure of displayed images, that of `radiance` where none was there yet."""
+        if self.exposure_ev is None:
+            self.exposure_ev = metered(radiance) or 0.0
+        return self.exposure_ev

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError, did_you_mean
+from lambent.core.exposure import ev100_of
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
 from lambent.core.progress import Progress, silent, tracked
-from lambent.core.projections import Projection, View
+from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
-from lambent.render.projected import Projected, faces_settings
+from lambent.render.projected import Projected, faces_settings, view_of
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.store import Store
@@ -31,7 +32,11 @@ DEFAULT = Settings()
 
 @dataclass(frozen=True)
 class Rendered:
-    """The written file, its size in pixels, its frames, and the time that it took."""
+    """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
+
+    `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours; of these `scale`
+    says what they mean: low, high, log, unit.
+    """
 
     file: Path
     width: int
@@ -39,6 +44,9 @@ class Rendered:
     integrator: str
     frames: int
     seconds: float
+    exposure_ev: float | None = None
+    ev100: float | None = None
+    scale: dict[str, float | bool | str] | None = None
 
 
 def ignore(text: str) -> None:
@@ -81,8 +89,20 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = _opened(store)
     view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
-    write_still(images(opened, settings, scene=scene, note=note), file, view, progress)
-    return Rendered(file, settings.width, settings.height, settings.integrator, 1, time.perf_counter() - began)
+    drawn = images(opened, settings, scene=scene, note=note)
+    write_still(drawn, file, view, progress)
+    seconds = time.perf_counter() - began
+    return Rendered(file, settings.width, settings.height, settings.integrator, 1, seconds, **displayed_as(file, drawn))
+
+
+def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
+    """How what is in a file is displayed: the last fields of `Rendered`."""
+    if file.suffix.lower() not in (".png", FILM):
+        return {}
+    if drawn.settings.is_false_coloured:
+        return {"scale": None if drawn.scale is None else {**asdict(drawn.scale), "unit": drawn.quantity.unit}}
+    exposure_ev = drawn.exposure_ev
+    return {} if exposure_ev is None else {"exposure_ev": exposure_ev, "ev100": ev100_of(exposure_ev)}
 
 
 def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:
@@ -90,9 +110,7 @@ def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = si
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
-        of = drawn.settings
-        seen = View.of(view, of.projection, of.width, of.height, of.field_deg).radiance_options()
-        write_image(file, drawn.radiance(view, progress), seen)
+        write_image(file, drawn.radiance(view, progress), view_of(drawn.settings, view).radiance_options())
 
 
 def drawn_view(
@@ -145,7 +163,8 @@ def film(
     cameras = [camera_at(chosen, index / fps) for index in range(chosen.frames(fps))]
     write_frames(file, cameras, draw, (settings.width, settings.height), fps, progress)
     seconds = time.perf_counter() - began
-    return Rendered(file, settings.width, settings.height, settings.integrator, len(cameras), seconds)
+    width, height, said = settings.width, settings.height, displayed_as(file, drawn)
+    return Rendered(file, width, height, settings.integrator, len(cameras), seconds, **said)
 
 
 def write_frames(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,6 +23,7 @@ from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
 QMC_SPP = 256
+METERED_PX = 256  # the longer side of what sets an exposure
 FILM_SUPERSAMPLES = 4  # of the radiance in an image sequence
 
 
@@ -42,7 +44,7 @@ class RealTime(Images):
         self.quantity = quantity_of(settings.show)
         self._frame = partial(
             FrameState, width=settings.width, height=settings.height, integrator=settings.integrator,
-            n=None if self._progressive else settings.samples, exposure_ev=settings.exposure_ev or 0.0,
+            n=None if self._progressive else settings.samples,
             view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
             planar=settings.planar,
         )  # fmt: skip
@@ -59,4 +61,10 @@ class RealTime(Images):
         if self._progressive or self.settings.is_false_coloured:
             return super().displayed(camera, progress)
         draw = self._renderer.display_image if self._moving else self._renderer.still
-        return draw(self._frame(camera))
+        frame = self._frame(camera)
+        exposure_ev = self.exposure_ev
+        if exposure_ev is None:
+            share = min(1.0, METERED_PX / max(frame.size))
+            width, height = (max(1, round(share * size)) for size in frame.size)
+            exposure_ev = self.exposed(self._renderer.image(replace(frame, width=width, height=height)))
+        return draw(replace(frame, exposure_ev=exposure_ev))

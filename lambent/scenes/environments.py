@@ -15,6 +15,7 @@ from lambent.core.colour import xyz_to_rgb
 from lambent.core.cubemap import face_directions, texel_solid_angles
 from lambent.core.directions import normalize
 from lambent.core.latlong import lat_long_uv
+from lambent.core.photometry import LM_PER_W
 
 
 def studio(n: int = 256) -> Floats:
@@ -82,7 +83,7 @@ _SUN_KLUX, _SUN_RADIUS_RAD = 100.0, np.radians(1.0)  # the sun is drawn wider th
 def daylight(
     n: int = 256, sun_direction: tuple[float, float, float] = (0.45, 0.62, 0.64), turbidity: float = 3.0
 ) -> Floats:
-    """Environment (6, n, n, 3): clear sky with its sun over a grey ground of albedo 0.3; in kcd/m^2 / 4."""
+    """Environment (6, n, n, 3): clear sky with its sun over a grey ground of albedo 0.3, W/(sr m^2)."""
     w = normalize(face_directions(n))
     sun = normalize(np.array(sun_direction, float))
     theta_s = float(np.arccos(sun[1]))
@@ -107,7 +108,7 @@ def daylight(
     seen = light[np.broadcast_to(up, light.shape)].reshape(-1, 3)
     omega = np.broadcast_to(texel_solid_angles(n), w.shape[:3])[up[..., 0]]
     ground = 0.3 / np.pi * (seen * (omega * w[..., 1][up[..., 0]])[:, None]).sum(axis=0)
-    return np.asarray(np.where(up, light, ground) / 4, np.float32)
+    return np.asarray(np.where(up, light, ground) * 1000 / LM_PER_W, np.float32)
 
 
 def _perez(shape: Sequence[float], cos_theta: Floats, cos_gamma: Floats) -> Floats:

@@ -10,18 +10,22 @@ no part of the reflector.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion, distance_transform_edt, label, maximum_filter, uniform_filter
+from scipy.ndimage import distance_transform_edt, label, maximum_filter, uniform_filter
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.directions import basis
 from lambent.core.geometry import cross_2d
 
-CELLS = 600  # per size of the reflector, the root of its area
+CELLS = 600  # at most, per size of the reflector, the root of its area
+FEWEST_CELLS = 32  # where a scene has very many reflectors
+CELLS_OF_ALL = 6 * CELLS**2  # plans of one scene together take no more: some 2 s
 MOST_CELLS = 2048  # along one side
+SPREAD = 4.0  # times the reflector's area: a rectangle around it that is larger has coarser cells
 HEIGHTS = (0.01, 0.03)  # of the cuts that look for walls, over the reflector, in shares of its size
 FOOT = 0.0005  # of the cut that looks for the feet of objects
 SHARE = 0.6  # of a stretch of edge and of the heights: the least at which a wall stands
@@ -47,34 +51,78 @@ class FloorPlan:
     distance: NDArray[np.int8]
 
 
-def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | None:
+def shared_cells(areas_m2: Sequence[float]) -> list[float]:
+    """Cells per size for the plan of every reflector of a scene, so that all together take CELLS_OF_ALL at most.
+
+    Reflectors have CELLS each as long as that suffices; else the large ones keep them, and the others have cells of
+    one size in metres.
+    """
+    areas = np.asarray(areas_m2, float)
+
+    def cells(per_m2: float) -> Floats:
+        return np.sqrt(np.clip(areas * per_m2, FEWEST_CELLS**2, CELLS**2))
+
+    low, high = 0.0, CELLS**2 / max(float(areas.min(initial=1.0)), 1e-12)
+    for _ in range(60):
+        middle = high if (cells(high) ** 2).sum() <= CELLS_OF_ALL else (low + high) / 2
+        low, high = (middle, high) if (cells(middle) ** 2).sum() <= CELLS_OF_ALL else (low, middle)
+    return [float(count) for count in cells(low)]
+
+
+def may_have_walls(faces: Floats, normal: Floats, corners: Floats) -> bool:
+    """Whether a triangle crosses a plane at one of HEIGHTS over the rectangle around a reflector, or close to it."""
+    axes = np.stack(basis(normal), axis=1)
+    flat = faces @ axes
+    size = _size(flat)
+    low, high = flat.reshape(-1, 2).min(axis=0) - NEAR * size, flat.reshape(-1, 2).max(axis=0) + NEAR * size
+    height = corners @ normal - float((faces @ normal).mean())
+    for over in HEIGHTS:
+        cut = _cut(height - over * size, corners) @ axes
+        if ((cut.max(axis=1) >= low) & (cut.min(axis=1) <= high)).all(axis=1).any():
+            return True
+    return False
+
+
+def _size(flat: Floats) -> float:
+    """Root of the area of triangles (K, 3, 2)."""
+    return float(np.sqrt(np.abs(cross_2d(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])).sum() / 2))
+
+
+def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CELLS) -> FloorPlan | None:
     """Plan of a reflector of the triangles `faces` (K, 3, 3), all in a plane of unit normal (3,); None without walls.
 
-    `corners` (F, 3, 3) are the triangles of the scene. A wall stands on an edge where triangles cross the planes at
-    both HEIGHTS over the reflector, within NEAR of the edge.
+    `corners` (F, 3, 3) are the triangles of the scene, `cells` the number of cells per size of the reflector. A wall
+    stands on an edge where triangles cross the planes at both HEIGHTS over the reflector, within NEAR of the edge.
     """
     across, along = basis(normal)
     axes = np.stack([across, along], axis=1)
     flat = faces @ axes
-    size = float(np.sqrt(np.abs(cross_2d(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])).sum() / 2))
+    size = _size(flat)
     low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
-    cell = max(size / CELLS, float((high - low).max()) / MOST_CELLS)
+    sides = high - low
+    cell = max(size, float(np.sqrt(sides.prod() / SPREAD))) / cells
+    cell = max(cell, float(sides.max()) / MOST_CELLS)
     corner = low - BORDER * cell
-    columns, rows = (np.ceil((high - low) / cell).astype(int) + 2 * BORDER).tolist()
-    fine = _filled(((flat - corner) / cell + 0.5) * FINE - 0.5, (rows * FINE, columns * FINE))
-    height = float((faces @ normal).mean())
-    foot = _cut((corners @ normal) - height - FOOT * size, corners)
-    standing = _drawn(((foot @ axes - corner) / cell + 0.5) * FINE - 0.5, fine.shape)
-    fine = _without_strips(fine, standing, NEAR * size / cell * FINE)
-    share_of = fine.reshape(rows, FINE, columns, FINE).mean(axis=(1, 3))
-    covered = share_of >= 0.5
+    columns, rows = (np.ceil(sides / cell).astype(int) + 2 * BORDER).tolist()
+    level = float((faces @ normal).mean())
+    height = corners @ normal - level
+    around = (height.max(axis=1) > FOOT * size) & (height.min(axis=1) < max(HEIGHTS) * size)
+    height, corners = height[around], corners[around]
     share = np.zeros((rows, columns))
     for over in HEIGHTS:
-        cut = _cut((corners @ normal) - height - over * size, corners)
-        standing = _drawn((cut @ axes - corner) / cell, (rows, columns))
+        standing = _drawn((_cut(height - over * size, corners) @ axes - corner) / cell, (rows, columns))
         if standing.any():
             share += (distance_transform_edt(~standing) <= NEAR * size / cell) / len(HEIGHTS)
-    edge = covered & ~binary_erosion(covered)
+    if not share.any():
+        return None
+    fine = _filled(((flat - corner) / cell + 0.5) * FINE - 0.5, (rows * FINE, columns * FINE))
+    foot = _cut(height - FOOT * size, corners)
+    standing = _drawn(((foot @ axes - corner) / cell + 0.5) * FINE - 0.5, fine.shape)
+    fine = _without_strips(fine, standing, NEAR * size / cell * FINE)
+    counts = fine.view(np.uint8).reshape(rows, FINE, columns, FINE).sum(axis=3, dtype=np.uint8)
+    share_of = counts.sum(axis=1, dtype=np.uint8) / FINE**2
+    covered = share_of >= 0.5
+    edge = covered & ~_eroded(covered)
     window = 2 * round(WINDOW * size / cell) + 1
     along_edge = uniform_filter(edge.astype(float), window, mode="constant")
     walled = uniform_filter(share * edge, window, mode="constant") >= SHARE * np.maximum(along_edge, 1e-9)
@@ -86,19 +134,30 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats) -> FloorPlan | No
     outwards, inwards = _edge_from(share_of, covered), _edge_from(1 - share_of, ~covered)
     signed = np.where(past, outwards[tuple(nearest)] - beyond, before - inwards[tuple(wall)])
     steps = np.clip(np.floor((signed - MARGIN) * STEPS), -127, 127).astype(np.int8)
-    return FloorPlan(corner @ axes.T + height * normal, across, along, cell, steps)
+    return FloorPlan(corner @ axes.T + level * normal, across, along, cell, steps)
 
 
 def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     """`covered` without the strips along its edge that `standing` cuts off, up to `width` cells wide in the mean."""
+    if not (covered & standing).any():
+        return covered
     pieces, count = label(covered & ~standing)
-    inner = binary_erosion(pieces > 0)
+    rim = np.flatnonzero((pieces > 0) & ~_eroded(pieces > 0))
+    edge = np.flatnonzero(covered & ~_eroded(covered))
     cells = np.bincount(pieces.ravel(), minlength=count + 1)
-    border = np.bincount(pieces[~inner], minlength=count + 1)
-    at_edge = np.bincount(pieces[~binary_erosion(covered)], minlength=count + 1) > 0
+    border = np.bincount(pieces.ravel()[rim], minlength=count + 1)
+    at_edge = np.bincount(pieces.ravel()[edge], minlength=count + 1) > 0
     strip = at_edge & (2 * cells <= width * border)
     strip[0] = False
-    return np.asarray(covered & ~strip[pieces])
+    return np.asarray(covered & ~strip[pieces]) if strip.any() else covered
+
+
+def _eroded(covered: Flags) -> Flags:
+    """Cells whose four neighbours are covered, too."""
+    inner = np.zeros_like(covered)
+    inner[1:-1, 1:-1] = covered[1:-1, 1:-1] & covered[2:, 1:-1] & covered[:-2, 1:-1]
+    inner[1:-1, 1:-1] &= covered[1:-1, 2:] & covered[1:-1, :-2]
+    return inner
 
 
 def _edge_from(share: Floats, covered: Flags) -> Floats:
@@ -123,7 +182,7 @@ def _filled(triangles: Floats, shape: tuple[int, int]) -> Flags:
         begin, end = (np.ceil(x[met]).clip(0, shape[1]).astype(int) for x in (left, np.floor(right) + 1))
         np.add.at(change, (row[met], begin), 1)
         np.add.at(change, (row[met], np.maximum(begin, end)), -1)
-    return np.asarray(change.cumsum(axis=1)[:, :-1] > 0)
+    return np.asarray(change.cumsum(axis=1, dtype=np.int32)[:, :-1] > 0)
 
 
 def _cut(height: Floats, corners: Floats) -> Floats:

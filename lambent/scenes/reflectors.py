@@ -13,19 +13,21 @@ be a whole object: the top of a table is found, its edge and its legs are not. `
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import basis
 from lambent.core.geometry import triangle_areas, triangle_normals
 from lambent.materials.document import Material
-from lambent.scenes.floor_plan import FloorPlan, floor_plan
+from lambent.scenes.floor_plan import FloorPlan, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 
 LEAST_AREA_M2 = 0.25  # of all parts in one plane
@@ -73,36 +75,38 @@ def find_reflectors(scene: Scene) -> tuple[Reflector, ...]:
         return ()
     faces = _Faces.of(candidates)
     free = np.ones(len(faces.area), bool)
-    found = []
-    for plane in _given_planes(scene.reflector_rules):
-        mine = faces.in_plane(plane) & free
-        free &= ~mine
+    found: list[tuple[Floats, Indices]] = []
+
+    def take(plane: Floats) -> None:
+        mine = faces.in_plane(plane, free)
+        free[mine] = False
         found.append((plane, mine))
+
+    for plane in _given_planes(scene.reflector_rules):
+        take(plane)
     for seed in faces.seeds(np.isin(faces.owner, [i for i, o in enumerate(candidates) if o.name in forced])):
-        if not free[seed]:
-            continue
-        near = faces.in_plane(faces.plane_of(seed)) & free
-        if near.any():
-            plane = faces.fitted(near)
-            mine = faces.in_plane(plane) & free
-            free &= ~mine
-            found.append((plane, mine))
+        if free[seed] and len(near := faces.in_plane(faces.plane_of(seed), free)):
+            take(faces.fitted(near))
     large = []
     for plane, mine in found:
-        parts = [i for i in np.unique(faces.owner[mine]) if faces.area[mine & (faces.owner == i)].sum() > LEAST_PART_M2]
-        mine &= np.isin(faces.owner, parts)
+        owner = faces.owner[mine]
+        parts = np.flatnonzero(np.bincount(owner, faces.area[mine], len(candidates)) > LEAST_PART_M2)
+        mine = mine[np.isin(owner, parts)]
         if faces.area[mine].sum() >= LEAST_AREA_M2 or any(candidates[i].name in forced for i in parts):
             large.append(faces.reflector(plane, mine, candidates, scene.materials))
+    return tuple(sorted(_with_walls(large, scene), key=lambda r: -r.area_m2))
+
+
+def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
+    """The reflectors, those with walls on their edges with a floor plan."""
     corners = scene.corners
-    meshes = {o.name: o.mesh for o in candidates}
-    return tuple(sorted((_with_walls(r, meshes, corners) for r in large), key=lambda r: -r.area_m2))
-
-
-def _with_walls(found: Reflector, meshes: Mapping[str, Mesh], corners: Floats) -> Reflector:
-    """The reflector with its floor plan; `corners` (F, 3, 3) are the triangles of the scene."""
-    n = np.array(found.plane[:3])
-    faces = np.concatenate([meshes[part.object].corners[part.faces] for part in found.parts])
-    return replace(found, plan=floor_plan(faces, n, corners))
+    meshes = {o.name: o.mesh for o in scene.objects}
+    faces = [np.concatenate([meshes[part.object].corners[part.faces] for part in r.parts]) for r in found]
+    normals = [np.array(r.plane[:3]) for r in found]
+    walled = [i for i in range(len(found)) if may_have_walls(faces[i], normals[i], corners)]
+    cells = shared_cells([found[i].area_m2 for i in walled])
+    plans = {i: floor_plan(faces[i], normals[i], corners, n) for i, n in zip(walled, cells, strict=True)}
+    return [replace(r, plan=plans.get(i)) for i, r in enumerate(found)]
 
 
 def is_glossy(material: Material) -> bool:
@@ -154,14 +158,23 @@ class _Faces:
         n = self.normal[face]
         return np.array([*n, -n @ self.corners[face].mean(axis=0)])
 
-    def in_plane(self, plane: Floats) -> NDArray[np.bool_]:
-        """(F,) whether a face lies in the plane and faces the side of its normal."""
+    def in_plane(self, plane: Floats, free: Flags) -> Indices:
+        """The faces among `free` (F,) that lie in the plane and face the side of its normal."""
         flat = np.cos(np.radians(FLAT_DEG))
-        inside = (self.normal @ plane[:3] > flat) & (self.tilt > flat)
-        inside[inside] = np.abs(self.corners[inside] @ plane[:3] + plane[3]).max(axis=1) <= FLAT_M
-        return np.asarray(inside)
+        chord = 2 * np.sin(np.radians(FLAT_DEG) / 2) * 1.001
+        near = np.sort(np.asarray(self._by_normal.query_ball_point(plane[:3], chord), int))
+        near = near[free[near] & (self.tilt[near] > flat)]
+        near = near[self.normal[near] @ plane[:3] > flat]
+        within = np.abs(self.corners[near] @ plane[:3] + plane[3]).max(axis=1, initial=0) <= FLAT_M
+        return np.asarray(near[within])
 
-    def fitted(self, mine: NDArray[np.bool_]) -> Floats:
+    @cached_property
+    def _by_normal(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.normal)
+
+    def fitted(self, mine: Indices) -> Floats:
         """Plane of the mean normal through the mean position, weighted by area."""
         weight = self.area[mine]
         n = weight @ self.normal[mine]
@@ -182,12 +195,12 @@ class _Faces:
         return [int(largest[g]) for g in order if wanted[g]]
 
     def reflector(
-        self, plane: Floats, mine: NDArray[np.bool_], objects: list[SceneObject], materials: Mapping[str, Material]
+        self, plane: Floats, mine: Indices, objects: list[SceneObject], materials: Mapping[str, Material]
     ) -> Reflector:
         parts, two_sided = [], False
         for i in np.unique(self.owner[mine]):
-            here = mine & (self.owner == i)
-            whole = here.sum() == len(objects[i].mesh.faces)
+            here = mine[self.owner[mine] == i]
+            whole = len(here) == len(objects[i].mesh.faces)
             two_sided |= bool(whole or materials[objects[i].material].transmits)
             parts.append(ReflectorPart(objects[i].name, self.number[here], float(self.area[here].sum())))
         points = self.corners[mine].reshape(-1, 3)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,15 @@ from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import Triple
 from lambent.core.surroundings import Axis, Layout
 from lambent.materials.document import Material
+from lambent.scenes.ies import Photometry
 
 Array = NDArray[np.floating]
 UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
+SUN_RADIUS_DEG = 0.2679  # Mitsuba's aperture of .5358 degrees
+LEAST_SUN_DEG, MOST_SUN_DEG = 0.05, 30.0
+Ground = Literal["diffuse", "black"]
 
 
 @dataclass(frozen=True)
@@ -97,13 +102,19 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class SunSky:
-    """Clear daylight by Mitsuba's `sunsky` (Hosek-Wilkie), up is +y, over a diffuse ground of the same `albedo`."""
+    """Clear daylight, up is +y, over a `ground` that is diffuse, of the sky's `albedo` and lit by it, or black.
+
+    Colours and distribution are those of Mitsuba's `sunsky` (Hosek-Wilkie), illuminances those of `scenes.clear_sky`
+    times `sun_scale` and `sky_scale`. The sun gives the same light whatever its radius.
+    """
 
     sun_direction: Triple  # unit, towards the sun
     turbidity: float = 3.0
     albedo: float = 0.3
     sun_scale: float = 1.0
     sky_scale: float = 1.0
+    sun_radius_deg: float = SUN_RADIUS_DEG
+    ground: Ground = "diffuse"
 
 
 @dataclass(frozen=True)
@@ -153,7 +164,38 @@ class DirectionalLight:
     irradiance: Triple
 
 
-Light = PointLight | DirectionalLight
+@dataclass(frozen=True)
+class IesLight:
+    """A luminaire at a point; `scale` is W/sr for each candela of its photometry.
+
+    It is aimed along `aim`, unit; `rotation_deg` turns it about that, counter-clockwise seen from behind.
+    """
+
+    position: Triple
+    photometry: Photometry
+    scale: Triple
+    aim: Triple = (0.0, -1.0, 0.0)
+    rotation_deg: float = 0.0
+
+    @property
+    def axes(self) -> Array:
+        """(3, 3) rows: unit world directions of the horizontal angles 0 and 90, and of vertical angle 0.
+
+        Aimed straight down, horizontal angle 0 is +x and 90 is -z; aimed elsewhere, as the shortest turn leaves them.
+        """
+        aim, down = np.asarray(self.aim, float), np.array([0.0, -1.0, 0.0])
+        angle = np.radians(self.rotation_deg)
+        across = np.array([np.cos(angle), 0.0, -np.sin(angle)])
+        beside = np.array([-np.sin(angle), 0.0, -np.cos(angle)])
+        turn = np.cross(down, aim)
+        cosine = float(down @ aim)
+        if cosine < -1 + 1e-9:  # straight up: half a turn about x
+            return np.array([across * (1, 1, -1), beside * (1, 1, -1), aim])
+        turned = [v + np.cross(turn, v) + np.cross(turn, np.cross(turn, v)) / (1 + cosine) for v in (across, beside)]
+        return np.array([*turned, aim])
+
+
+Light = PointLight | DirectionalLight | IesLight
 Environment = SunSky | ImageEnvironment | ConstantEnvironment | ComputedEnvironment
 
 
@@ -180,7 +222,7 @@ class Scene:
     lights: tuple[Light, ...] = ()
     cameras: tuple[Camera, ...] = ()
     paths: tuple[CameraPath, ...] = ()
-    exposure_ev: float = 0.0
+    exposure_ev: float | None = None  # stops; None: by the first picture (core.exposure)
     sources: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
@@ -189,6 +231,7 @@ class Scene:
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
+    crease_deg: float | None = None  # of the hard edges that its normals were made anew for
     origin: str | None = None  # "builtin:NAME" or the absolute path that it was loaded from; None if made in memory
 
     @property

@@ -14,7 +14,8 @@ import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.directions import normalize
-from lambent.scenes.scene import Light, PointLight
+from lambent.core.errors import UserError
+from lambent.scenes.scene import IesLight, Light, PointLight
 
 SMALLEST_SR, POWER = 0.01, 0.25  # of the importance L omega^POWER (Agarwal et al. 2003, eq. 5 with a = 1)
 FEWEST_SAMPLES = 12  # of the environment within a triangle; less are not split
@@ -67,9 +68,11 @@ def joined(parts: Sequence[TriangleLights]) -> TriangleLights:
 
 
 def small_lights(lights: Sequence[Light]) -> TriangleLights:
-    """Point and directional lights as triangles whose corners coincide."""
+    """Point and directional lights as triangles whose corners coincide; `UserError` of luminaires."""
     places, values, near, cones = [], [], [], []
     for light in lights:
+        if isinstance(light, IesLight):
+            raise UserError("views lit by an IES luminaire cannot be edited", field="lights", hint="leave it out")
         here = isinstance(light, PointLight)
         places.append(
             light.position if isinstance(light, PointLight) else -normalize(np.asarray(light.direction, float))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.camera import Camera
+from lambent.core.camera import FARTHEST_M, Camera
 from lambent.core.errors import UserError
 from lambent.store.artefact import Array
 from lambent.store.store import MANIFEST, Store
@@ -47,8 +47,8 @@ def check_record(store: Store, record: SceneRecord) -> None:
     _check_names(store, record)
     for field, camera in _cameras(record):
         if not is_usable(camera):
-            raise _broken(store, field, "a camera is not finite, or sees no angle")
-    numbers = [record.exposure_ev, *_flat(record.bounds)]
+            raise _broken(store, field, "a camera is not within 1e9 m, or sees no angle")
+    numbers = [record.exposure_ev or 0.0, *_flat(record.bounds)]
     numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds))]
     numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
     numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]
@@ -106,9 +106,9 @@ def numbers_of(store: Store, artefact: str, name: str, count: int) -> tuple[floa
 
 
 def is_usable(camera: Camera) -> bool:
-    """Whether a camera is finite and sees something."""
-    numbers = (*camera.position, *camera.target, *camera.up, camera.fov_y_deg)
-    return all(map(math.isfinite, numbers)) and 0 < camera.fov_y_deg < 180
+    """Whether a camera is within FARTHEST_M and sees something."""
+    numbers = (*camera.position, *camera.target, *camera.up)
+    return all(abs(number) <= FARTHEST_M for number in numbers) and 0 < camera.fov_y_deg < 180
 
 
 def _cameras(record: SceneRecord) -> Iterable[tuple[str, Camera]]:

@@ -4,18 +4,21 @@
     geometry/uv, uv2                       (V, 2) float32; uv2 in [0, 1] is the light map's
     geometry/faces                         (T, 3) uint32, sorted by object; ObjectRecord has the range of each
     light_map/irradiance                   (H, W, 3) float16, W/m^2 on the normal's side; the centre of texel (row,
-                                           column) is at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip
+                                           column) is at uv2 = ((column + 1/2)/W, (row + 1/2)/H): no flip.
+                                           meta["sun"], may be absent: the SunRecord whose direct light is left out, for
+                                           a shadow map to add; its light from other surfaces is in the map
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before denoising; may be absent
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
-    environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap), W/(sr m^2), sun disc included
-    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"], without OBJECT if
-                                           meta["object_left_out"]. meta["seen_irradiance"], may be absent: luminance of
-                                           the irradiance it would give, coefficients of 1, x, y, z, xy, yz, 3zz - 1,
-                                           xz, xx - yy of the normal; scale its light by the light map's share of that,
-                                           at most 1
+    environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
+                                           in units of meta["unit"] W/(sr m^2): a power of two; 1 where it is absent
+    probe/OBJECT/radiance                  (6, N, N, 3) float16, cube map seen from meta["centre"] in meta["unit"] as
+                                           above, without OBJECT if meta["object_left_out"]. meta["seen_irradiance"],
+                                           may be absent: luminance of the irradiance it would give, coefficients of
+                                           1, x, y, z, xy, yz, 3zz - 1, xz, xx - yy of the normal; scale its light by
+                                           the light map's share of that, at most 1
                                            An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
@@ -87,8 +90,8 @@ the band, and the factor of the tail. Coefficients of bands are `Curve.band_mean
 of a tail scattered as they did in the bake, over their albedos then.
 
 The scene record (cameras, materials, objects...) is the document "scene"; of a store of edited views alone it has no
-objects. Times are the document "timings". Every array is absent, partial or complete (`Store.availability`); of a
-partial one, `Store.read_partial` gives what is there.
+objects. Times are the documents "timings" and "last_run". Every array is absent, partial or complete
+(`Store.availability`); of a partial one, `Store.read_partial` gives what is there.
 """
 
 from __future__ import annotations
@@ -100,6 +103,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
@@ -108,7 +112,9 @@ from lambent.store.store import MANIFEST, Store
 
 FAR = 1.0e4  # metres: distance of what is not hit
 SCENE = "scene"
-TIMINGS = "timings"
+CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for which viewers
+TIMINGS = "timings"  # of every step, in seconds
+LAST_RUN = "last_run"  # those of the last bake alone, and "other"
 SHARED_PROBES = "shared_probes"  # document: its key, and "owners", by object that shows the probe of another
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
@@ -130,6 +136,14 @@ class ObjectRecord(_Record):
     emission: Triple = (0.0, 0.0, 0.0)
     bounds: tuple[Triple, Triple]
     probe: bool = False  # wants probe/NAME/*, its own or a shared one
+
+
+class SunRecord(_Record):
+    """A disc in the sky: unit direction towards it, W/m^2 on a surface that faces it, angular radius."""
+
+    direction: Triple
+    irradiance: Triple
+    radius_rad: float = Field(ge=0, le=0.2)
 
 
 class TexturesRecord(_Record):
@@ -184,7 +198,7 @@ class SceneRecord(_Record):
     cameras: tuple[Camera, ...]
     paths: tuple[CameraPath, ...] = ()
     reflectors: tuple[ReflectorRecord, ...] = ()
-    exposure_ev: float = 0.0
+    exposure_ev: float | None = 0.0  # None: by the first picture (core.exposure)
     bounds: tuple[Triple, Triple]
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = {}  # by the material's name
@@ -248,6 +262,31 @@ def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
     """What a probe alone would give (see the head), where the light map is to scale it; else nothing."""
     name = probe_name(object_name, "radiance")
     return numbers_of(store, name, "seen_irradiance", 9) if store.artefact(name).meta.get("seen_irradiance") else ()
+
+
+def radiance_unit(store: Store, name: str) -> float:
+    """W/(sr m^2) that 1 stands for in a cube map of radiance."""
+    unit = store.artefact(name).meta.get("unit", 1.0)
+    if not (isinstance(unit, int | float) and 1 <= unit <= MOST_UNIT):
+        expected = f"a number from 1 to {MOST_UNIT:g}"
+        raise UserError("broken store", file=store.folder, field=f"{name}: unit", got=unit, expected=expected)
+    return float(unit)
+
+
+def sun_beside(store: Store) -> SunRecord | None:
+    """The sun whose direct light the light map leaves out; None where it has all light, as earlier stores have."""
+    name = f"light_map/{SIDES[0]}"
+    said = store.artefact(name).meta.get("sun") if name in store else None
+    if said is None:
+        return None
+    try:
+        sun = SunRecord.model_validate(said)
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    numbers = np.array([*sun.direction, *sun.irradiance, sun.radius_rad])
+    if not np.isfinite(numbers).all() or abs(np.linalg.norm(sun.direction) - 1) > 1e-3:
+        raise UserError("broken store", file=store.folder, field=f"{name}: sun", got=str(said))
+    return sun
 
 
 def shared_probes(store: Store) -> dict[str, str]:

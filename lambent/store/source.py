@@ -14,11 +14,12 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
 from lambent.scenes.scene import ImageEnvironment, Scene
-from lambent.store.contract import SCENE, ObjectRecord, SceneRecord, scene_record
+from lambent.store.contract import CUTS, SCENE, ObjectRecord, SceneRecord, scene_record
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
 SOURCE = "source"  # document: "builtin:NAME", or a path relative to the store's folder
+CREASE_ANGLE = "crease_angle"  # document: degrees, or null where the scene's normals are as its files have them
 SURROUNDINGS = "surroundings"  # document: the image that lights views instead of the scene's environment, if any
 SAME_M = 1e-4  # metres, and share of the largest coordinate: bounds that differ less are the same
 log = logging.getLogger(__name__)
@@ -48,6 +49,7 @@ def write_source(store: Store, scene: Scene) -> None:
     if place is not None and not place.startswith("builtin:"):
         place = Path(os.path.relpath(place, store.folder)).as_posix()
     store.set_document(SOURCE, place)
+    store.set_document(CREASE_ANGLE, scene.crease_deg)
 
 
 def scene_of(store: Store, given: str | None = None) -> Scene:
@@ -64,7 +66,8 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
     place = given or store.documents.get(SOURCE)
     if not isinstance(place, str):
         raise UserError("store does not say where its scene is", file=store.folder, hint="name it with --scene")
-    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place)
+    crease_deg = store.documents.get(CREASE_ANGLE)
+    scene = load_scene(place if given or place.startswith("builtin:") else store.folder / place, crease_deg)
     if SCENE not in store.documents:  # baked for edited views alone
         return scene
     record = scene_record(store)
@@ -72,9 +75,11 @@ def scene_of(store: Store, given: str | None = None) -> Scene:
         worn = worn_in_views(store)
         objects = (replace(o, material=worn.get(o.name, o.material)) for o in scene.objects)
         return replace(scene, objects=tuple(objects), materials={**scene.materials, **record.materials})
+    cuts = set(store.documents.get(CUTS, {}).get("objects", ()))
     baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
     if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
-        _fits(parts, o.mesh.bounds, len(o.mesh.faces)) for parts, o in zip(baked.values(), scene.objects, strict=True)
+        _fits(parts, o.mesh.bounds, len(o.mesh.faces), cuts)
+        for parts, o in zip(baked.values(), scene.objects, strict=True)
     ):
         log.warning("%s: its scene %s has other geometry now than when it was baked", store.folder, place)
     objects = (
@@ -96,9 +101,10 @@ def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:
     return [o for o in record.objects if o.name == name or o.name.startswith(f"{name}.part")]
 
 
-def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int) -> bool:
-    """Whether the parts have so many faces, and these bounds."""
-    if sum(part.face_count for part in parts) != faces or not parts:
+def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int, cuts: set[str]) -> bool:
+    """Whether the parts have so many faces, or more where the bake has cut them, and these bounds."""
+    baked, was_cut = sum(part.face_count for part in parts), any(part.name in cuts for part in parts)
+    if not parts or baked < faces or (baked > faces and not was_cut):
         return False
     lows, highs = zip(*(part.bounds for part in parts), strict=True)
     both = np.array([np.min(lows, axis=0), np.max(highs, axis=0)])

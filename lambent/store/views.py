@@ -129,7 +129,9 @@ def _check(views: Views, path: Path) -> None:
     for kind, cameras in (("cameras", views.cameras), *((f"paths.{p.name}", p.keys) for p in views.paths)):
         for camera in cameras:
             if not is_usable(camera):
-                raise UserError("a camera is not finite, or sees no angle", file=path, field=f"{kind}.{camera.name}")
+                raise UserError(
+                    "a camera is not within 1e9 m, or sees no angle", file=path, field=f"{kind}.{camera.name}"
+                )
     for walk in views.paths:
         times = walk.times_s or ()
         if not walk.keys or len(times) != len(walk.keys):

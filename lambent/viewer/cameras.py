@@ -42,34 +42,46 @@ def yaw_pitch(camera: Camera) -> tuple[float, float]:
     return math.atan2(x, -z), math.atan2(y, math.hypot(x, z))
 
 
-def orbit(camera: Camera, dx_px: float, dy_px: float) -> Camera:
-    """Turned about the target: the picture follows the mouse."""
+def orbit(camera: Camera, dx_px: float, dy_px: float, pivot: Triple | None = None) -> Camera:
+    """Turned about `pivot`, by default the target, which stays where it is in the picture: that follows the mouse."""
+    pivot = camera.target if pivot is None else pivot
     yaw, pitch = yaw_pitch(camera)
-    sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
-    return _placed(camera, np.array(camera.target) - sight * _distance(camera), camera.target)
+    before, after = _axes(yaw, pitch), _axes(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
+    eye = np.array(pivot) + after.T @ (before @ np.subtract(camera.position, pivot))
+    return _placed(camera, eye, pivot if pivot == camera.target else eye + after[2] * _distance(camera))
 
 
 def pan(camera: Camera, dx_px: float, dy_px: float, height_px: float) -> Camera:
     """Shifted in the picture plane, so that the target stays under the mouse."""
     yaw, pitch = yaw_pitch(camera)
     right = np.array([math.cos(yaw), 0, math.sin(yaw)])
-    up = np.cross(right, _direction(yaw, pitch))
+    up = np.cross(right, direction(yaw, pitch))
     metres_px = 2 * _distance(camera) * math.tan(math.radians(camera.fov_y_deg) / 2) / height_px
     shift = (dy_px * up - dx_px * right) * metres_px
     return _placed(camera, np.array(camera.position) + shift, np.array(camera.target) + shift)
 
 
-def zoom(camera: Camera, steps: float, bounds: Bounds) -> Camera:
-    """`steps` of the wheel nearer to the target (negative: away), never past it nor out of sight of the scene."""
-    farthest = 20 * math.dist(*bounds)
-    distance = min(max(_distance(camera) * ZOOM_PER_STEP**steps, NEAREST_M), farthest)
-    return _placed(camera, np.array(camera.target) - _direction(*yaw_pitch(camera)) * distance, camera.target)
+def zoom(camera: Camera, steps: float, bounds: Bounds, pivot: Triple | None = None) -> Camera:
+    """`steps` of the wheel nearer to `pivot`, by default the target (negative: away).
+
+    Never past it nor out of sight of the scene.
+    """
+    pivot = camera.target if pivot is None else pivot
+    before = max(math.dist(pivot, camera.position), NEAREST_M)
+    return nearer(camera, pivot, min(max(before * ZOOM_PER_STEP**steps, NEAREST_M), 20 * math.dist(*bounds)) / before)
+
+
+def nearer(camera: Camera, pivot: Triple, share: float) -> Camera:
+    """At this share of the distance from `pivot`, which stays where it is in the picture."""
+    eye = np.array(pivot) + share * np.subtract(camera.position, pivot)
+    ahead = direction(*yaw_pitch(camera)) * max(share * _distance(camera), NEAREST_M)
+    return _placed(camera, eye, pivot if pivot == camera.target else eye + ahead)
 
 
 def look(camera: Camera, dx_px: float, dy_px: float) -> Camera:
     """Turned on the spot, in the direction the mouse is dragged."""
     yaw, pitch = yaw_pitch(camera)
-    sight = _direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
+    sight = direction(yaw + TURN_RAD_PX * dx_px, pitch - TURN_RAD_PX * dy_px)
     return _placed(camera, camera.position, np.array(camera.position) + sight * _distance(camera))
 
 
@@ -111,7 +123,7 @@ def walk(
         return camera
     dt_s = min(dt_s, LONGEST_STEP_S)
     yaw, pitch = yaw_pitch(camera)
-    step = right * np.array([math.cos(yaw), 0, math.sin(yaw)]) + forward * _direction(yaw, pitch if flying else 0.0)
+    step = right * np.array([math.cos(yaw), 0, math.sin(yaw)]) + forward * direction(yaw, pitch if flying else 0.0)
     step = step + np.array([0, up if flying else 0, 0])
     length = float(np.linalg.norm(step))
     if length > 0:
@@ -122,7 +134,7 @@ def walk(
         eye_y = (bounds[0][1] if floor_y is None else floor_y) + walker.eye_height_m
         eye[1] += (eye_y - eye[1]) * (1 - math.exp(-dt_s / SETTLE_S))
     eye = confined(eye, camera.position, bounds)
-    return _placed(camera, eye, eye + _direction(yaw, pitch) * _distance(camera))
+    return _placed(camera, eye, eye + direction(yaw, pitch) * _distance(camera))
 
 
 def standing(camera: Camera, bounds: Bounds, floor_y: float | None, height_m: float) -> Camera:
@@ -143,11 +155,29 @@ def confined(eye: np.ndarray, before: Triple, bounds: Bounds) -> np.ndarray:
     return np.asarray(np.clip(eye, np.minimum(low + margin, before), np.maximum(high - margin, before)))
 
 
+def is_within(point: Triple, bounds: Bounds) -> bool:
+    """Whether a point lies in the bounds."""
+    return bool(np.all(np.greater_equal(point, bounds[0]) & np.less_equal(point, bounds[1])))
+
+
+def way_out_m(point: np.ndarray, towards: np.ndarray, bounds: Bounds) -> float:
+    """Distance along a unit direction at which a ray from within the bounds leaves them."""
+    ends = np.where(towards > 0, bounds[1], bounds[0]) - point
+    return float(np.min(np.divide(ends, towards, out=np.full(3, np.inf), where=np.abs(towards) > 1e-12)))
+
+
+def _axes(yaw: float, pitch: float) -> np.ndarray:
+    """(3, 3) rows to the right, up and ahead of a level camera."""
+    right, ahead = np.array([math.cos(yaw), 0, math.sin(yaw)]), direction(yaw, pitch)
+    return np.stack([right, np.cross(right, ahead), ahead])
+
+
 def _distance(camera: Camera) -> float:
     return max(math.dist(camera.target, camera.position), NEAREST_M)
 
 
-def _direction(yaw: float, pitch: float) -> np.ndarray:
+def direction(yaw: float, pitch: float) -> np.ndarray:
+    """Line of sight (3,) of a heading and an elevation, which stays short of the poles."""
     pitch = min(max(pitch, -PITCH_LIMIT_RAD), PITCH_LIMIT_RAD)
     return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), -math.cos(yaw) * math.cos(pitch)])
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
 from lambent.editing.history import History
 from lambent.materials.document import Material
+
+
+@dataclass(frozen=True)
+class _State:
+    """Edited materials, and what goes with materials besides their numbers, both by name."""
+
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    beside: Mapping[str, Hashable] = field(default_factory=dict)
 
 
 class MaterialEdits:
@@ -27,22 +37,33 @@ class MaterialEdits:
     def __init__(self, scene: Mapping[str, Material]) -> None:
         self.scene = scene
         self.saved: dict[str, Material] = {}
-        self._history: History[Mapping[str, Material]] = History({})
+        self._history: History[_State] = History(_State())
 
     @property
     def edited(self) -> Mapping[str, Material]:
         """The materials that differ from the scene's."""
-        return self._history.now
+        return self._history.now.materials
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
 
     def change(self, name: str, material: Material) -> None:
         """One moment of the stroke that is under way, or the first of a new one."""
+        others = {other: edited for other, edited in self.edited.items() if other != name}
+        self._go_on(materials=others if material == self.scene[name] else {**others, name: material})
+
+    def beside(self, name: str) -> Hashable:
+        """What was kept beside a material; None where nothing was."""
+        return self._history.now.beside.get(name)
+
+    def keep_beside(self, name: str, value: Hashable) -> None:
+        """Keep something beside a material, such as what a fit leaves alone: undo brings back what was there before."""
+        self._go_on(beside={**self._history.now.beside, name: value})
+
+    def _go_on(self, **changes: Any) -> None:
         if not self.in_stroke:
             self._history.begin_stroke()
-        others = {other: edited for other, edited in self.edited.items() if other != name}
-        self._history.change(others if material == self.scene[name] else {**others, name: material})
+        self._history.change(replace(self._history.now, **changes))
 
     def end_stroke(self) -> None:
         self._history.end_stroke()
@@ -61,7 +82,7 @@ class MaterialEdits:
     def previous(self, name: str) -> Material | None:
         """The material before the last stroke, or before the one under way; None where there was none."""
         before = self._history.previous
-        return None if before is None else before.get(name, self.scene[name])
+        return None if before is None else before.materials.get(name, self.scene[name])
 
     @property
     def can_undo(self) -> bool:

@@ -10,6 +10,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from lambent.core.camera import Camera
+from lambent.core.plain import Triple
 from lambent.viewer import cameras
 from lambent.viewer.edits import MaterialEdits
 from lambent.viewer.navigation import Navigation
@@ -52,7 +54,8 @@ class Input:
                 self.clicked(x - place.x, y - place.y)
             self._button = None
         elif kind == "wheel" and over and self.navigation.movement == "orbit":
-            self.navigation.move(cameras.zoom(self.navigation.camera, -event["dy"] / 100, self.navigation.bounds))
+            camera, bounds = self.navigation.camera, self.navigation.bounds
+            self.navigation.move(cameras.zoom(camera, -event["dy"] / 100, bounds, self.pivot))
 
     def _drag(self, x: float, y: float) -> None:
         dx, dy = x - self._at[0], y - self._at[1]
@@ -61,13 +64,22 @@ class Input:
         self._at, self._moved_px = (x, y), self._moved_px + math.hypot(dx, dy)
         self.dragged(dx, dy)
 
+    @property
+    def pivot(self) -> Triple:
+        """What orbit turns about and the wheel approaches."""
+        return self.navigation.camera.target
+
     def dragged(self, dx: float, dy: float) -> None:
-        """Turn about the target with the left button, shift the view with the others."""
+        """Turn about the pivot with the left button, shift the view with the others."""
         camera = self.navigation.camera
         if self._button == LEFT:
-            self.navigation.move(cameras.orbit(camera, dx, dy))
+            self.navigation.move(self.turned(dx, dy))
         else:
             self.navigation.move(cameras.pan(camera, dx, dy, self.screen.picture.height))
+
+    def turned(self, dx: float, dy: float) -> Camera:
+        """The camera after a drag in orbit."""
+        return cameras.orbit(self.navigation.camera, dx, dy, self.pivot)
 
     def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
         """Answer a key that was pressed or released; letters are small."""
@@ -80,6 +92,8 @@ class Input:
                 self.edits.undo()
             elif key == "s":
                 self.saved()
+            elif key == "q":
+                self.screen.close_wanted = True
         elif key == "p":
             self.screen.save_wanted = True
         elif key == "h":

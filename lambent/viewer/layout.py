@@ -12,10 +12,13 @@ import imgui_bundle
 from imgui_bundle import imgui, implot
 
 from lambent.viewer.mode import Beside, Drawing, Mode, Textures
-from lambent.viewer.panels.widgets import shadowed
+from lambent.viewer.panels import closing
+from lambent.viewer.panels.widgets import explain, shadowed
 from lambent.viewer.screen import Rect
 
 COLUMN_PX = 370  # logical
+MOST_SHARE = 1 / 3  # of a window's width that the column takes
+LEAST_FONT = 0.8  # size of letters where the column is narrow
 LABEL_PX = 88
 BORDER_PX = 6  # between picture, disks and curves
 LEAST_SHARE = 0.15  # of the window that a border leaves on either side
@@ -24,6 +27,7 @@ FONT_PX = 15.0
 COLOURS = {
     imgui.Col_.window_bg: (0.11, 0.115, 0.125, 1.0),
     imgui.Col_.popup_bg: (0.14, 0.145, 0.155, 1.0),
+    imgui.Col_.modal_window_dim_bg: (0.0, 0.0, 0.0, 0.45),
     imgui.Col_.frame_bg: (0.20, 0.21, 0.23, 1.0),
     imgui.Col_.frame_bg_hovered: (0.26, 0.28, 0.32, 1.0),
     imgui.Col_.frame_bg_active: (0.30, 0.34, 0.40, 1.0),
@@ -71,7 +75,7 @@ def set_style() -> None:
 
 def regions(mode: Mode, width: float, height: float) -> Regions:
     """How a window of that size is shared out."""
-    wide = min(COLUMN_PX, round(0.6 * width)) if mode.screen.panels_shown else 0
+    wide = min(COLUMN_PX, int(MOST_SHARE * width)) if mode.screen.panels_shown else 0
     left, down = max(1, round(width) - wide), max(1, round(height))
     column = Rect(round(width) - wide, 0, wide, down)
     if mode.beside is None or not mode.screen.panels_shown:
@@ -86,6 +90,7 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
     """The whole interface of one frame; returns whether the mouse is the interface's, also over the picture."""
     textures = textures or {}
     width, height = imgui.get_io().display_size
+    imgui.get_style().font_scale_main = max(LEAST_FONT, min(1.0, MOST_SHARE * width / COLUMN_PX))
     shared, beside = regions(mode, width, height), mode.beside
     dragged = _pictures(mode.drawing, shared.picture, textures)
     if beside is not None and shared.plots is not None:
@@ -95,6 +100,7 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
         _column(mode)
         imgui.end()
     mode.draw_over(textures)
+    closing.draw(mode)
     return dragged or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 
@@ -111,7 +117,9 @@ def _column(mode: Mode) -> None:
         imgui.begin_child("sections")
         imgui.push_item_width(-LABEL_PX)
     for panel in mode.panels:
-        if imgui.collapsing_header(panel.title, imgui.TreeNodeFlags_.default_open if panel.opened else 0):
+        opened = imgui.collapsing_header(panel.title, imgui.TreeNodeFlags_.default_open if panel.opened else 0)
+        explain(panel.meaning)
+        if opened:
             imgui.push_id(panel.title)
             panel.draw()
             imgui.pop_id()
@@ -170,6 +178,7 @@ def _border(name: str, begin: tuple[float, float], length: float, *, upright: bo
     if held:
         mouse = imgui.get_io().mouse_pos
         at = mouse.x if upright else mouse.y
+    explain("drag to share the room between both sides")
     if held or hovered:
         imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew if upright else imgui.MouseCursor_.resize_ns)
     shade = 0.55 if held else 0.4 if hovered else 0.24

@@ -34,10 +34,11 @@ class Divider:
 
 @dataclass(frozen=True)
 class Panel:
-    """A section of the column at the right, under a header that folds it."""
+    """A section of the column at the right, under a header that folds it; `meaning` says what it is for."""
 
     title: str
     draw: Callable[[], None]
+    meaning: str
     opened: bool = False  # at the start
 
 
@@ -53,7 +54,7 @@ class Beside:
 class Drawing:
     """Fills the picture's place with `views` of textures: of A and, beside a `divider`, of B.
 
-    `images` are further textures, by name; one called "picture A" takes the place of A's view.
+    `images` are further textures by name, arrays or views; one called "picture A" takes the place of A's view.
     """
 
     def __init__(self, device: Any) -> None:
@@ -68,7 +69,7 @@ class Drawing:
         raise NotImplementedError
 
     @property
-    def images(self) -> Mapping[str, Image]:
+    def images(self) -> Mapping[str, Any]:
         return {}
 
     @property
@@ -129,6 +130,17 @@ class Mode:
 
     def drop(self, path: str) -> None:
         """Take a file that was dropped onto the window."""
+
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        """What would be lost if the window closed now, in plain words."""
+        return ()
+
+    def save(self) -> None:
+        """Save what is unsaved, and say so on the screen, or why not."""
+
+    def discard(self) -> None:
+        """Closing keeps nothing of what is unsaved."""
 
     def rescue(self) -> None:
         """The window is lost: write unsaved work to files of new names, and say where on stderr."""

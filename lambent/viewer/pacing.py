@@ -1,9 +1,10 @@
 """When to draw the picture, how large, and with which integrator.
 
-In motion: the few-sample integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of
-planar reflectors (which show their probes then) where even half of the width and height takes too long with them.
-`REST_S` after the last change: the same once more, whole and with everything; then every frame adds samples of `qmc`
-to the picture, up to a stated count; then nothing is drawn any more.
+A changed material is drawn over the last picture at full size, on its objects alone. In motion: the few-sample
+integrator, on fewer pixels where the adapter is too slow, and without the mirrored views of planar reflectors (which
+show their probes then) where even half of the width and height takes too long with them. `REST_S` after the last
+change: the same once more, whole and with everything; then every frame adds samples of `qmc` to the picture, up to a
+stated count; then nothing is drawn any more.
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ PRIOR_SAMPLES = 16  # of `qmc` that the last picture in motion counts for, while
 
 @dataclass(frozen=True)
 class Plan:
-    """One picture to draw: its size relative to the window, its index in the accumulation (None: in motion), and
-    whether planar reflectors get mirrored views."""
+    """One picture to draw: its size relative to the window, its index in the accumulation (None: in motion),
+    whether planar reflectors get mirrored views, and whether it is drawn over the last one, see `FrameState.over`."""
 
     scale: float
     accumulate: int | None
     mirrors: bool = True
+    over: bool = False
 
 
 WHOLE = Plan(1.0, None)
@@ -115,10 +117,15 @@ class Pacer:
         """A frame in motion should take no longer from now on."""
         self._budget_s = seconds
 
-    def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool) -> Plan | None:
-        """Plan to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due."""
+    def plan(self, picture: object, now_s: float, *, refine: bool, adaptive: bool, over: bool = False) -> Plan | None:
+        """Plan to draw at `now_s` so that the window shows `picture`; None when it is shown already, or not yet due.
+
+        `over`: in motion, what changed is drawn over the last picture, at full size.
+        """
         if picture != self.shown:
             self.shown, self._changed_s, self.accumulated = picture, now_s, 0
+            if over:
+                return Plan(1.0, None, self._mirrors or not adaptive, over=True)
             return self.moving if adaptive else WHOLE
         return self._next(refine) if now_s - self._changed_s >= REST_S else None
 
@@ -138,7 +145,7 @@ class Pacer:
 
     def cost(self, plan: Plan, seconds: float, mirrors: int = 0) -> None:
         """Learn the time of a frame in motion with this many mirrored views, and choose the next."""
-        if plan.accumulate is not None:
+        if plan.accumulate is not None or plan.over:
             return
         size = self._sizes[plan.mirrors]
         size.learn(plan.scale, seconds, self._budget_s)

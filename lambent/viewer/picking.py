@@ -21,20 +21,35 @@ class Geometry:
 
     def pick(self, origin: ArrayLike, direction: Floats) -> ObjectRecord | None:
         """The first object on a ray; None where it meets none."""
+        return self.hit(origin, direction)[0]
+
+    def free_m(self, origin: ArrayLike, direction: Floats, but: str = "") -> float:
+        """Distance along a ray that no object stands in, apart from the one named `but`."""
+        return self.hit(origin, direction, but)[1]
+
+    def hit(self, origin: ArrayLike, direction: Floats, but: str = "") -> tuple[ObjectRecord | None, float]:
+        """The first object on a ray but one, and its distance; None and inf where it meets none."""
         start = np.asarray(origin, float)
         nearest, chosen = math.inf, None
         for item in self._objects:
+            if item.name == but:
+                continue
             entry = _box_entry(start, direction, np.array(item.bounds))
             if entry < nearest:
                 triangles = self.triangles[item.first_face : item.first_face + item.face_count]
                 distance = first_hit(start, direction, triangles)
                 if distance < nearest:
                     nearest, chosen = distance, item
-        return chosen
+        return chosen, nearest
 
 
 def first_hit(origin: Floats, direction: Floats, triangles: Floats) -> float:
-    """Distance to the nearest of triangles (T, 3, 3), on either side; inf for none (Moller & Trumbore 1997)."""
+    """Distance to the nearest of triangles (T, 3, 3), on either side; inf for none."""
+    return float(hits(origin, direction, triangles).min(initial=math.inf))
+
+
+def hits(origin: Floats, direction: Floats, triangles: Floats) -> Floats:
+    """Distances (T,) to triangles (T, 3, 3), on either side; inf where a ray misses (Moller & Trumbore 1997)."""
     edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     p = np.cross(direction, edge2)
     det = np.sum(edge1 * p, axis=-1)
@@ -46,7 +61,7 @@ def first_hit(origin: Floats, direction: Floats, triangles: Floats) -> float:
     v = np.sum(direction * q, axis=-1) * inverse
     t = np.sum(edge2 * q, axis=-1) * inverse
     hit = ~flat & (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 1e-6)
-    return float(t[hit].min()) if hit.any() else math.inf
+    return np.where(hit, t, np.inf)
 
 
 def _box_entry(origin: Floats, direction: Floats, box: Floats) -> float:

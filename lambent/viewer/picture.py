@@ -31,12 +31,13 @@ from lambent.viewer.screen import Rect, Screen, Statistics, least
 REST_FRAMES = 128
 LARGEST_PX = 8192  # of a texture, by WebGPU's default limits; a larger window shows a magnified picture
 SOFTWARE_N = 1
+LONGEST_OVER_S = 0.15  # of a frame over another one that is not drawn in parts
 QUIET_S = 0.5  # at most so long after an event, or as long as a part of a frame at rest takes, none is begun
 
 
 @dataclass
 class Job:
-    """A frame at rest that is drawn in parts."""
+    """A frame that is drawn in parts."""
 
     plan: Plan
     view: Any
@@ -57,6 +58,7 @@ class Picture:
         self._refine = True
         self._part_s = 0.0  # longest part of the last frame at rest
         self._whole_s = math.inf if adapter.is_software else 0.0  # the last frame at rest altogether
+        self._over_s = 0.0  # the last frame that was drawn over another
         self._cut = Cut()
         self._under_way: Job | None = None
         self.view: Any = None
@@ -74,16 +76,17 @@ class Picture:
         self._refine = pace.refine if refine is None else refine
         self.pacer.aim(share * pace.target_ms / 1e3)
         rests = wanted == self.pacer.shown
-        if not rests:
+        over = not rests and bool(self._renderer.redrawn(wanted))
+        if not (rests or (over and self._under_way is not None and self._under_way.plan.over)):
             self._under_way = None  # another frame is wanted: nobody will see this one
         if self._under_way is not None:
             return
-        plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive)
+        plan = self.pacer.plan(wanted, now_s, refine=self._refine, adaptive=pace.adaptive, over=over)
         if plan is None or (rests and (pace.answering or self._quiet_for_s() > 0)):
             return
         frame = self._planned(wanted, plan)
         view = self._view_of(frame.width, frame.height)
-        if rests and self._whole_s > SLICE_S:
+        if (rests and self._whole_s > SLICE_S) or (over and self._over_s > LONGEST_OVER_S):
             self._under_way = Job(plan, view, self._renderer.slices(frame, view, self._cut))
             return
         started = time.perf_counter()
@@ -93,11 +96,13 @@ class Picture:
         seconds = time.perf_counter() - started
         if rests:
             self._whole_s = self._part_s = seconds
+        elif over:
+            self._over_s = seconds
         self._show(plan, view, radiance, seconds)
 
     @property
     def under_way(self) -> bool:
-        """Whether a frame at rest is being drawn in parts, see `work`."""
+        """Whether a frame is being drawn in parts, see `work`."""
         return self._under_way is not None
 
     @property
@@ -120,7 +125,10 @@ class Picture:
             next(job.steps)
         except StopIteration as done:
             self._under_way = None
-            self._whole_s, self._part_s = job.seconds, job.longest_s
+            if job.plan.over:
+                self._over_s = job.seconds
+            else:
+                self._whole_s, self._part_s = job.seconds, job.longest_s
             self._show(job.plan, job.view, done.value, job.seconds)
             return True
         seconds = time.perf_counter() - started
@@ -177,7 +185,7 @@ class Picture:
         if not plan.mirrors:
             frame = replace(frame, planar=OFF)
         width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
-        return replace(frame, width=width, height=height)
+        return replace(frame, width=width, height=height, over=plan.over)
 
     def _view_of(self, width: int, height: int) -> Any:
         """A target for the next frame: never the view that is shown, which a frame in parts must leave alone."""
@@ -201,7 +209,8 @@ class Picture:
         dtype = np.dtype(np.float16 if self.radiance.format == "rgba16float" else np.float32)
         source, layout = {"texture": self.radiance, "origin": (x, y, 0)}, {"bytes_per_row": width * 4 * dtype.itemsize}
         data = self._device.queue.read_texture(source, layout, (width, height, 1))
-        return np.asarray(np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3], np.float32)
+        assert isinstance(self.pacer.shown, FrameState)
+        return self._renderer.in_units(np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3], self.pacer.shown)
 
     @property
     def samples(self) -> int:

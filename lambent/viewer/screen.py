@@ -76,6 +76,9 @@ class Screen:
     messages: list[Message] = field(default_factory=list)
     panels_shown: bool = True
     save_wanted: bool = False  # of the picture
+    close_wanted: bool = False  # by a key
+    asks_to_close: bool = False  # what is to become of unsaved work
+    closes: bool = False  # that question was answered: the window closes now
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""

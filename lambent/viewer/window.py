@@ -53,6 +53,7 @@ class Window:
         self._error: Exception | None = None
         self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
         self._take_dropped_files()
+        self._take_the_close_button()
 
     def run(self) -> None:
         """Show the window until it is closed; raises what went wrong meanwhile."""
@@ -77,7 +78,7 @@ class Window:
             return
         with self._watched():
             io = self._imgui.backend.io
-            has_keys = io.want_text_input or io.want_capture_keyboard
+            has_keys = io.want_text_input or io.want_capture_keyboard or self.screen.asks_to_close
             self.mode.input.handle(event, ui_has_mouse=self._popup_open, ui_has_keys=has_keys)
 
     def _draw(self) -> None:
@@ -93,6 +94,8 @@ class Window:
         now_s = self.screen.clock()
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
         self.mode.advance(since_last_s if self._moving else 0.0)  # the sleep before a first step is not walked through
+        if self.screen.close_wanted or self.screen.closes:
+            self._want_close()
         self.screen.drop_old_messages()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
 
@@ -144,6 +147,25 @@ class Window:
             self.canvas.request_draw()
 
         glfw.set_drop_callback(self.canvas._window, dropped)  # type: ignore[arg-type]
+
+    def _take_the_close_button(self) -> None:
+        """Ask before the window closes with unsaved work."""
+
+        def pressed(_: object) -> None:
+            glfw.set_window_should_close(self.canvas._window, 0)
+            with self._watched():
+                self._want_close()
+
+        glfw.set_window_close_callback(self.canvas._window, pressed)
+
+    def _want_close(self) -> None:
+        self.screen.close_wanted = False
+        if self.mode.unsaved and not self.screen.closes:
+            self.screen.asks_to_close = True
+            self._extra_frames = SETTLE_FRAMES
+            self.canvas.request_draw()
+        else:
+            loop.call_soon(self.canvas.close)
 
     def _interface(self) -> None:
         self._popup_open = layout.draw(self.mode, self._textures)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.surfaces.atlas import PIECE_FACES, merged, object_records, separated, unwrap
+from lambent.bake.surfaces.atlas import merged, object_records, separated, unwrap
+from lambent.bake.surfaces.charts import PIECE_FACES
 from lambent.bake.surfaces.texels import chart_labels, texels_of
 from lambent.core.geometry import cross_2d
 from lambent.scenes import load_scene

@@ -16,6 +16,7 @@ from lambent.core.images import write_image
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.environment_images import orientation
 from lambent.scenes.scene import ImageEnvironment, SunSky
+from lambent.store.contract import sun_beside
 from tests.bake.small_scenes import TINY, plane
 
 SUN = normalize(np.array([0.5, 0.6, 0.3]))
@@ -27,13 +28,17 @@ def irradiance(cube: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return (cube.astype(float) * (cosine * texel_solid_angles(n))[..., None]).sum(axis=(0, 1, 2))
 
 
-def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path) -> None:
-    sky = SunSky(tuple(SUN))
+@pytest.mark.parametrize("radius_deg", [0.2679, 4.0])
+def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path, radius_deg: float) -> None:
+    sky = SunSky(tuple(SUN), sun_radius_deg=radius_deg)
     store = bake(
         replace(plane(), environment=sky), tmp_path / "s", quality=TINY.changed(light_map={"samples": (128, 128)})
     )
     raw = store.read("light_map/traced")
-    traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum()
+    sun = sun_beside(store)
+    assert sun is not None
+    direct = np.multiply(sun.irradiance, sun.direction[1])  # which the light map leaves out
+    traced = raw[..., :3].sum(axis=(0, 1, 2)) / raw[..., 3].sum() + direct
     assert irradiance(environment_cube(sky, 128), np.array([0, 1.0, 0])) == pytest.approx(traced, rel=0.02)
 
 

@@ -117,6 +117,8 @@ SUN_SKY: Answers = {
     "albedo": (0.2, SKY),
     "sun_scale": (0.5, SKY),
     "sky_scale": (0.5, SKY),
+    "sun_radius_deg": (1.0, SKY),
+    "ground": ("black", SKY),
 }
 IMAGE: Answers = {
     "file": (lambda file: file.with_name("dusk.exr"), SKY),
@@ -142,6 +144,7 @@ SCENE: Answers = {
     "cameras": ((VIEW,), NOTHING),
     "paths": ((CameraPath("path", (VIEW, replace(VIEW, position=(0.0, 1.0, 2.0)))),), NOTHING),
     "exposure_ev": (2.0, NOTHING),
+    "crease_deg": (30.0, NOTHING),  # the meshes have it already
     "sources": ((Path("other.toml"),), NOTHING),
     "warnings": (("a face is missing",), NOTHING),
     "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes",)),

@@ -28,12 +28,14 @@ def tilted(mesh: Mesh, tilt_deg: float) -> Mesh:
     return replace(mesh, normals=np.tile(np.float32([np.sin(lean), np.cos(lean), 0]), (len(mesh.positions), 1)))
 
 
-def landed(objects: tuple[SceneObject, ...], sun: DirectionalLight, photons: int = 1 << 19) -> dict[str, float]:
+def landed(
+    objects: tuple[SceneObject, ...], sun: DirectionalLight, photons: int = 1 << 19, bounces: int = 4
+) -> dict[str, float]:
     """Flux in W on each object's front: every object's light map is one texel of a row."""
     engine()
     scene = Scene("s", objects, {"black": BLACK, "white": Material(kd=0.8)}, lights=(sun,))
     uv2 = {o.name: np.tile([(i + 0.5) / len(objects), 0.5], (len(o.mesh.positions), 1)) for i, o in enumerate(objects)}
-    flux = shoot(SceneBuilder(scene, uv2).build(), (1, 1, len(objects)), photons, 4, 1)
+    flux = shoot(SceneBuilder(scene, uv2).build(), (1, 1, len(objects)), photons, bounces, 1)
     return {o.name: float(flux[0, 0, i, 1]) for i, o in enumerate(objects)}
 
 
@@ -44,6 +46,21 @@ def test_irradiance_is_that_of_the_shading_normal(tilt_deg: float) -> None:
     sun = DirectionalLight((-0.5, -np.sqrt(0.75), 0.0), (2.0, 2.0, 2.0))
     wanted = 4 * 2 * np.cos(np.radians(30 - tilt_deg))
     assert landed((floor,), sun, 1 << 16)["floor"] == pytest.approx(wanted, rel=0.01)
+
+
+def test_photons_are_counted_up_to_the_last_bounce() -> None:
+    """Sun on the floor, none on the wall at right angles to it: one bounce lights the wall, two the floor again."""
+    sun = DirectionalLight((0.0, -1.0, 0.0), (2.0, 2.0, 2.0))
+    floor = SceneObject("floor", patch((-1, 0, 1), (2, 0, 0), (0, 0, -2)), "white")
+    wall = SceneObject("wall", patch((-1, 0.001, 1), (0, 0, -2), (0, 2, 0)), "white")
+    found = [landed((floor, wall), sun, 1 << 16, bounces) for bounces in range(3)]
+    assert found[0] == {"floor": pytest.approx(8, rel=0.01), "wall": 0}
+    assert found[1]["floor"] == pytest.approx(found[0]["floor"], rel=1e-6) and found[1]["wall"] == pytest.approx(
+        8 * 0.8 * 0.2, rel=0.05
+    )
+    assert found[2]["floor"] > 1.01 * found[0]["floor"] and found[2]["wall"] == pytest.approx(
+        found[1]["wall"], rel=0.02
+    )
 
 
 def test_smooth_shading_sends_light_by_the_triangles_cosine() -> None:

@@ -11,6 +11,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.probes.centre import flat_axis, probe_centre
 from lambent.bake.probes.planes import bounding_planes
+from lambent.bake.probes.probe import MOST, _blocks_needed
 from lambent.bake.reference.path_traced import render_reference
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.camera import Camera
@@ -44,6 +45,15 @@ def test_every_face_sees_its_wall(tmp_path: Path) -> None:
     unit = normalize(face_directions(16))
     assert np.allclose(store.read("probe/ball/distance"), 2 / np.abs(unit).max(axis=-1), rtol=1e-4)
     assert np.allclose(store.artefact("probe/ball/radiance").meta["centre"], 0, atol=1e-6)
+
+
+def test_noisy_texels_get_more_paths() -> None:
+    """As many as bring the relative standard error down to the noise, at most `MOST` times as many."""
+    samples, mean = 16, np.repeat([[2.0, 2.0, 2.0]], 3, axis=0)
+    variance = np.array([[0.0], [4.0], [1e6]])
+    squares = samples * (mean**2 + variance)
+    times = _blocks_needed(samples * mean, squares, samples, 0.1)
+    np.testing.assert_allclose(times, [1, 4 / samples / (0.1 * 2) ** 2, MOST])
 
 
 def test_planes_are_those_of_the_room_in_world_space(tmp_path: Path) -> None:

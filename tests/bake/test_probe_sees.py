@@ -51,7 +51,7 @@ def test_every_face_has_its_lamp_in_its_texel(tmp_path: Path, method: str) -> No
     radiance, distance = (store.read(f"probe/ball/{part}").astype(float) for part in ("radiance", "distance"))
     for face, (at, (row, column)) in enumerate(LAMPS):
         seen = radiance[face, ..., 1]
-        assert seen[row, column] > 0.5 * 9, f"face {face}"
+        assert seen[row, column] == pytest.approx(0.8**2 * 9, rel=0.15), f"face {face}: the texel's mean"
         assert seen.sum() == pytest.approx(seen[row, column]), f"face {face}: one texel alone"
         assert distance[face, row, column] == pytest.approx(np.linalg.norm(at), rel=1e-3)
         assert np.sum(distance[face] < 1.9) == 1, f"face {face}"

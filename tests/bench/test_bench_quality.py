@@ -42,12 +42,13 @@ def test_rings_stand_above_the_published_estimates(tmp_path: Path) -> None:
     effort = replace(quality.QUICK, qmc_spp=1024, ns=(7,), materials=MATERIALS[::2], environments={"studio": studio})
     report = run_bench("quality", effort, inputs=[tmp_path / "lamp.hdr"])
     check_form(report)
-    assert len(report["rows"]) == 2 * 5 * 5
+    assert len(report["rows"]) == 2 * 5 * 6
     assert report["inputs"][0]["path"] == "lamp.hdr"
     above = report["summary"]["rings_above"]
     assert above["fis"]["7"] > 3
     assert above["lobe-4.25"]["7"] > 4
     assert above["lobe-4.24"]["7"] > 4
+    assert above["lamps"]["7"] < -4  # both environments have lamps
     assert all(0 < row["flip_qmc"] < row["flip_qmc_worst_tile"] < 1 for row in report["rows"])
 
 

@@ -47,3 +47,15 @@ def test_decimal_commas_are_named(refused, bright):
 def test_a_file_that_does_not_say_its_quantity(refused, tmp_path):
     (tmp_path / "a.txt").write_text("10 0 0 0 0.1\n10 0 20 0 0.1\n")
     assert "theta_i phi_i theta_o phi_o, then f, f_cos or p" in refused("inspect", tmp_path / "a.txt")
+
+
+def test_daylight_is_said_in_a_line(lambent, tmp_path):
+    """The sun's height, both illuminances, and the ground that the scene does not have."""
+    scene = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n[materials]\n' + "".join(
+        f"{name} = {{ kd = 0.5 }}\n" for name in ("white", "red", "green", "black", "metal")
+    )
+    sky = '[environment]\nkind = "sunsky"\nsun_direction = [0.0, 1.0, 1.0]\nalbedo = 0.4\n'
+    for more, ground in (("", "a diffuse ground of albedo 0.4"), ('ground = "black"\n', "nothing")):
+        (tmp_path / "scene.toml").write_text(scene + sky + more)
+        said = lambent("inspect", tmp_path / "scene.toml", "--json").json["daylight"]
+        assert said == f"sun 45 degrees high, 90.1 klx facing it; sky 13.8 klx, turbidity 3; below the horizon {ground}"

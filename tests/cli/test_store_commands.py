@@ -10,7 +10,7 @@ import pytest
 
 from lambent.core.false_colour import Range, false_colour
 from lambent.core.images import read_encoded, read_image
-from lambent.core.photometry import photometric
+from lambent.core.photometry import LM_PER_W, photometric
 from tests.viewer.small_store import write_small_store
 
 
@@ -66,6 +66,27 @@ def test_false_colour_names_the_luminance(lambent, store, tmp_path):
     expected = false_colour(photometric(np.array([0.6, 0.55, 0.5]) * 2 / np.pi), Range(10, 1000))
     np.testing.assert_allclose(floor, expected, atol=0.01)
     assert lambent(*common, "--linear").code == 0, "the range is found"
+
+
+def test_luminance_and_illuminance_by_their_names(lambent, refused, store, tmp_path):
+    """2 W/m2 arrive everywhere; --show names the quantity, and the view and the unit follow."""
+    file = tmp_path / "a.png"
+    common = ("render", store, "-o", file, "--size", "192x128", "--force")
+    for what, value, unit in (("illuminance", 2 * LM_PER_W, "lx"), ("luminance", 0, "cd/m2")):
+        said = lambent(*common, "--show", what, "--range", "10:1000", "--json").json
+        assert said["scale"] == {"low": 10, "high": 1000, "log": True, "unit": unit} and said["exposure_ev"] is None
+        if value:
+            expected = false_colour(np.array(value), Range(10, 1000))
+            np.testing.assert_allclose(read_encoded(file)[-8, 20], expected, atol=0.01)
+    assert "leave out --view" in refused(*common, "--show", "luminance", "--view", "neutral")
+
+
+def test_exposure_as_ev100(lambent, refused, store, tmp_path):
+    common = ("render", store, "-o", tmp_path / "a.png", "--size", "32x24", "--force", "--json")
+    assert lambent(*common, "--ev100", "9").json["ev100"] == pytest.approx(9)
+    said = lambent(*common, "--exposure", "-2").json
+    assert said["exposure_ev"] == -2 and said["ev100"] == pytest.approx(np.log2(LM_PER_W / 1.2) + 2)
+    assert "leave out --exposure" in refused(*common, "--ev100", "9", "--exposure", "1")
 
 
 def test_noise_of_the_light_map(lambent, refused, store, tmp_path):

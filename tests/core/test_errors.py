@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.inputs import foreign_bytes
 
 
 @pytest.mark.parametrize("end", ["\n", "\r", "\r\n", "\v", "\x1c", "\x85", "\u2028"])
@@ -12,3 +15,22 @@ def test_errors_are_one_line(end: str) -> None:
     said = str(UserError(f"a{end}b", file=f"c{end}d", field=f"e{end}f", got=f"g{end}h", expected=f"i{end}j", hint="k"))
     assert said.splitlines() == [said]
     assert said == "c d: e f: a b; found g h; expected i j; k"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [KeyError("a"), TypeError("b\nc"), ZeroDivisionError(), AttributeError("d" * 5000), RecursionError(), OSError()],
+)
+def test_whatever_a_reader_raises_names_the_file_and_the_reader(error: Exception) -> None:
+    with pytest.raises(UserError) as caught, foreign_bytes("the reader", Path("a.bin")):
+        raise error
+    said = str(caught.value)
+    assert said.startswith("a.bin: cannot be read as the reader") and type(error).__name__ in said
+    assert said.splitlines() == [said] and len(said) < 300
+
+
+def test_what_is_no_fault_of_the_bytes_passes() -> None:
+    for error in (UserError("known"), KeyboardInterrupt()):
+        with pytest.raises(type(error)) as caught, foreign_bytes("the reader", Path("a.bin")):
+            raise error
+        assert caught.value is error

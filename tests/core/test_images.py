@@ -63,11 +63,23 @@ def test_rgbe_run_lengths_new_and_old() -> None:
     old = bytes([128, 0, 0, 129, 1, 1, 1, 3])
     image = rgbe.decode(b"#?RADIANCE\n\n-Y 2 +X 2\n" + old, Path("x"))
     np.testing.assert_array_equal(image[..., 0], np.ones((2, 2)))
+    digits = bytes([128, 0, 0, 129, 1, 1, 1, 3, 1, 1, 1, 1, 64, 0, 0, 129])  # 3 + 256 more of the first
+    image = rgbe.decode(b"#?RADIANCE\n\n-Y 1 +X 261\n" + digits, Path("x"))
+    np.testing.assert_array_equal(image[0, :, 0], [*np.ones(260), 0.5])
 
 
 def test_rgbe_rows_from_below_and_exposure() -> None:
     data = b"#?RADIANCE\nEXPOSURE=2\n\n+Y 2 +X 1\n" + bytes([128, 0, 0, 129, 0, 128, 0, 129])
     np.testing.assert_array_equal(rgbe.decode(data, Path("x")), [[[0, 0.5, 0]], [[0.5, 0, 0]]])
+    from_the_right = data.replace(b"EXPOSURE=2\n", b"").replace(b"+Y 2 +X 1", b"-Y 1 -X 2")
+    np.testing.assert_array_equal(rgbe.decode(from_the_right, Path("x")), [[[0, 1, 0], [1, 0, 0]]])
+
+
+def test_rgbe_of_xyz_becomes_rgb() -> None:
+    """An even spectrum, X = Y = Z, is warmer than white under D65; Y stays the luminance."""
+    data = b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + bytes([128, 128, 128, 129])
+    (r, g, b) = rgbe.decode(data, Path("x"))[0, 0]
+    assert r > 1.1 > 1 > g > b and 0.2126 * r + 0.7152 * g + 0.0722 * b == pytest.approx(1, abs=1e-3)
 
 
 def _refused(path: Path) -> str:

@@ -124,14 +124,16 @@ def test_what_a_killed_process_left_goes_and_nothing_else(tmp_path: Path) -> Non
     )
     subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.png")], check=False)
     (left,) = tmp_path.iterdir()
-    living = tmp_path / left.name.replace(files._BESIDE.match(left.name)[1], str(os.getppid()))  # type: ignore[index]
+    of = files._BESIDE.match(left.name)[1]  # type: ignore[index]
+    living, namesake = (tmp_path / left.name.replace(of, str(number)) for number in (os.getppid(), os.getpid()))
+    namesake.write_text("")  # of a dead process whose number is ours now
     elsewhere = tmp_path / left.name.replace(files._MACHINE, ".lambent-00000000-")
     kept = {living, elsewhere, tmp_path / ".a.1234.png", tmp_path / f"{left.name[1:]}"}
     for path in kept:
         path.write_text("")
     with atomic_path(tmp_path / "b.png") as mine:
         remove_left_over(tmp_path)
-        assert mine.exists() and not left.exists()
+        assert mine.exists() and not left.exists() and not namesake.exists()
     assert set(tmp_path.iterdir()) == kept | {tmp_path / "b.png"}
 
 

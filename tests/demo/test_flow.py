@@ -13,8 +13,9 @@ import pytest
 from lambent.bake.quality import quality_named
 from lambent.core.images import read_encoded
 from lambent.core.progress import Cancelled
-from lambent.demo.flow import SPECIMEN_OF, STILLS, Effort, Flow
+from lambent.demo.flow import PACE_M_S, SPECIMEN_OF, STILLS, Effort, Flow, walked
 from lambent.materials.document import load_material
+from lambent.scenes import load_scene
 from lambent.store.store import Store
 
 TINY = Effort(
@@ -29,13 +30,20 @@ TINY = Effort(
     still=(160, 100),
     still_frames=2,
     film=(96, 60),
-    film_seconds=0.5,
-    film_fps=12,
+    film_fps=1,
     compared=(96, 60),
     path_spp=16,
     qmc_spp=64,
     moving_frames=4,
 )
+
+
+def test_the_film_walks_at_a_persons_pace() -> None:
+    (path,) = load_scene("builtin:room").paths
+    eyes = np.array([camera.position for camera in walked(path, 20)])
+    steps_m = np.linalg.norm(np.diff(eyes, axis=0), axis=1)
+    assert np.allclose(20 * steps_m, PACE_M_S, rtol=0.02)
+    assert 0.8 <= PACE_M_S <= 1.5
 
 
 class Interrupt:
@@ -69,7 +77,7 @@ def test_the_flow_ends_with_everything_it_names(tmp_path: Path) -> None:
         assert picture.shape == (100, 160, 3)
         assert 0.1 < picture.mean() < 0.95 and picture.std() > 0.05
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "walk.mp4"))
-    assert frames == 6
+    assert frames == 7
     # A coarse bake and few paths: what would fail here is a mirrored, shifted, black or wrongly lit picture.
     assert report["compare"]["sampling"]["psnr_db"] > 25
     assert report["compare"]["total"]["psnr_db"] > 15

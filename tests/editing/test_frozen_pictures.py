@@ -13,10 +13,11 @@ import pytest
 from lambent.core.camera import Camera
 from lambent.core.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.editing.canvas import HostCanvas
+from lambent.editing.interreflection.entries import TermLight
 from lambent.editing.interreflection.noise import light_of, noise
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers, second_coefficients
-from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight, interreflections
+from lambent.editing.interreflection.stored import Interreflections, PartLight, interreflections
 from lambent.editing.interreflection.whole import WholePicture
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import DensePairs, Rows
@@ -57,10 +58,10 @@ def light(tails: Tails, seed: int = 0) -> Interreflections:
             dense = rng.random((len(part), len(tails) * int(np.prod(counts, dtype=int)), 3)) ** 8
             dense[rng.random(dense.shape[:2]) < 0.7] = 0
             point, code = np.nonzero(dense.any(axis=2))
-            ends = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=len(part)))])
+            each = np.bincount(point, minlength=len(part))
             units = np.where(np.arange(len(part)) < 6, 2.0, 0.25).astype(np.float32)
             values = packed_rgb((dense[point, code] / units[point, None]).astype(np.float32))
-            terms.append(TermLight(ends, code.astype(np.uint32), values, units, counts))
+            terms.append(TermLight.of_tiles([(each, code.astype(np.uint32), values)], units, counts))
         theta_o = rng.uniform(0, 1.5, len(part)).astype(np.float32)
         parts[name] = PartLight(START[name], np.sort(part), theta_o, tuple(terms), name != "known")
     return Interreflections(SIZE, tails, parts, 1)
@@ -105,7 +106,7 @@ def test_frozen_pictures_are_the_whole_sum(tails: Tails, edited: str, hits: tupl
 def test_edits_by_frames(tails: Tails) -> None:
     """A highlight and a colour change: frames reach the sum of everything; other materials answer as well."""
     whole = light(tails)
-    frozen = FrozenPicture(whole, START, "glossy", CANVAS)
+    frozen = FrozenPicture(whole, START, "glossy", CANVAS, {"diffuse", "highlight"})
     before = shown(frozen)
     later = of_material(Material(kd=(0.1, 0.8, 0.4), lobes=(Lobe(mx=0.15, my=0.15, r0=0.5),)))
     assert frozen.serves(later, None)
@@ -138,13 +139,13 @@ def test_noise_is_found_from_two_passes() -> None:
 
 
 def test_the_idle_curve_wants_to_be_frozen_anew() -> None:
-    frozen = FrozenPicture(light(DIFFUSE), START, "glossy", CANVAS)
+    frozen = FrozenPicture(light(DIFFUSE), START, "glossy", CANVAS, {"highlight"})
     first, second = (factor.curve for factor in GLOSSY.terms[1].factors)
     flat = GLOSSY.with_curve(second, Curve.constant(0.3))
     assert frozen.serves(GLOSSY, first)
     assert not frozen.serves(flat, None)
     assert not frozen.serves(GLOSSY, second)
-    anew = FrozenPicture(light(DIFFUSE), {**START, "glossy": flat}, "glossy", CANVAS, active=second)
+    anew = FrozenPicture(light(DIFFUSE), {**START, "glossy": flat}, "glossy", CANVAS, {second})
     assert anew.serves(flat, second)
     reference = expected(light(DIFFUSE), {**START, "glossy": flat})
     assert np.abs(shown(anew) - reference).max() < 2e-3 * reference.max()

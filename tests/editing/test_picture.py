@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from lambent.core.camera import Camera
+from lambent.core.errors import UserError
 from lambent.editing.operators import Region
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.rows import DensePairs, Rows
@@ -213,6 +214,14 @@ def test_what_the_transport_does_not_serve_is_said_and_changes_nothing() -> None
     picture.show("it", edited)
     picture.draw()
     assert close(pixels_of(picture.image(), part), direct(part, bands, edited))
+
+
+def test_a_material_that_no_pixel_shows_is_said(tray: Editable) -> None:
+    picture = EditedPicture(np.zeros((HEIGHT, WIDTH, 3), np.float32), {"tray": part_of(tray, np.arange(80), 5)[0]})
+    for ask in (lambda: picture.show("trap", tray), lambda: picture.activate("trap", "diffuse")):
+        with pytest.raises(UserError, match="unknown material in view") as caught:
+            ask()
+        assert caught.value.expected == "tray" and "tray" in str(caught.value.hint)
 
 
 def test_better_transport_replaces_the_first(tray: Editable) -> None:

@@ -233,7 +233,7 @@ REFUSED = {
     "lights": ({"lights": 10**9}, "lights"),
     "camera": (
         {"camera": {"name": "a", "position": [0, 0, 0], "target": [0, 0, 1], "fov_y_deg": 999}},
-        r"json: the camera is not finite, or sees no angle$",
+        r"json: the camera is not within 1e9 m, or sees no angle$",
     ),
     "environment": ({"environment": {"file": "a.hdr", "scale": -1}}, "environment.scale"),
     "nan": ({"environment": {"file": "a.hdr", "rotation_deg": float("nan")}}, "rotation_deg"),

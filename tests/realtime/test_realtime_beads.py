@@ -60,6 +60,12 @@ def test_a_small_lamp_has_one_highlight(ball, m: float) -> None:
         assert second_highlight(drawn(ball, m, n)) < LIMIT[m], n
 
 
+@pytest.mark.parametrize("m", [0.1, 0.25, 0.4])
+def test_a_lamp_outside_of_the_cube_map_has_one_highlight_at_any_n(ball, m: float) -> None:
+    for n in (1, 3, 5, 7):
+        assert second_highlight(drawn(ball, m, n, "lamps")) < 0.02, n
+
+
 def test_pieces_are_told_from_one_highlight(ball, monkeypatch: pytest.MonkeyPatch) -> None:
     """Filters of a fifth of the solid angle leave one highlight per sample."""
 

@@ -83,7 +83,7 @@ def test_perpendiculars_and_octahedral_coordinates() -> None:
 @pytest.mark.parametrize(
     ("shader", "declared"),
     [
-        ("rings", f"const FACTOR_ROWS = {albedo.FACTORS // 4}u;"),
+        ("albedo_factor", f"const FACTOR_ROWS = {albedo.FACTORS // 4}u;"),
         ("split_sum", f"const LAST_LEVEL = {albedo.LEVELS - 1}.0;"),
         ("lobes", f"const LAMBENT_COS_MIN: f32 = {albedo.COS_MIN:.0e};".replace("e-0", "e-")),
         ("aim", f"const AIM_NODES = {aim.HEAD_ROWS}u;"),

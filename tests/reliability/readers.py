@@ -80,7 +80,7 @@ def sound() -> tuple[Sound, ...]:
             "spectrum file": "a.spd",
             "lat-long HDR": "sky.hdr",
         },
-        "scene.toml": {"material of a scene": "copper.json"},
+        "scene.toml": {"material of a scene": "copper.json", "IES photometry": "lamp.ies"},
     }
     for one in [s for s in found if s.main in within]:
         files = one.files | ({"scene.xml": scene_seeds.PLAIN_MITSUBA} if one.main == "scene.xml" else {})

@@ -353,6 +353,12 @@ intensity = [20.0, 18.0, 15.0]
 direction = [0.0, -1.0, 0.0]
 outer_deg = 40.0
 
+[[lights]]
+kind = "ies"
+file = "lamp.ies"
+position = [0.0, 2.5, 0.0]
+lumens = 800.0
+
 [[cameras]]
 name = "entrance"
 position = [0.0, 1.6, 3.0]
@@ -369,8 +375,26 @@ keys = [
 """
 
 
+IES = b"""IESNA:LM-63-2002
+[TEST] by hand
+TILT=INCLUDE
+1
+3
+0 45 90
+1 .9 .8
+1 800 1 5 3 1 2 .6 .6 0
+.95 1 40
+0 22.5 45 67.5 90
+0 45 90
+300 280 200 90 0
+300 270 180 80 0
+300 260 160 70 0
+"""
+
+
 def toml(material: bytes, table: bytes) -> Files:
     """A scene.toml with a file of every kind that it may name."""
     return {
         "scene.toml": TOML, **gltf("glb"), **ply("ascii"), "sky.hdr": HDR, "copper.json": material, "oak.txt": table,
+        "lamp.ies": IES,
     }  # fmt: skip

@@ -11,6 +11,7 @@ import pytest
 from lambent.core.camera import CameraPath
 from lambent.core.colour import srgb_encode
 from lambent.core.errors import UserError
+from lambent.core.exposure import KEY, ev100_of
 from lambent.core.false_colour import fitting_range
 from lambent.core.images import read_encoded, read_image, to_bytes
 from lambent.core.photometry import photometric
@@ -163,3 +164,33 @@ def test_films_have_even_sizes_of_their_own(store: Path, tmp_path: Path) -> None
     path = CameraPath("mine", (FRONT, SIDE), 1.0)
     done = film(store, tmp_path / "a.mp4", path, replace(SMALL, width=51, height=33), fps=2)
     assert (done.width, done.height) == (50, 32)
+
+
+def test_a_scene_without_an_exposure_is_metered(tmp_path: Path) -> None:
+    """Its middle is middle grey in every way of drawing, whatever its light; a film keeps the exposure of its start."""
+    opened = Store.open(write_small_store(tmp_path / "s"))
+    record = scene_record(opened)
+    write_scene_record(opened, record.model_copy(update={"exposure_ev": None}))
+    exposures = []
+    for factor in (1.0, 64.0):
+        for name in ("light_map/irradiance", "environment/radiance", "probe/ball/radiance"):
+            meta = opened.artefact(name).meta
+            opened.put(name, name.split("/")[0], opened.read(name) * np.float16(factor), key=f"{factor}", meta=meta)
+        done = still(opened, tmp_path / f"{factor}.png", FRONT, replace(SMALL, view="linear"))
+        shown = photometric(images(opened, replace(SMALL, view="linear")).radiance(FRONT)) / 179
+        assert done.exposure_ev is not None and done.ev100 == pytest.approx(ev100_of(done.exposure_ev))
+        assert np.exp(np.log(shown[shown > 0]).mean()) * 2**done.exposure_ev == pytest.approx(KEY, rel=0.25)
+        exposures.append(done.exposure_ev)
+        slow = images(opened, replace(SMALL, integrator="qmc", samples=8))
+        slow.displayed(FRONT)
+        assert slow.exposure_ev == pytest.approx(done.exposure_ev, abs=0.1)
+    assert exposures[0] - exposures[1] == pytest.approx(6, abs=0.05)
+    moving = images(opened, SMALL, moving=True)
+    moving.displayed(FRONT)
+    before = moving.exposure_ev
+    moving.displayed(SIDE)
+    assert moving.exposure_ev == before
+    assert still(opened, tmp_path / "a.exr", FRONT, SMALL).exposure_ev is None
+    measured = still(opened, tmp_path / "a.png", FRONT, replace(SMALL, show="light-map", view="false-colour"))
+    assert measured.exposure_ev is None and measured.scale is not None and measured.scale["unit"] == "lx"
+    assert measured.scale["low"] < 128 * 179 <= measured.scale["high"]

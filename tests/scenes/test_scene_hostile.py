@@ -52,7 +52,8 @@ HOSTILE = {
     "includes itself": ('<include filename="scene.xml"/>', r"includes itself"),
     "a picture out": ('<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string '
                       'name="filename" value="../../p.png"/></texture></bsdf></shape>', r"leaves its folder"),
-    "not there": ('<shape type="obj"><string name="filename" value="a.obj"/></shape>', r"file not found; found a.obj"),
+    "not there": ('<shape type="obj"><string name="filename" value="a.obj"/></shape>',
+                  r"holds no triangles; a: left out, its file a\.obj is not there"),
     "not a number": ('<shape type="sphere"><float name="radius" value="big"/></shape>',
                      r"line 1 <float> radius: not a number; found big"),
     "not finite": ('<shape type="sphere"><float name="radius" value="nan"/></shape>', r"not a finite number"),

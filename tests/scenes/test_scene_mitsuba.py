@@ -288,7 +288,7 @@ def test_old_names_defaults_includes_and_instances(tmp_path: Path) -> None:
     assert np.allclose(grey.mesh.normals, (0, 0, -1)) and [c.name for c in scene.cameras] == ["overview"]
     (sun,) = scene.lights
     assert isinstance(sun, DirectionalLight) and sun.direction == (0, -1, 0) and sun.irradiance == (2, 2, 2)
-    assert scene.environment == ConstantEnvironment((0.1, 0.2, 0.3)) and scene.exposure_ev == 0
+    assert scene.environment == ConstantEnvironment((0.1, 0.2, 0.3)) and scene.exposure_ev is None
     assert "a scene has one environment" in " ".join(scene.warnings)
     assert {p.name for p in scene.sources} == {"scene.xml", "materials.xml"}
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.scenes import load_scene
-from lambent.scenes.scene import PointLight, SunSky
+from lambent.scenes.scene import SUN_RADIUS_DEG, PointLight, SunSky
 from tests.scenes.test_gltf import _png as png
 from tests.scenes.test_scene_mitsuba import written
 
@@ -48,6 +48,39 @@ def test_daylight_is_scaled_as_a_whole_and_by_parts(tmp_path: Path, kind: str, s
     assert isinstance(made, SunSky)
     assert (made.sun_scale, made.sky_scale, made.turbidity) == pytest.approx((sun, sky, 4))
     assert np.linalg.norm(made.sun_direction) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("said", "radius_deg"),
+    [
+        ("", SUN_RADIUS_DEG),
+        ('<float name="sunRadiusScale" value="18.8131"/>', 18.8131 * SUN_RADIUS_DEG),
+        ('<float name="sun_aperture" value="2"/>', 1.0),
+        ('<float name="sunRadiusScale" value="0"/>', 0.05),
+        ('<float name="sun_aperture" value="170"/>', 30.0),
+    ],
+)
+def test_the_suns_radius_is_read(tmp_path: Path, said: str, radius_deg: float) -> None:
+    sky = f'<emitter type="sunsky"><vector name="sunDirection" x="0" y="1" z="0"/>{said}</emitter>'
+    scene = load_scene(written(tmp_path, sky + BALL))
+    assert isinstance(scene.environment, SunSky)
+    assert scene.environment.sun_radius_deg == pytest.approx(radius_deg)
+    notes = " ".join(scene.warnings)
+    assert "not read: sun" not in notes and "ground of its albedo" in notes
+    assert ("sun's radius" in notes) == (radius_deg in (0.05, 30.0))
+
+
+def test_lamps_beside_a_sky_are_in_its_unit(tmp_path: Path) -> None:
+    """Mitsuba's sky is in W/(sr m^2 nm): of equal light, both are as bright as before beside each other."""
+    lamp = '<emitter type="point"><rgb name="intensity" value="2"/></emitter>'
+    glow = '<shape type="sphere"><emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>'
+    sky = '<emitter type="sunsky"><vector name="sunDirection" x="0" y="1" z="0"/></emitter>'
+    for more, unit in (("", 1.0), (sky, 683 * 106.856 / 179)):
+        scene = load_scene(written(tmp_path, lamp + glow + more + BALL))
+        (point,) = scene.lights
+        assert isinstance(point, PointLight) and point.intensity == pytest.approx((2 * unit,) * 3)
+        assert max(o.emission for o in scene.objects) == pytest.approx((unit,) * 3)
+        assert ("in the unit of its sky" in " ".join(scene.warnings)) == bool(more)
 
 
 @pytest.mark.parametrize(("channel", "byte"), [("r", 40), ("g", 120), ("b", 200), ("a", 90)])

@@ -9,10 +9,22 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.exposure import exposure_of
+from lambent.core.geometry import triangle_areas
+from lambent.core.photometry import photometric
 from lambent.materials.document import Material
 from lambent.scenes import load_scene
+from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.scene_toml.assembly import assigned
 from lambent.scenes.loaders.scene_toml.schema import SceneDocument, known_keys
-from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, ImageEnvironment, PointLight
+from lambent.scenes.scene import (
+    ConstantEnvironment,
+    DirectionalLight,
+    IesLight,
+    ImageEnvironment,
+    PointLight,
+    SceneObject,
+)
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
 MATERIALS = """
@@ -96,11 +108,68 @@ keys = [
     assert set(scene.sources) == {path, tmp_path / "gold.json", tmp_path / "sky.hdr"}
 
 
+LAMPS = """
+[[lights]]
+kind = "point"
+position = [0.0, 1.0, 0.0]
+lumens = 1256.637
+colour = [1.0, 0.5, 0.25]
+[[lights]]
+kind = "spot"
+position = [0.0, 1.0, 0.0]
+direction = [0.0, -1.0, 0.0]
+inner_deg = 20.0
+outer_deg = 50.0
+lumens = 1000.0
+[[lights]]
+kind = "directional"
+direction = [0.0, -1.0, 0.0]
+lux = 1790.0
+[[lights]]
+kind = "ies"
+file = "lamp.ies"
+position = [0.0, 2.0, 0.0]
+direction = [1.0, 0.0, 0.0]
+lumens = 628.3185
+[objects.lamp]
+lumens = 500.0
+[objects.sphere]
+luminance = 1790.0
+"""
+
+
+def test_lamps_in_photometric_units(tmp_path: Path) -> None:
+    even = "TILT=NONE\n1 -1 1 3 1 1 2 0 0 0 1 1 1\n0 90 180\n0\n7 7 7\n"
+    (tmp_path / "lamp.ies").write_text(even)
+    scene = load_scene(written(tmp_path, MATERIALS + LAMPS))
+    point, spot, far, luminaire = scene.lights
+    assert isinstance(point, PointLight) and isinstance(spot, PointLight) and isinstance(luminaire, IesLight)
+    assert photometric(np.array(point.intensity)) == pytest.approx(100, rel=1e-5)
+    assert point.intensity[0] == pytest.approx(4 * point.intensity[2])
+    x = np.radians(np.linspace(0, 50, 20_001))
+    falloff = np.clip((50 - np.degrees(x)) / 30, 0, 1) * np.sin(x)
+    lumens = 2 * np.pi * photometric(np.array(spot.intensity)) * (falloff[1:] + falloff[:-1]).sum() / 2 * x[1]
+    assert lumens == pytest.approx(1000, rel=1e-4)
+    assert isinstance(far, DirectionalLight) and far.irradiance == pytest.approx((10, 10, 10))
+    assert 7 * photometric(np.array(luminaire.scale)) == pytest.approx(50, rel=1e-5)
+    assert luminaire.aim == (1, 0, 0) and tmp_path / "lamp.ies" in scene.sources
+    lamp, ball = scene.object("lamp"), scene.object("sphere")
+    assert photometric(np.array(lamp.emission)) * np.pi * triangle_areas(lamp.mesh.corners).sum() == pytest.approx(500)
+    assert ball.emission == pytest.approx((10, 10, 10))
+
+
+def test_exposure_as_ev100_or_none(tmp_path: Path) -> None:
+    exposures = [
+        load_scene(written(tmp_path, text + MATERIALS)).exposure_ev for text in ("", "exposure_ev100 = 12.0\n")
+    ]
+    assert exposures == [None, pytest.approx(exposure_of(12))]
+
+
 def test_geometry_can_be_scaled(tmp_path: Path) -> None:
     head = HEAD.replace('"builtin:box"', '{ file = "builtin:box", scale = 0.01 }')
     scene = load_scene(written(tmp_path, MATERIALS, head))
     assert scene.bounds[1][1] == pytest.approx(0.0101, abs=1e-6)
-    assert "is its unit the metre?" in scene.warnings[0]
+    assert any("is its unit the metre?" in warning for warning in scene.warnings)
 
 
 def test_the_same_geometry_twice_gets_names_of_its_own(tmp_path: Path) -> None:
@@ -122,12 +191,20 @@ WRONG = {
     "[materials.white]\nkd = -1.0": r"materials.white: kd.*greater than or equal to 0",
     "[objects.sphre]\nmaterial = 'white'": r"objects.sphre: fits no object; did you mean 'sphere'\?",
     MATERIALS + "[objects.sphere]\nmaterial = 'wite'": r"unknown material; found wite; did you mean 'white'\?",
+    "[[cameras]]\nname='a'\nposition=[1e308,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.0.*1000000000",
     "[[cameras]]\nname='a'\nposition=[0.0,0.0,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.*same point",
     "[[cameras]]\nname='a'\nposition=[0.0,nan,0.0]\ntarget=[0.0,0.0,0.0]": r"cameras.0.position.1.*finite",
     MATERIALS + "[assign]\nsphere = 'metall'": r"assign.sphere: unknown material; found metall; did you mean 'metal'",
     "variant = 'oak'": r"variant: unknown variant; found oak; the geometry has none",
     "[[paths]]\nname='a'\nkeys=[]": r"paths.0.keys.*at least 2",
     "[[lights]]\nkind='laser'": r"lights.0.*laser",
+    "[[lights]]\nkind='point'\nposition=[0.0,0.0,0.0]": r"does not say its light, by one of intensity",
+    "[[lights]]\nkind='point'\nposition=[0.0,0.0,0.0]\ncandela=1\nlumens=2": r"says its light twice",
+    "[[lights]]\nkind='directional'\ndirection=[0.0,1.0,0.0]\nlux=1\ncolour=[0.0,0.0,0.0]": r"cannot be black",
+    MATERIALS + "[[lights]]\nkind='ies'\nfile='../a.ies'\nposition=[0.0,0.0,0.0]": r"lights.file.*leaves its folder",
+    MATERIALS + "[[lights]]\nkind='ies'\nfile='none.ies'\nposition=[0.0,0.0,0.0]": r"lights.file: file not found",
+    "[objects.lamp]\nemission=[1.0,1.0,1.0]\nlumens=5": r"says its light twice, by emission and lumens",
+    "exposure_ev = 1.0\nexposure_ev100 = 9.0": r"exposure twice",
     "name = ": r"not a TOML document",
     "name = '\\x00'\nx = [" + "[" * 5000: r"not a TOML document|unknown key",
 }
@@ -244,3 +321,10 @@ def test_known_keys_are_all_keys() -> None:
     assert {"turbidity", "probe_planes", "fov_y_deg", "intensity", "scale"} | set(
         SceneDocument.model_fields
     ) <= known_keys()
+
+
+def test_of_two_rules_that_fit_the_later_wins() -> None:
+    objects = [SceneObject(name, patch((0, 0, 0), (1, 0, 0), (0, 1, 0)), "plain") for name in ("chair_1", "chair_2")]
+    rules, materials = {"chair_*": "oak", "chair_2": "ash"}, dict.fromkeys(("oak", "ash"), Material())
+    found, warnings = assigned(rules, objects, materials, Path("scene.toml"))
+    assert [o.material for o in found] == ["oak", "ash"] and not warnings

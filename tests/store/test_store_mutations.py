@@ -228,6 +228,8 @@ BIG = 15 << 30
         ((*ARRAYS, "probe/floor/radiance", "meta"), {}, "centre"),
         ((*ARRAYS, "probe/floor/radiance", "meta", "centre"), [0, float("nan"), 0], "3 finite numbers"),
         ((*ARRAYS, "probe/floor/radiance", "meta", "seen_irradiance"), [1] * 8, "9 finite numbers"),
+        ((*ARRAYS, "probe/floor/radiance", "meta", "unit"), 0, "a number from 1"),
+        ((*ARRAYS, "environment/radiance", "meta", "unit"), float("nan"), "a number from 1"),
         ((*SCENE, "objects", 0, "material"), "woof", "no such material; found woof"),
         ((*SCENE, "objects", 0, "face_count"), 3, "no such faces"),
         ((*SCENE, "objects", 0, "first_face"), -1, "no such faces"),

@@ -117,7 +117,7 @@ def new_state(screen, folder, backend=None, **materials):
 
 def until(state, condition):
     """Let the state go on until it meets a condition."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + 180  # never reached but by a machine at a standstill
     while not condition():
         assert time.monotonic() < end, "not in time"
         state.tick()

@@ -17,7 +17,7 @@ class Frames:
     """Dear ImGui frames of what `draw` draws. `rects[label]` is where a control was drawn last."""
 
     def __init__(self, monkeypatch, size):
-        self.rects = {}
+        self.rects = self.new_rects()
         self._context = imgui.create_context()
         imgui.set_current_context(self._context)
         self.io = imgui.get_io()
@@ -31,6 +31,9 @@ class Frames:
     def close(self):
         implot.destroy_context()
         imgui.destroy_context(self._context)
+
+    def new_rects(self):
+        return {}
 
     def draw(self):
         raise NotImplementedError

@@ -389,7 +389,7 @@ def test_values_of_every_size(panel, top, log):
     middle = axes.y.value(0.5)
     panel.pull((45.0, middle), (45.0, axes.y.value(0.6)))
     expected = [axes.y.value(0.6) - middle]
-    assert [layer.size for layer in panel.layers()] == pytest.approx(expected, rel=0.05)
+    assert [layer.size for layer in panel.layers()] == pytest.approx(expected, rel=0.08)  # a pixel is a seventeenth
     panel.io.add_mouse_wheel_event(0, 100)
     panel.frame(3)
     panel.io.add_mouse_wheel_event(0, -100)

@@ -148,3 +148,19 @@ def test_the_panel_shows_the_difference_to_a(driver):
     driver.click("fit scale")
     assert state.scale is None
     until(state, lambda: state.scale is not None)
+
+
+def test_sliders_are_in_reach_without_scrolling(monkeypatch, screen, tmp_path):
+    """In a window of 1280 x 960 as it opens: the plot, its region, the numbers of a lobe, and exposure."""
+    state, bakes = new_state(screen, tmp_path)
+    until(state, lambda: bakes.begun)
+    for lights in LIGHTS:
+        bakes.begun[0].arrive(lights)
+        until(state, lambda lights=lights: state.loading.lights == lights)
+    state.select("tray")
+    driver = PanelDriver(monkeypatch, EditMode(state, Drawing(None)), (1280, 960))
+    driver.frame(3)
+    bottoms = {label: driver.rects[label][3] for label in ("all##preset", "mx", "my", "alpha", "undo", "exposure")}
+    driver.close()
+    state.close()
+    assert max(bottoms.values()) <= 960

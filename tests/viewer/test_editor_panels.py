@@ -161,3 +161,13 @@ def test_from_the_walk_mode(monkeypatch, scene, screen, geometry, tmp_path):
     driver.click("compare##measurement")
     assert materials.editor is not editor, "the door is there again"
     driver.close()
+
+
+def test_sliders_are_in_reach_without_scrolling(monkeypatch, state):
+    """Two lobes in a window of 1280 x 960, with their error, the fit, and the preview's exposure."""
+    state.editor.subject.add_lobe("reflection")
+    driver = PanelDriver(monkeypatch, MaterialMode(state, Drawing(None)), (1280, 960))
+    tick(driver)
+    bottoms = {label: driver.rects[label][3] for label in ("alpha", "add retro", "fit from here", "exposure##preview")}
+    driver.close()
+    assert max(bottoms.values()) <= 960

@@ -116,7 +116,7 @@ def test_lobes_come_and_go_and_restrictions_follow(editor):
     editor.subject.turn_lobe(0, "transmission")
     assert [lobe.side for lobe in editor.subject.material.lobes] == ["transmission", "transmission"]
     assert editor.subject.restrictions.fixed == {"kd"}
-    for _ in range(4):
+    for _ in range(5):
         editor.subject.edits.undo()
     assert editor.subject.material == BRASS
 
@@ -293,3 +293,38 @@ def test_work_is_cancelled_through_its_progress():
     work.wait()
     assert work.poll() and ends == []
     assert isinstance(work._error, Cancelled)
+
+
+def test_the_editor_fits_as_the_command_line_does(screen):
+    """One default: what a person gets does not depend on the door."""
+    from inspect import signature
+
+    from lambent.cli.fit import command
+    from lambent.materials.fitting.fit import fit
+
+    made = Editor(MaterialEdits({"m": Material(name="m")}), "m", screen).fit
+    for function in (fit, command):
+        assert signature(function).parameters["distribution"].default == made.distribution
+        assert signature(function).parameters["method"].default == made.method
+    assert str(signature(command).parameters["lobes"].default) == made.lobes
+
+
+def test_what_a_fit_leaves_alone_is_undone_too(editor):
+    subject, edits = editor.subject, editor.subject.edits
+    subject.add_lobe("reflection")
+    subject.restrictions.fix("mx_2", True)
+    edits.end_stroke()
+    subject.restrictions.narrow("mx", (0.1, 0.2))
+    edits.end_stroke()
+    subject.remove_lobe(1)
+    assert subject.restrictions.fixed == set() and set(subject.restrictions.ranges) == {"mx"}
+    edits.undo()
+    assert len(subject.material.lobes) == 2 and subject.restrictions.fixed == {"mx_2"}, "one step brings back both"
+    edits.undo()
+    assert subject.restrictions.ranges == {}
+    edits.undo()
+    assert subject.restrictions.fixed == set()
+    edits.redo()
+    edits.redo()
+    assert subject.restrictions.fixed == {"mx_2"} and subject.restrictions.ranges == {"mx": (0.1, 0.2)}
+    assert not edits.previous(subject.name).lobes[2:]

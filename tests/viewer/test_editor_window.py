@@ -72,5 +72,5 @@ def test_save_and_close(session):
     assert saved.lobes[0].mx < 0.15 and "edited by hand" in saved.provenance.notes[-1]
     session.drag(session.point("mx", 0.3), session.point("mx", 0.6))
     session.wait_for(lambda state: lobe_of(state).get("mx", 0) > saved.lobes[0].mx)
-    assert session.close() == 0
+    assert session.close("discard") == 0
     assert "brass was changed and not saved" in session.log()

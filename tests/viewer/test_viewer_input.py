@@ -2,11 +2,16 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
+import numpy as np
 import pytest
 
+from lambent.core.camera import camera_axes
 from lambent.viewer import cameras
+from lambent.viewer.framing import framed
 from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.markers import projected
 from lambent.viewer.navigation import PathPlay
 
 
@@ -41,6 +46,97 @@ def test_orbit_turns_and_shifts(mouse, state, button, target_moves):
     assert state.navigation.camera.position != before.position
 
 
+def test_orbit_turns_about_what_is_selected(mouse, state):
+    state.navigation.movement = "orbit"
+    before = state.navigation.camera
+    state.selection.choose("table")
+    middle = (0.0, 1.0, 0.0)
+    state.navigation.camera = replace(before, target=(0.5, 1.2, 0.0))
+    drag(mouse, (100, 100), (180, 100))
+    after = state.navigation.camera
+    assert after.position != before.position
+    assert math.dist(after.position, middle) == pytest.approx(math.dist(before.position, middle))
+    assert place(after, middle) == pytest.approx(place(replace(before, target=(0.5, 1.2, 0.0)), middle))
+    send(mouse, "wheel", x=10, y=10, dx=0, dy=-200)
+    assert math.dist(state.navigation.camera.position, middle) < math.dist(after.position, middle)
+    state.selection.choose(None)
+    drag(mouse, (100, 100), (120, 100))
+    assert math.dist(state.navigation.camera.target, after.target) > 0.01, "the target was nearer, too"
+
+
+def place(camera, point):
+    """Where the camera sees a point: right, up and ahead."""
+    return np.array(camera_axes(camera)) @ np.subtract(point, camera.position)
+
+
+def test_a_click_on_something_large_is_what_orbit_turns_about(mouse, state):
+    """The middle of a floor may be far behind the eye."""
+    mouse.clicked(200, 290)
+    assert state.selection.name == "floor"
+    _, y, z = state.selection.pivot
+    assert y == pytest.approx(0, abs=1e-6) and 0 < z < 3
+    state.selection.choose("floor")
+    assert state.selection.pivot == pytest.approx((0, 0, 0))
+
+
+def test_one_drag_does_not_leave_the_room(mouse, state):
+    state.navigation.movement = "orbit"
+    (low, high), front = state.navigation.bounds, state.navigation.camera
+    for begin, end in (((200, 100), (900, 100)), ((200, 100), (200, 900)), ((200, 100), (-700, -400))):
+        for target in (front.target, (3.0, 1.0, 0.0), (0.0, 0.2, -3.0)):
+            state.navigation.camera = replace(front, target=target)
+            drag(mouse, begin, end)
+            eye = np.array(state.navigation.camera.position)
+            assert (eye >= low).all() and (eye <= high).all()
+            assert state.navigation.camera.target == pytest.approx(target)
+
+
+def test_orbit_stays_before_a_wall_within_the_bounds(state, geometry):
+    """A wall at x = 1 that ends short of the bounds: the eye comes nearer instead of passing through it."""
+    wall = np.array([[(1, 0, -4), (1, 2.6, -4), (1, 2.6, 4)], [(1, 0, -4), (1, 2.6, 4), (1, 0, 4)]], np.float32)
+    geometry.triangles = np.concatenate([geometry.triangles, wall])
+    mouse = WalkInput(state, geometry)
+    state.navigation.movement = "orbit"
+    state.navigation.camera = replace(state.navigation.camera, position=(0, 1.6, 3), target=(0, 1.6, 0))
+    drag(mouse, (300, 100), (0, 100))  # a right turn
+    x, _, z = state.navigation.camera.position
+    assert 0.5 < x < 1.0, "it went as far as the wall"
+    assert math.hypot(x, z) < 1.2
+    drag(mouse, (100, 100), (300, 100))
+    assert state.navigation.camera.position[0] < 1.0
+
+
+@pytest.mark.parametrize("name", ["table", "floor"])
+def test_f_frames_the_selection(mouse, state, name):
+    state.selection.choose(name)
+    send(mouse, "key_down", key="f")
+    camera, picture = state.navigation.camera, state.screen.picture
+    (low, high), record = state.navigation.bounds, state.selection.record
+    assert camera.target == pytest.approx(np.mean(record.bounds, axis=0)) and state.navigation.movement == "orbit"
+    assert (np.array(camera.position) >= low).all() and (np.array(camera.position) <= high).all()
+    if name == "table":
+        corners = np.array(list(product(*np.array(record.bounds).T)))
+        places, depths = projected(camera, corners, (picture.width, picture.height))
+        assert depths.min() > 0 and places.min() > 0 and places.max() < 1
+        assert np.ptp(places, axis=0).max() > 0.6, "it fills the picture"
+
+
+def test_f_without_a_selection_says_so(mouse, state):
+    before = state.navigation.camera
+    send(mouse, "key_down", key="f")
+    assert state.navigation.camera == before and "click an object" in state.screen.messages[-1].text
+
+
+def test_framing_looks_for_a_line_of_sight_that_is_free(state):
+    """Something stands before the object on the present side."""
+    bounds = ((-0.2, 0.0, -0.2), (0.2, 0.4, 0.2))
+    camera = replace(state.navigation.camera, position=(0, 0.5, 3), target=(0, 0.2, 0))
+    found = framed(camera, bounds, 1.5, lambda point, towards: 0.3 if towards[2] > 0.5 else 5.0)
+    assert found.position[2] < 0.5 * math.dist(found.position, found.target)
+    blocked = framed(camera, bounds, 1.5, lambda point, towards: 0.3)
+    assert 0.1 < math.dist(blocked.position, blocked.target) < 0.3
+
+
 def test_the_wheel_zooms_in_orbit_only(mouse, state):
     before = state.navigation.camera
     send(mouse, "wheel", x=10, y=10, dx=0, dy=-100)
@@ -71,6 +167,24 @@ def test_a_click_selects_and_a_click_beside_selects_nothing(mouse, state):
 def test_a_drag_selects_nothing(mouse, state):
     drag(mouse, (200, 160), (230, 160))
     assert state.selection.name is None
+
+
+def test_a_key_that_is_released_before_the_frame_takes_a_step(mouse, state):
+    before = state.navigation.camera
+    send(mouse, "key_down", key="w")
+    send(mouse, "key_up", key="w")
+    assert mouse.walking
+    mouse.walk(0.0)
+    stepped = state.navigation.camera
+    assert stepped != before and not mouse.walking
+    mouse.walk(0.2)
+    assert state.navigation.camera == stepped
+    send(mouse, "key_down", key="w")
+    mouse.walk(0.0)
+    assert state.navigation.camera == stepped, "the sleep before a first step is not walked through"
+    send(mouse, "key_up", key="w")
+    mouse.walk(0.1)
+    assert state.navigation.camera != stepped and not mouse.walking
 
 
 def test_walking(mouse, state):
@@ -109,7 +223,7 @@ def test_keys(mouse, state):
     assert state.navigation.camera == state.scene.cameras[1] and state.navigation.path is None
     send(mouse, "key_down", key="9")
     assert state.navigation.camera == state.scene.cameras[1]
-    for key in ("o", "f", "p", "h"):
+    for key in ("o", "g", "p", "h"):
         send(mouse, "key_down", key=key)
     assert (
         state.navigation.movement,
@@ -168,12 +282,12 @@ def test_the_walkers_own_pace(mouse, state):
 
 
 def test_who_stops_flying_comes_down(mouse, state):
-    send(mouse, "key_down", key="f")
+    send(mouse, "key_down", key="g")
     mouse.walk(0.0)
     state.navigation.camera = replace(state.navigation.camera, position=(2.0, 2.4, 2.0), target=(2.0, 2.4, 1.0))
     mouse.walk(0.0)
     assert state.navigation.camera.position[1] == 2.4
-    send(mouse, "key_down", key="f")
+    send(mouse, "key_down", key="g")
     mouse.walk(0.0)
     assert state.navigation.camera.position == pytest.approx((2.0, 1.6, 2.0)) and state.navigation.camera.target[
         1

@@ -43,7 +43,8 @@ def start(path, name, screen, **options):
             screen.say(f"{path.stem} goes")
 
     COLOUR = np.full((4, 4, 4), (30, 160, 90, 255), np.uint8)
-    return Mode(path.stem, screen, Input(screen, None, None), Plain(open_device()), [Panel("Toy", draw, opened=True)])
+    panel = Panel("Toy", draw, "a toy", opened=True)
+    return Mode(path.stem, screen, Input(screen, None, None), Plain(open_device()), [panel])
 '''
 
 

@@ -7,9 +7,10 @@ import pytest
 from imgui_bundle import imgui
 
 from lambent.core.false_colour import Range
-from lambent.materials.document import load_material
+from lambent.materials.document import Lobe, load_material
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.store.views import read_views
+from lambent.viewer import layout
 from lambent.viewer.look import SAMPLE_COUNTS
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.comparison import Figures
@@ -25,8 +26,15 @@ from tests.viewer.panel_driver import PanelDriver
 @pytest.fixture
 def panels(monkeypatch, state, geometry):
     driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
+    unfold(driver, "Drawing", "Camera")
     yield driver
     driver.close()
+
+
+def unfold(driver, *headers):
+    for header in headers:
+        driver.click(header, 0.3)
+    driver.frame(2)
 
 
 def walk_mode(state, geometry):
@@ -164,6 +172,7 @@ def whole(monkeypatch, scene, screen, geometry):
     state = WalkState.of(scene, "walk", screen, screen.folder)
     state.notes = ("light map: noise 3.1 %",)
     driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (1400, 2200))
+    unfold(driver, "Drawing", "Camera")
     yield driver
     driver.close()
 
@@ -295,6 +304,43 @@ def test_the_method_of_planar_reflectors_is_offered_where_there_are_some(monkeyp
     scene = scene.model_copy(update={"reflectors": (plane,)})
     state = WalkState.of(scene, "walk", screen)
     driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (1400, 2200))
+    unfold(driver, "Drawing")
     pick(driver, "planes", 1)
     driver.close()
     assert state.look.planar == "off"
+
+
+@pytest.mark.parametrize("size", [(640, 480), (800, 600), (320, 240), (1000, 700), (1680, 1050), (1100, 400)])
+def test_the_column_takes_a_third_at_most(state, geometry, size):
+    column = layout.regions(walk_mode(state, geometry), *size).column
+    assert column.width <= size[0] / 3 and (column.width >= 300 or size[0] < 1000)
+
+
+def test_the_sliders_are_in_reach_without_scrolling(monkeypatch, scene, screen, geometry):
+    """Of a material with two lobes, in a window of 1280 x 960 as it opens; exposure, too."""
+    lobes = tuple(Lobe(mx=0.1 * k, my=0.1 * k) for k in (1, 2))
+    brass = scene.materials["brass"].model_copy(update={"lobes": lobes})
+    objects = tuple(scene.objects[1].model_copy(update={"name": f"table {k}"}) for k in range(80))
+    scene = scene.model_copy(update={"materials": {**scene.materials, "brass": brass}, "objects": objects})
+    state = WalkState.of(scene, "walk", screen)
+    state.selection.choose("table 30")
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (1280, 960))
+    driver.frame(2)
+    wanted = ("##values", "mx", "my", "alpha", "undo", "save", "exposure", "transform", "show", "save picture")
+    places = {label: driver.rects[label] for label in wanted}
+    driver.close()
+    assert max(place[3] for place in places.values()) <= 960
+    assert max(place[2] for place in places.values()) <= 1280
+
+
+@pytest.mark.parametrize("size", [(640, 480), (800, 600)])
+def test_controls_of_a_narrow_column_can_be_used(monkeypatch, state, geometry, size):
+    state.selection.choose("table")
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), size)
+    driver.frame(2)
+    for label in ("undo", "redo", "reset", "save", "walk", "orbit", "fly", "meter", "save picture"):
+        x0, _, x1, _, _ = driver.rects[label]
+        assert 2 / 3 * size[0] <= x0 < x1 <= size[0], label
+    driver.drag("mx", 0.3, 0.9)
+    assert state.materials.edits.current("brass").lobes[0].mx > 0.2
+    driver.close()

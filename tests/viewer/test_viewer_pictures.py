@@ -175,7 +175,7 @@ def test_side_by_side_with_the_reference(renderer, state):
     figures = state.comparison.figures
     assert len(pictures.views) == 2 and figures.of >= 8
     assert 20 < figures.psnr_db < 80
-    assert state.comparison.divider.a_label == "rings" and "qmc" in state.comparison.divider.b_label
+    assert state.comparison.divider.a_label == "lamps" and "qmc" in state.comparison.divider.b_label
     state.navigation.camera = SIDE
     drawn(pictures, state, dt_s=0.01)
     assert state.comparison.figures is None, "figures of another place are not shown"
@@ -186,7 +186,7 @@ def test_side_by_side_with_the_reference(renderer, state):
 
 def test_an_integrator_agrees_with_itself(renderer, state):
     pictures = Pictures(renderer, state)
-    state.comparison.mode, state.comparison.integrator = "error map", "rings"
+    state.comparison.mode, state.comparison.integrator = "error map", "lamps"
     drawn(pictures, state, 4)
     assert state.comparison.figures.psnr_db == np.inf and state.comparison.figures.difference_percent == 0
     assert (pictures.images["picture A"][..., :3] == 0).all()

@@ -16,7 +16,8 @@ def at(x):
 
 def walked(seconds, waited_s=0.0, jitter=0.0):
     recording, rng = Recording(), np.random.default_rng(1)
-    recording.take(at(0.0), 0.0)
+    for time_s in np.arange(0.0, waited_s + 0.01, 0.1):
+        recording.take(at(0.0), time_s)
     for k in range(1, round(30 * seconds) + 1):
         recording.take(at(k / 30 + jitter * rng.normal()), waited_s + k / 30)
     return recording
@@ -37,6 +38,34 @@ def test_waiting_before_the_first_step_is_left_out_and_standing_still_is_kept():
     path = recording.path("w", smooth_s=0.0)
     assert path.seconds == pytest.approx(7.0, abs=0.1)
     assert camera_at(path, 5.0).position[0] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_slow_frames_are_no_standstill():
+    """A frame takes a fifth of a second while the picture refines: the walk is steady all the same."""
+    recording = Recording()
+    for k in range(8):
+        recording.take(at(0.2 * k), 0.2 * k)
+    path = recording.path("w", smooth_s=0.0)
+    for time_s in np.linspace(0, 1.4, 29):
+        assert camera_at(path, time_s).position[0] == pytest.approx(time_s, abs=1e-6)
+
+
+def test_a_single_step_is_a_walk():
+    recording = Recording()
+    for time_s in (0.0, 0.1, 5.0):
+        recording.take(at(0.0), time_s)
+    recording.take(at(0.07), 5.05)
+    path = recording.path("w")
+    assert path.seconds == pytest.approx(0.05) and path.keys[-1].position[0] == pytest.approx(0.07)
+    assert camera_at(path, path.seconds).position == path.keys[-1].position
+
+
+def test_when_the_camera_rested_is_known_to_the_frame():
+    recording = Recording()
+    for time_s, x in ((0.0, 0), (0.1, 0.1), (0.2, 0.2), (0.3, 0.2), (0.4, 0.2), (0.45, 0.25), (0.5, 0.3)):
+        recording.take(at(x), time_s)
+    path = recording.path("w", smooth_s=0.0)
+    assert camera_at(path, 0.4).position[0] == pytest.approx(0.2, abs=1e-6)
 
 
 def test_sight_and_angle_of_view_are_recorded():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lambent.materials.document import load_material
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import MESSAGE_S
 
@@ -16,7 +17,12 @@ def rougher(material, mx):
 
 def test_it_starts_at_the_first_camera_with_the_scenes_exposure(state, scene):
     assert state.navigation.camera == scene.cameras[0]
-    assert state.look.exposure_ev == 1.5
+    assert state.look.exposure_ev == 1.5 and not state.meter.expose_wanted
+
+
+def test_a_scene_without_an_exposure_is_metered_at_its_first_picture(scene, screen):
+    state = WalkState.of(scene.model_copy(update={"exposure_ev": None}), "walk", screen)
+    assert state.look.exposure_ev == 0 and state.meter.expose_wanted
 
 
 def test_a_scene_without_cameras_is_seen_whole(scene):

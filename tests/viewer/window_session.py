@@ -129,11 +129,18 @@ class WindowSession:
     def point(self, label, along=0.5):
         return point_of(self.state()["rects"][label], along)
 
-    def close(self):
-        """Close the window as its own button does; returns the exit code."""
+    def close(self, answer=None):
+        """Close the window as its own button does, and answer what is to become of changes; returns the exit code."""
         subprocess.run(
             [sys.executable, "-m", "tests.viewer.close_button", self.id], cwd=ROOT, env=self._environment, check=True
         )
+        if answer is not None:
+            self.wait_for(lambda state: f"{answer}##closing" in state["rects"])
+            self.settle()
+            self.move(*self.point(f"{answer}##closing"))
+            self.tool("mousedown", 1)
+            self.settle()
+            self.tool("mouseup", 1)
         return self.process.wait(PATIENCE_S)
 
     def kill(self):

@@ -8,6 +8,7 @@ from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import environment_inputs, key_of
 from lambent.bake.quality import QualityName
+from lambent.core.colour import in_halves
 
 KIND = "environment"
 NEEDS = ()
@@ -39,5 +40,6 @@ def bake(context: BakeContext) -> None:
 
     context.progress(0, 1, "environment")
     cube = environment_cube(environment, context.settings(KIND).texels if environment else BLACK_TEXELS)
-    context.put(KIND, RADIANCE, cube)
+    radiance, unit = in_halves(cube)
+    context.put(KIND, RADIANCE, radiance, {"unit": unit})
     context.progress(1, 1, "environment")

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from lambent.bake.context import GEOMETRY, BakeContext
+from lambent.bake.cuts import longest_piece
+from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.quality import QualityName
 from lambent.bake.surfaces.atlas import merged, object_records, unwrap
 from lambent.core.plain import triple
 from lambent.scenes.reflectors import Reflector, find_reflectors
 from lambent.scenes.scene import Scene
-from lambent.store.contract import ReflectorPart, ReflectorRecord, SceneRecord, write_scene_record
+from lambent.store.contract import SCENE, ReflectorPart, ReflectorRecord, SceneRecord, write_scene_record
 from lambent.store.plans import plan_record
 from lambent.store.textures import texture_records, write_textures
 
 KIND = "geometry"
 NEEDS = ()
-REVISION = 2
+REVISION = 3
+REFLECTORS = "reflectors"  # document: the key of everything that reflectors in the scene record depend on
 
 
 @dataclass(frozen=True)
@@ -36,26 +39,41 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    atlas = unwrap(context.scene, context.settings(KIND).texels, context.progress)
+    engine()  # before Mitsuba is imported
+    from lambent.bake.tracing.viewed import texel_sizes
+
+    texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)
+    atlas = unwrap(context.scene, texels, context.progress, texel_sizes, longest_m)
     meta = {"light_map_size": [atlas.width, atlas.height]}
     for name, array in merged(atlas).items():
         context.put(KIND, f"geometry/{name}", array, meta)
 
 
 def describe(context: BakeContext) -> None:
-    """Write the textures and the scene record: cameras may change, and geometry stay."""
+    """Write the textures and the scene record: cameras may change, and geometry stay.
+
+    Reflectors are looked for again only where what they depend on has changed.
+    """
     write_textures(context.store, context.scene.textures)
-    write_scene_record(context.store, scene_record_of(context.scene))
+    scene, store = context.scene, context.store
+    worn = [(o.name, scene.materials[o.material].model_dump(mode="json")) for o in scene.objects]
+    key = key_of(REFLECTORS, 1, *geometry_inputs(scene), worn, list(map(asdict, scene.reflector_rules)))
+    if store.documents.get(REFLECTORS) == key and SCENE in store.documents:
+        reflectors = tuple(map(ReflectorRecord.model_validate, store.documents[SCENE]["reflectors"]))
+    else:
+        with context.timed(REFLECTORS):
+            reflectors = tuple(map(_reflector_record, find_reflectors(scene)))
+    write_scene_record(store, scene_record_of(scene, reflectors))
+    store.set_document(REFLECTORS, key)
 
 
-def scene_record_of(scene: Scene) -> SceneRecord:
+def scene_record_of(scene: Scene, reflectors: tuple[ReflectorRecord, ...]) -> SceneRecord:
     """The scene but for its arrays."""
     low, high = scene.bounds
     return SceneRecord(
         name=scene.name, objects=object_records(scene), materials=dict(scene.materials), cameras=scene.cameras,
-        paths=scene.paths, reflectors=tuple(map(_reflector_record, find_reflectors(scene))),
-        exposure_ev=scene.exposure_ev, bounds=(triple(low), triple(high)), warnings=scene.warnings,
-        textures=texture_records(scene.textures),
+        paths=scene.paths, reflectors=reflectors, exposure_ev=scene.exposure_ev,
+        bounds=(triple(low), triple(high)), warnings=scene.warnings, textures=texture_records(scene.textures),
     )  # fmt: skip
 
 

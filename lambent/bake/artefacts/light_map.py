@@ -19,6 +19,7 @@ from lambent.bake.methods import LightMapMethod
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE = 4, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN = 4, 1, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -70,6 +71,8 @@ def keys(context: BakeContext) -> dict[str, str]:
     effort += [how.tile_texels, how.max_depth, context.seed]
     if _by_photons(context):
         effort.append([LightMapMethod.photons, how.photons_per_texel])
+    if _may_have_sun(context.scene):
+        effort.append(["without the sun", REVISION_OF_SUN])
     geometry = context.keys("geometry")["geometry/positions"]
     samples = key_of(KIND, REVISION, geometry, material_inputs(context.scene), light_inputs(context.scene), effort)
     filtered = key_of("irradiance", REVISION_OF_IRRADIANCE, samples)
@@ -87,8 +90,10 @@ def bake(context: BakeContext) -> None:
     stale = context.stale(KIND)
     if stale - {DOMINANT_DIRECTION, MOMENTS, *NOISE}:
         maps = _photon_maps(context) if _by_photons(context) else _sampled_maps(context)
+        sun = context.traced.sun
+        left_out = {} if sun is None else {"sun": sun.record.model_dump(mode="json")}
         for name, (irradiance, meta) in zip(IRRADIANCE, maps, strict=False):
-            note = context.provenance(integrator=context.methods["light_map"], **meta)
+            note = context.provenance(integrator=context.methods["light_map"], **left_out, **meta)
             context.put(KIND, name, irradiance, note)
     if stale & {DOMINANT_DIRECTION, MOMENTS}:
         _dominant_direction(context)
@@ -104,6 +109,12 @@ def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
 
 def _by_photons(context: BakeContext) -> bool:
     return context.methods["light_map"] == LightMapMethod.photons
+
+
+def _may_have_sun(scene: Scene) -> bool:
+    """Whether direct light of a sun is left out, if there is one: which takes the environment's picture to know."""
+    constant = scene.environment is None or isinstance(scene.environment, ConstantEnvironment)
+    return not constant or any(isinstance(light, DirectionalLight) for light in scene.lights)
 
 
 def _sides(context: BakeContext) -> int:
@@ -127,7 +138,6 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 
 def _sampled_maps(context: BakeContext) -> Maps:
-    from lambent.bake.light.cache import LightMapCache
     from lambent.bake.light.sampling import finished, gathered, path_traced
 
     def maps(stage: str, sampling: Sampling) -> Maps:
@@ -139,12 +149,12 @@ def _sampled_maps(context: BakeContext) -> Maps:
         return found
 
     how: Settings = context.settings(KIND)
-    first = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth))
+    first = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth, context.traced.sun))
     if not how.gather_samples:
         return first
     back = first[1][0] if len(first) > 1 else None
-    cache = LightMapCache(context.traced.builder(diffuse=False), first[0][0], back)
-    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache))
+    cache = context.traced.cache(first[0][0], back)
+    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache, context.traced.sun))
 
 
 def _samples(
@@ -183,7 +193,7 @@ def _photon_maps(context: BakeContext) -> Maps:
     if writer.missing:
         photon_map.shoot(
             writer, context.traced.scene, whole, context.progress, per_texel=how.photons_per_texel, noise=how.noise,
-            max_bounces=how.max_depth, seed=context.seed,
+            max_bounces=how.max_depth, seed=context.seed, unseen=context.traced.sun,
         )  # fmt: skip
     writer.finish()
     context.progress(0, 1, "denoising")
@@ -197,11 +207,11 @@ def _photon_map(context: BakeContext) -> PhotonMap:
 
 
 def _dominant_direction(context: BakeContext) -> None:
-    from lambent.bake.light.cache import LightMapCache
     from lambent.bake.light.dominant_direction import dominant_direction, moments
 
     front, back = finished_maps(context)
-    how = moments(LightMapCache(context.traced.builder(diffuse=False), front, back), context.settings(KIND).max_depth)
+    cache = context.traced.cache(front, back)
+    how = moments(cache, context.settings(KIND).max_depth, context.traced.sun)
     raw, _ = _samples(context, MOMENTS, 0, how, _bumpy_faces(context))
     context.put(KIND, DOMINANT_DIRECTION, dominant_direction(raw, front, context.traced.labels), context.provenance())
 

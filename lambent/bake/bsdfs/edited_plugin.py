@@ -60,7 +60,7 @@ def _register() -> None:
             wi *= mi.Vector3f(1, 1, up)
             bs = mi.BSDFSample3f()
             bs.wo = mi.Vector3f(*frame.to_world(wi))
-            active &= (pdf > 0) & self._is_possible(bs.wo, wi)
+            active &= (pdf > 0) & self._is_possible(si, bs.wo, wi)
             bs.pdf, bs.eta = dr.select(active, pdf, 0.0), 1.0
             bs.sampled_component, bs.sampled_type = mi.UInt32(0), mi.UInt32(self.m_components[0])
             value = self._value(wi, wo, si, active)
@@ -70,7 +70,7 @@ def _register() -> None:
             frame = self._frame(si, active)
             viewer, light = (mi.Vector3f(*frame.to_local(w)) for w in (si.wi, wo))
             up = mi.Vector3f(1, 1, dr.select(viewer.z < 0, -1.0, 1.0))
-            active &= self._is_possible(wo, light)
+            active &= self._is_possible(si, wo, light)
             value = self._value(light, viewer, si, active) * dr.abs(light.z)
             return dr.select(active, value, 0.0), dr.select(active, density(light * up, viewer * up, self.sides), 0.0)
 

@@ -19,13 +19,12 @@ from __future__ import annotations
 
 import functools
 import json
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from lambent.bake.bsdfs.textured import SurfaceTextures, textures_dict
+from lambent.bake.bsdfs.textured import SurfaceTextures, faced_side, facing_frame, textures_dict
 from lambent.bake.engine import once_per_variant
 from lambent.materials import bsdf
 from lambent.materials.document import Material, material_from
@@ -89,7 +88,7 @@ def register_material_plugin() -> type:
             density = bsdf.pdf(wi, wo, material, dr)
             bs = mi.BSDFSample3f()
             bs.wo = mi.Vector3f(frame.to_world(mi.Vector3f(*wi)))
-            active &= (density > 0) & self._is_possible(bs.wo, wi)
+            active &= (density > 0) & self._is_possible(si, bs.wo, wi)
             value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
 
             bs.pdf = dr.select(active, density, 0.0)
@@ -108,7 +107,7 @@ def register_material_plugin() -> type:
             viewer, light = frame.to_local(si.wi), frame.to_local(wo)
             value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
             density = bsdf.pdf(light, viewer, material, dr)
-            active &= self._is_possible(wo, light)
+            active &= self._is_possible(si, wo, light)
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
@@ -133,7 +132,7 @@ def register_material_plugin() -> type:
             if name == SHEET_ATTRIBUTE:
                 return mi.Color3f(si.sh_frame.n) * float("normal" in self.textures)
             turned = brushing_angle(si, active, anisotropic=True)
-            frame = self.textures.frame(turned, si, active) if self.framed else Turned(*turned)
+            frame = self.textures.frame(turned, si, active) if self.framed else facing_frame(turned, si)
             axis = (0.0, 0.0, 1.0) if name == NORMAL_ATTRIBUTE else (1.0, 0.0, 0.0)
             return mi.Color3f(si.to_world(mi.Vector3f(frame.to_world(mi.Vector3f(*axis)))))
 
@@ -147,11 +146,14 @@ def register_material_plugin() -> type:
 
         def _frame(self, si: Any, active: Any) -> Any:
             tangent = brushing_angle(si, active, self.anisotropic or self.framed)
-            return self.textures.frame(tangent, si, active) if self.framed else Turned(*tangent)
+            return self.textures.frame(tangent, si, active) if self.framed else facing_frame(tangent, si)
 
-        def _is_possible(self, wi: Any, in_frame: Any) -> Any:
-            """False for light from behind the surface that a bent normal would let in."""
-            return wi.z * in_frame[2] > 0 if "normal" in self.textures else mi.Bool(True)
+        def _is_possible(self, si: Any, wi: Any, in_frame: Any) -> Any:
+            """False for light from behind the surface that a normal map would let in."""
+            if "normal" not in self.textures:
+                return mi.Bool(True)
+            turned = faced_side(si)[0] * si.wi.z < 0
+            return turned | (wi.z * in_frame[2] > 0)
 
         def _component(self, sample1: Any, wo: Any, material: Material) -> tuple[Any, Any]:
             """Index and flags of the component that `bsdf.sample` chose."""
@@ -178,20 +180,6 @@ def brushing_angle(si: Any, active: Any, anisotropic: bool) -> tuple[Any, Any]:
     length = dr.sqrt(t.x * t.x + t.y * t.y)
     brushed &= length > 1e-6
     return dr.select(brushed, t.x / length, 1.0), dr.select(brushed, t.y / length, 0.0)
-
-
-@dataclass(frozen=True)
-class Turned:
-    """A frame turned about n by the angle of this cosine and sine; its methods are those of mi.Frame3f."""
-
-    c: Any
-    s: Any
-
-    def to_local(self, w: Any) -> tuple[Any, Any, Any]:
-        return self.c * w[0] + self.s * w[1], self.c * w[1] - self.s * w[0], w[2]
-
-    def to_world(self, w: Any) -> tuple[Any, Any, Any]:
-        return self.c * w[0] - self.s * w[1], self.c * w[1] + self.s * w[0], w[2]
 
 
 def _masked(material: Material, on: list[bool]) -> Material:

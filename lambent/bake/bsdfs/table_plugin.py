@@ -24,7 +24,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lambent.bake.bsdfs.material_plugin import Turned, brushing_angle
+from lambent.bake.bsdfs.material_plugin import brushing_angle
+from lambent.bake.bsdfs.textured import facing_frame
 from lambent.bake.engine import once_per_variant
 from lambent.bake.tracing.array_ops import array_ops
 from lambent.core.progress import Progress, silent
@@ -85,8 +86,8 @@ def register_table_plugin() -> None:
             self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            angle = brushing_angle(si, active, self.anisotropic)
-            wo = Turned(*angle).to_local(si.wi)
+            frame = facing_frame(brushing_angle(si, active, self.anisotropic), si)
+            wo = frame.to_local(si.wi)
             wi = self.lookup.sample(wo, sample1, sample2.x, sample2.y, ops)
             density = self.lookup.pdf(wi, wo, ops)
             across = wi[2] * wo[2] < 0
@@ -94,7 +95,7 @@ def register_table_plugin() -> None:
             value = mi.Color3f(self.lookup.evaluate(wi, wo, ops))
 
             bs = mi.BSDFSample3f()
-            bs.wo = mi.Vector3f(Turned(*angle).to_world(wi))
+            bs.wo = frame.to_world(mi.Vector3f(*wi))
             bs.pdf = dr.select(active, density, 0.0)
             bs.eta = 1.0
             bs.sampled_component = dr.select(across, mi.UInt32(1), mi.UInt32(0))
@@ -108,8 +109,8 @@ def register_table_plugin() -> None:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            angle = brushing_angle(si, active, self.anisotropic)
-            viewer, light = Turned(*angle).to_local(si.wi), Turned(*angle).to_local(wo)
+            frame = facing_frame(brushing_angle(si, active, self.anisotropic), si)
+            viewer, light = frame.to_local(si.wi), frame.to_local(wo)
             active &= self._enabled(ctx, viewer[2] * light[2] < 0)
             value = mi.Color3f(self.lookup.evaluate(light, viewer, ops)) * dr.abs(light[2])
             density = self.lookup.pdf(light, viewer, ops)

@@ -103,7 +103,9 @@ class SurfaceTextures:
             along = half[0] * t + half[1] * b
         if "normal" in self:
             x, y = self.at("normal", si, active)
-            n = _bent(dr.normalize(x * t + y * b + n), si.wi)
+            n = bent(dr.normalize(x * t + y * b + n), si.wi, faced_side(si)[0], GRAZING)
+        else:
+            n = bent(n, si.wi, *faced_side(si))
         along = dr.normalize(along - n * dr.dot(n, along))
         return mi.Frame3f(along, dr.cross(n, along), n)
 
@@ -124,8 +126,30 @@ def _half_angle(cos2: Any, sin2: Any) -> tuple[Any, Any]:
     return c, dr.select(sin2 < 0, -s, s)
 
 
-def _bent(n: Any, wo: Any) -> Any:
-    """The normal on the +z side, bent to a cosine of at least GRAZING to the viewer, on either side."""
-    side = dr.select(wo.z < 0, -1.0, 1.0)
+def faced_side(si: Any) -> tuple[Any, Any]:
+    """Which side of its triangle the viewer sees, 1 or -1, and the least cosine of a normal to him.
+
+    That is GRAZING as in the renderer, or that of the triangle itself where it is less: a flat mesh stays as it is.
+    """
+    towards = dr.dot(si.n, si.to_world(si.wi)) * dr.sign(dr.dot(si.n, si.sh_frame.n))
+    seen = dr.select(towards == 0, si.wi.z, towards)
+    return dr.select(seen < 0, -1.0, 1.0), dr.minimum(dr.abs(towards), GRAZING)
+
+
+def bent(n: Any, wo: Any, side: Any, least: Any) -> Any:
+    """A normal n on the +z side; on the side of the viewer wo it is bent to a cosine of at least `least` to him."""
     n = n * side
-    return dr.normalize(n + dr.maximum(GRAZING - dr.dot(n, wo), 0.0) * wo) * side
+    return dr.normalize(n + dr.maximum(least - dr.dot(n, wo), 0.0) * wo) * side
+
+
+def facing_frame(tangent: tuple[Any, Any], si: Any) -> Any:
+    """mi.Frame3f (t, b, n) within `si.sh_frame`, bent where a smooth normal turns from a viewer whom its face sees."""
+    c, s = tangent
+    t, b, up = mi.Vector3f(c, s, 0.0), mi.Vector3f(-s, c, 0.0), mi.Vector3f(0.0, 0.0, 1.0)
+    side, least = faced_side(si)
+    n = bent(up, si.wi, side, least)
+    along = dr.normalize(t - n * dr.dot(n, t))
+    turned = side * si.wi.z < least
+    return mi.Frame3f(
+        dr.select(turned, along, t), dr.select(turned, dr.cross(n, along), b), dr.select(turned, n, up)
+    )  # fmt: skip

@@ -20,6 +20,7 @@ from lambent.bake.light.seams import blend_seams
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, independent, vectors
+from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.sequences import hammersley, r2
@@ -36,6 +37,7 @@ class Sampling:
     """How texels are sampled: `samples` (at least, at most) times, until the relative noise is reached.
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must be without diffuse terms.
+    Direct light of the sun `unseen` is left out.
     """
 
     samples: tuple[int, int]
@@ -44,17 +46,20 @@ class Sampling:
     per_pass: int
     cache: path_tracer.Cache | None = None
     estimate: Estimate = path_tracer.irradiance
+    unseen: Sun | None = None
 
 
-def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
+def path_traced(samples: tuple[int, int], noise: float, max_depth: int, unseen: Sun | None = None) -> Sampling:
     """All bounces, for the whole scene."""
-    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
+    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)), unseen=unseen)
 
 
-def gathered(samples: int, noise: float, max_depth: int, cache: path_tracer.Cache) -> Sampling:
+def gathered(
+    samples: int, noise: float, max_depth: int, cache: path_tracer.Cache, unseen: Sun | None = None
+) -> Sampling:
     """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
     per_pass = max(1, min(GATHER_PASS, samples // 2))
-    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
+    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache, unseen=unseen)
 
 
 def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
@@ -130,7 +135,7 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = independent(int(rng.integers(1 << 32)), n * samples)
-    e = how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache)
+    e = how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)
     e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
     dr.eval(e)
     return block_sums(e, samples).reshape(2, count, 3)

@@ -18,6 +18,7 @@ from lambent.bake.photons.shooting import learnt_sky, shoot
 from lambent.bake.surfaces.coverage import texel_areas
 from lambent.bake.surfaces.texels import Sides, Texels
 from lambent.bake.tiles import run_tiles
+from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.progress import Progress
 from lambent.scenes.scene import Scene
@@ -40,9 +41,12 @@ class PhotonMap:
 
     def shoot(
         self, writer: Writer, scene: Scene, whole: Any, progress: Progress, *, per_texel: int, noise: float,
-        max_bounces: int, seed: int,
+        max_bounces: int, seed: int, unseen: Sun | None = None,
     ) -> None:  # fmt: skip
-        """Fill the missing batches, at most `per_texel` photons, until `noise` is reached; the rest stay black."""
+        """Fill the missing batches, at most `per_texel` photons, until `noise` is reached; the rest stay black.
+
+        Direct light of the sun `unseen` is not counted.
+        """
         photons = -(-per_texel * len(self.texels.index) // BATCHES)
         sky = learnt_sky(scene, whole, _over_area(self.texels), max_bounces)
         halves, reached = np.zeros((2, *self.chunk[1:])), False
@@ -56,7 +60,7 @@ class PhotonMap:
         def batch(region: tuple[slice, ...], of_batch: int) -> Floats:
             if reached:
                 return np.zeros(self.chunk, np.float32)
-            found = shoot(whole, self.chunk[1:4], photons, max_bounces, of_batch, sky).astype(np.float32)
+            found = shoot(whole, self.chunk[1:4], photons, max_bounces, of_batch, sky, unseen).astype(np.float32)
             add(region[0].start, found)
             return found[None]
 

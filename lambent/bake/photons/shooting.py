@@ -28,6 +28,7 @@ from lambent.bake.sky.photons import SkyPhotons, find_importance
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.rays import independent
 from lambent.bake.tracing.scene_builder import light_map_texel
+from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats
 from lambent.scenes.scene import Scene
 
@@ -40,8 +41,9 @@ STEEPEST = 20.0  # largest ratio of the cosines to shading and true normal: beyo
 
 
 def shoot(
-    scene: Any, shape: tuple[int, int, int], photons: int, max_bounces: int, seed: int, sky: SkyPhotons | None = None
-) -> Floats:
+    scene: Any, shape: tuple[int, int, int], photons: int, max_bounces: int, seed: int, sky: SkyPhotons | None = None,
+    unseen: Sun | None = None,
+) -> Floats:  # fmt: skip
     """Flux (sides, H, W, 3) float64 in W that falls on each texel, from so many photons.
 
     Parameters
@@ -54,6 +56,8 @@ def shoot(
         Photons are counted up to the surface they meet after so many.
     sky : SkyPhotons, optional
         Draws the environment's photons; without, they start on a disc as large as the scene.
+    unseen : Sun, optional
+        Whose photons count from their second surface on.
     """
     sums = dr.zeros(mi.UInt64, int(np.prod(shape)) * 3)
     rng = np.random.default_rng(seed)
@@ -62,9 +66,10 @@ def shoot(
         return np.zeros((*shape, 3))
     for first in range(0, photons, PHOTONS_AT_ONCE):
         sampler = independent(int(rng.integers(1 << 32)), min(PHOTONS_AT_ONCE, photons - first))
-        ray, power = _emitted(scene, sampler, sky)
+        ray, power, first = _emitted(scene, sampler, sky, unseen)
         count = partial(_count, sums, shape)
-        _trace(scene, sampler, ray, power * dr.opaque(mi.Float, scale), count, max_bounces, rays.has_holes(scene))
+        power *= dr.opaque(mi.Float, scale)
+        _trace(scene, sampler, ray, power, count, max_bounces, rays.has_holes(scene), first)
         dr.eval(sums)
     return np.array(sums).astype(np.float64).reshape(*shape, 3) / (scale * photons)
 
@@ -92,13 +97,13 @@ def learnt_sky(scene: Scene, whole: Any, over_area: Floats, max_bounces: int) ->
 
 def _units_per_watt(scene: Any, sky: SkyPhotons | None) -> float:
     """Integers per W, 0 where nothing is emitted."""
-    _, power = _emitted(scene, independent(0, POWER_PHOTONS), sky)
+    _, power, _ = _emitted(scene, independent(0, POWER_PHOTONS), sky, None)
     mean = float(np.array(power, np.float64).mean())
     return UNIT / mean if mean > 0 else 0.0
 
 
-def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None) -> tuple[Any, Any]:
-    """Rays of photons, and their power (mi.Color3f) in W times their number."""
+def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None, unseen: Sun | None) -> tuple[Any, Any, Any]:
+    """Rays of photons, their power (mi.Color3f) in W times their number, and the share that counts where they land."""
     u, place, direction = sampler.next_1d(), sampler.next_2d(), sampler.next_2d()
     number, weight, _ = scene.sample_emitter(u)
     emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), number)
@@ -112,7 +117,12 @@ def _emitted(scene: Any, sampler: Any, by_landing: SkyPhotons | None) -> tuple[A
             from_sky, power_of_sky, _ = by_landing.emit(sampler.next_1d(), place, direction)
         ray = mi.Ray3f(dr.select(sky, from_sky.o, ray.o), dr.select(sky, from_sky.d, ray.d))
         power = dr.select(sky, power_of_sky, power)
-    return ray, dr.select(dr.all(dr.isfinite(power)), power * weight, 0.0)
+    share = mi.Color3f(1.0)
+    if unseen is not None:
+        share = dr.select(unseen.is_light(emitter, -ray.d), mi.Color3f(0.0), share)
+        if scene.environment() is not None:
+            share = dr.select(sky, unseen.sky_share(scene.environment(), -ray.d), share)
+    return ray, dr.select(dr.all(dr.isfinite(power)), power * weight, 0.0), share
 
 
 def _nearer(scene: Any, emitter: Any, ray: Any, place: Any) -> Any:
@@ -139,7 +149,7 @@ def _from_environment(scene: Any, place: Any, direction: Any) -> tuple[Any, Any]
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, power, count, max_bounces, holes):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0):  # type: ignore[no-untyped-def]
     width = dr.width(power)
     ray = mi.Ray3f(ray)
     power = mi.Color3f(power)
@@ -152,7 +162,7 @@ def _trace(scene, sampler, ray, power, count, max_bounces, holes):  # type: igno
         true_cosine = dr.dot(si.n, -ray.d)
         active &= true_cosine * si.wi.z > 0
         tilt = dr.minimum(dr.abs(si.wi.z) / dr.maximum(dr.abs(true_cosine), 1e-6), STEEPEST)
-        count(si, power * tilt, true_cosine < 0, active)
+        count(si, power * tilt * dr.select(bounces == 0, first, 1.0), true_cosine < 0, active)
         active &= bounces < max_bounces
 
         sample, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(active), sampler.next_2d(active), active)

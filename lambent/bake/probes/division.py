@@ -19,6 +19,7 @@ import numpy as np
 from lambent.bake.artefacts.geometry import REVISION
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.timing import Timed, untimed
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, silent
@@ -37,7 +38,7 @@ DEPTH = 2  # cuts of cuts: at most four parts
 FACES = 24  # an object of fewer is left whole
 
 
-def divided(scene: Scene, store: Store, progress: Progress) -> Scene:
+def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untimed) -> Scene:
     """The scene with its objects in parts; the cuts are found again only where geometry has changed."""
     centres = sorted(scene.probe_centres.items())
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
@@ -46,7 +47,8 @@ def divided(scene: Scene, store: Store, progress: Progress) -> Scene:
     key = key_of("geometry", REVISION, "parts that pay", *geometry_inputs(scene), centres, shiny, clear, worn)
     found = store.documents.get(PARTS)
     if not isinstance(found, dict) or found.get("key") != key:
-        found = {"key": key, "cuts": cuts_of(scene, progress)}
+        with timed(PARTS):
+            found = {"key": key, "cuts": cuts_of(scene, progress)}
         store.set_document(PARTS, found)
     return split(scene, found["cuts"]) if found["cuts"] else scene
 

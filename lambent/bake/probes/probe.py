@@ -20,7 +20,7 @@ from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
 from lambent.bake.tracing.rays import array_of, block_sums, vectors
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.colour import in_halves, luminance
 from lambent.core.cubemap import face_directions, faces_at
 from lambent.core.directions import normalize
 from lambent.store.contract import FAR
@@ -34,9 +34,12 @@ MIRROR_DEPTH = 6  # glossy surfaces in a row
 
 @dataclass(frozen=True)
 class Probe:
-    """radiance (6, N, N, 3) float16, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side."""
+    """radiance (6, N, N, 3) float32, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side.
 
-    radiance: NDArray[np.float16]
+    Radiance is rounded as `in_halves` stores it.
+    """
+
+    radiance: NDArray[np.float32]
     distance: NDArray[np.float32]
     normals: NDArray[np.float32]
 
@@ -74,8 +77,8 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
     for channel in range(3):
         first[:, channel] += np.bincount(more, extra[:, channel], minlength=len(texels))
     count = (base + np.bincount(more, minlength=len(texels))) * block
-    radiance = np.minimum(first / count[:, None], HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
-    return Probe(radiance, *_geometry(scene.first, centre, n))
+    rounded, unit = in_halves((first / count[:, None]).reshape(6, n, n, 3))
+    return Probe(rounded.astype(np.float32) * np.float32(unit), *_geometry(scene.first, centre, n))
 
 
 def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -> Floats:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light.cache import LightMapCache
 from lambent.bake.probes.centre import encloses, flat_axis, places_above, probe_centre
 from lambent.bake.probes.division import HIDDEN, family
 from lambent.bake.probes.hidden import hidden_share, parallax_deg, seen_along, seen_from, spread
@@ -28,6 +27,7 @@ from lambent.bake.probes.selection import (
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
+from lambent.core.colour import in_halves
 
 LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored
 
@@ -47,7 +47,7 @@ class ProbeSet:
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
         self._scene = self._builder.scene
         self._left_out: tuple[frozenset[str], Any] | None = None
-        self._cache = None if irradiance is None else LightMapCache(self._builder, irradiance, irradiance_back)
+        self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
 
     @cached_property
     def _solids(self) -> SolidTest:
@@ -132,8 +132,9 @@ class ProbeSet:
         else:
             planes = np.asarray(given, np.float32).reshape(-1, 4)
         about = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
-        arrays: dict[str, NDArray[Any]] = {"radiance": probe.radiance, "distance": probe.distance, "planes": planes}
-        meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out}
+        radiance, unit = in_halves(probe.radiance)
+        arrays: dict[str, NDArray[Any]] = {"radiance": radiance, "distance": probe.distance, "planes": planes}
+        meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out, "unit": unit}
         meta["traced"] = self._cache is None
         if rays is not None:
             found = judged(rays, probe, centre, about, through=self._transmits(name))

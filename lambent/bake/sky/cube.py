@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.engine import engine
-from lambent.bake.sky.daylight import SUN_RADIUS_RAD, lone_emitter, radiance_from
+from lambent.bake.sky.daylight import lone_emitter, radiance_from
 from lambent.bake.tracing.scene_builder import environment_dict
 from lambent.core.arrays import Floats, Indices
-from lambent.core.colour import HALF_MAX
 from lambent.core.cubemap import directions_at, face_directions
 from lambent.core.directions import normalize
 from lambent.scenes.scene import Environment, SunSky
@@ -20,8 +19,8 @@ GRID, FINE_GRID = 4, 64  # samples per texel and axis; the fine one where the su
 TEXELS_AT_ONCE = 1 << 16
 
 
-def environment_cube(environment: Environment | None, n: int) -> NDArray[np.float16]:
-    """(6, n, n, 3) float16 mean radiance of each texel, W/(sr m^2); black without an environment."""
+def environment_cube(environment: Environment | None, n: int) -> NDArray[np.float32]:
+    """(6, n, n, 3) float32 mean radiance of each texel, W/(sr m^2); black without an environment."""
     cube = np.zeros((6 * n * n, 3))
     if environment is not None:
         engine()
@@ -31,10 +30,10 @@ def environment_cube(environment: Environment | None, n: int) -> NDArray[np.floa
             cube[texels] = _means(emitter, texels, n, GRID)
         if isinstance(environment, SunSky):
             sun = normalize(np.array(environment.sun_direction, float))
-            near = np.cos(SUN_RADIUS_RAD + 2 * np.sqrt(2) / n)  # texels that the disc may touch
+            near = np.cos(np.radians(environment.sun_radius_deg) + 2 * np.sqrt(2) / n)  # texels that the disc may touch
             sunny = np.flatnonzero(normalize(face_directions(n)).reshape(-1, 3) @ sun > near)
             cube[sunny] = _means(emitter, sunny, n, FINE_GRID)
-    return np.minimum(cube, HALF_MAX).reshape(6, n, n, 3).astype(np.float16)
+    return cube.reshape(6, n, n, 3).astype(np.float32)
 
 
 def _means(emitter: Any, texels: Indices, n: int, grid: int) -> Floats:

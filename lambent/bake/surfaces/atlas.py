@@ -1,25 +1,22 @@
-"""Second texture coordinates: every triangle of a scene gets a place of its own in one light map.
-
-xatlas parametrises and packs. Its time is quadratic in the size of a smooth chart, and it overruns its memory on a
-chart of 80,000 triangles: large meshes are cut into pieces first. A cut costs a seam, nothing else.
-"""
+"""Second texture coordinates: every triangle of a scene gets a place of its own in one light map."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xatlas
 
-from lambent.core.arrays import Floats, Indices
-from lambent.core.errors import UserError
+from lambent.bake.surfaces.charts import Chart, Piece, charts_of, pieces_of
+from lambent.bake.surfaces.packing import packed, snapped
+from lambent.core.arrays import Floats
+from lambent.core.geometry import triangle_areas
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, Scene
 from lambent.store.contract import ObjectRecord, needs_probe
 
-PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
-PADDING_TEXELS = 2  # between charts, so that a bilinear look-up stays within the texels of its own chart
+Sizes = Callable[[Scene, list[Piece], int], Floats]  # of texels on pieces, in metres, for a number of texels
 
 
 @dataclass(frozen=True)
@@ -36,69 +33,68 @@ class Atlas:
     height: int
 
 
-def unwrap(scene: Scene, resolution: int, progress: Progress = silent) -> Atlas:
-    """Parametrise all objects of a scene into one light map of about `resolution` x `resolution` texels.
+def unwrap(
+    scene: Scene,
+    resolution: int,
+    progress: Progress = silent,
+    sizes: Sizes | None = None,
+    longest_m: float = np.inf,
+) -> Atlas:
+    """Parametrise all objects of a scene into one light map.
 
-    The packing decides the exact size; texels are equally dense on all objects, times their `light_map_scale`. The
-    result is deterministic.
+    Its surface takes about `resolution` x `resolution` texels, the map some more. Texels have the `sizes` that a
+    function finds, of equal size on all objects without one, over their `light_map_scale`. The size changes from one
+    part of an object to the next, none of which is longer than `longest_m`. The result is deterministic.
     """
-    pieces = [(o, part) for o in scene.objects for part in _pieces(o.mesh)]
-    atlas = xatlas.Atlas()
-    # xatlas ignores triangles below 1.2e-7 of its units squared: a scene of centimetres is enlarged, without rounding.
-    unit = 2.0 ** max(0, np.ceil(-np.log2(np.ptp(scene.bounds, axis=0).max())))
-    for o, part in pieces:
-        vertices, faces = np.unique(o.mesh.faces[part], return_inverse=True)
-        faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.uint32)
-        try:
-            atlas.add_mesh(
-                o.mesh.positions[vertices] * np.float32(unit * o.light_map_scale), faces, o.mesh.normals[vertices]
-            )
-        except (RuntimeError, ValueError) as error:
-            raise UserError(f"object cannot be unwrapped ({error})", field=o.name) from error
     progress(0, 1, "unwrapping")
-    packing = xatlas.PackOptions()
-    packing.resolution, packing.padding, packing.bilinear = resolution, PADDING_TEXELS, True
-    atlas.generate(xatlas.ChartOptions(), packing, False)
-    assert atlas.atlas_count == 1, "an estimated texel density packs into one page"
+    pieces = pieces_of(scene.objects, longest_m)
+    sizes_m = (sizes or even)(scene, pieces, resolution**2)
+    charts = charts_of(scene.objects, pieces, sizes_m)
+    local, measures = zip(*(snapped(chart.corners) for chart in charts), strict=True)
+    places, (width, height) = packed(list(local), list(measures))
+    placed = [(corners + place) / (width, height) for corners, place in zip(local, places, strict=True)]
     uv2: dict[str, Floats] = {}
     objects = []
-    for o in scene.objects:
-        mine = [(part, atlas[i]) for i, (owner, part) in enumerate(pieces) if owner is o]
+    for owner, o in enumerate(scene.objects):
+        mine = [(chart, uv) for chart, uv in zip(charts, placed, strict=True) if chart.owner == owner]
         mesh, uv2[o.name] = _split(o.mesh, mine)
         objects.append(replace(o, mesh=mesh))
     progress(1, 1, "unwrapping")
-    return Atlas(replace(scene, objects=tuple(objects)), uv2, atlas.width, atlas.height)
+    return Atlas(replace(scene, objects=tuple(objects)), uv2, width, height)
 
 
-def _pieces(mesh: Mesh) -> list[Indices]:
-    """Face numbers in spatially compact pieces of at most PIECE_FACES faces (halved at the median, longest side)."""
-    centres = mesh.positions[mesh.faces].mean(axis=1)
-    pieces: list[Indices] = []
-    left: list[Indices] = [np.arange(len(mesh.faces))]
-    while left:
-        part = left.pop()
-        if len(part) <= PIECE_FACES:
-            pieces.append(np.sort(part))
-            continue
-        axis = np.argmax(np.ptp(centres[part], axis=0))
-        order = part[np.argsort(centres[part, axis], kind="stable")]
-        left += [order[len(order) // 2 :], order[: len(order) // 2]]
-    return pieces
+def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
+    """(N,) square metres of pieces."""
+    corners = [scene.objects[piece.owner].mesh.corners for piece in pieces]
+    return np.array([triangle_areas(c[p.faces].astype(float)).sum() for c, p in zip(corners, pieces, strict=True)])
 
 
-def _split(mesh: Mesh, parts: list[tuple[Indices, tuple[Floats, Floats, Floats]]]) -> tuple[Mesh, Floats]:
-    """The mesh with the vertices of its unwrapped pieces, faces in their old order, and the second coordinates."""
-    faces = np.empty_like(mesh.faces, dtype=np.uint32)
-    sources, coordinates, first = [], [], 0
-    for part, (vmapping, indices, uv) in parts:
-        vertices = np.unique(mesh.faces[part])
-        faces[part] = indices + first
-        sources.append(vertices[vmapping])
-        coordinates.append(uv)
-        first += len(vmapping)
-    source = np.concatenate(sources)
-    split = Mesh(mesh.positions[source], mesh.normals[source], mesh.tangents[source], mesh.uv[source], faces)
-    return split, np.concatenate(coordinates).astype(np.float32)
+def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
+    """(N,) `light_map_scale` of pieces."""
+    return np.array([scene.objects[piece.owner].light_map_scale for piece in pieces], float)
+
+
+def even(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
+    """Texels of one size on all pieces (N,), over the `light_map_scale` of their objects."""
+    areas, scales = areas_of(scene, pieces), scales_of(scene, pieces)
+    return np.asarray(np.sqrt((areas * scales**2).sum() / texels) / scales)
+
+
+def _split(mesh: Mesh, charts: list[tuple[Chart, Floats]]) -> tuple[Mesh, Floats]:
+    """The mesh with the vertices of its charts, faces in their old order, and the second coordinates."""
+    number, uv2 = np.zeros(mesh.faces.shape, np.int64), np.zeros((*mesh.faces.shape, 2), np.float32)
+    for chart, corners in charts:
+        number[chart.faces], uv2[chart.faces] = chart.vertices, corners
+    _, first, faces = np.unique(number, return_index=True, return_inverse=True)
+    source = mesh.faces.reshape(-1)[first]
+    split = Mesh(
+        mesh.positions[source],
+        mesh.normals[source],
+        mesh.tangents[source],
+        mesh.uv[source],
+        faces.reshape(-1, 3).astype(np.uint32),
+    )
+    return split, uv2.reshape(-1, 2)[first]
 
 
 def merged(atlas: Atlas) -> dict[str, Floats]:

@@ -16,6 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lambent.bake.tracing import rays
+from lambent.bake.tracing.sun import Sun
 
 ROULETTE_DEPTH = 2
 Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
@@ -26,12 +27,14 @@ class Start:
     """Where paths start: `ray`, the interaction it leaves, and the density of its direction, pdf (sr^-1).
 
     The density weights the emitters that the ray meets; `direct` counts them in full, where nothing else samples them.
+    The ray itself does not see the sun that is given as `unseen`.
     """
 
     ray: Any
     origin: Any
     pdf: Any
     direct: bool
+    unseen: Sun | None = None
 
 
 def camera_start(ray: Any) -> Start:
@@ -52,6 +55,7 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     return _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
         mi.Bool(start.direct), max_depth, cache or (lambda si, active: mi.Color3f(0.0)), rays.has_holes(scene),
+        start.unseen,
     )  # fmt: skip
 
 
@@ -64,7 +68,7 @@ def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tup
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
     result = dr.zeros(mi.Color3f, width)
     throughput = dr.ones(mi.Color3f, width)
@@ -77,7 +81,10 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes):  
         emitter = si.emitter(scene)
         pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
         weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
-        result += dr.select(active, throughput * emitter.eval(si, active) * weight, 0.0)
+        light = emitter.eval(si, active)
+        if unseen is not None:
+            light -= dr.select((depth == 0) & ~si.is_valid(), unseen.radiance(ray.d), 0.0)
+        result += dr.select(active, throughput * light * weight, 0.0)
         active &= si.is_valid() & (depth < max_depth)
         result += dr.select(active, throughput * cache(si, active), 0.0)
 
@@ -125,8 +132,9 @@ class Points:
 
 
 def irradiance(
-    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
-) -> Any:
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None,
+    unseen: Sun | None = None,
+) -> Any:  # fmt: skip
     """One sample of irradiance (mi.Color3f) at each point, W/m^2, all bounces.
 
     Parameters
@@ -135,29 +143,35 @@ def irradiance(
         In [0, 1)^2, for a cosine distributed direction and a point on an emitter; to be stratified.
     max_depth, cache
         As `radiance` takes them.
+    unseen : Sun, optional
+        Whose direct light is left out.
     """
-    (found, _), (aimed, _) = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    (found, _), (aimed, _) = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
     return found + aimed
 
 
 def moment(
-    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None
-) -> Any:
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None = None,
+    unseen: Sun | None = None,
+) -> Any:  # fmt: skip
     """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
-    both = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache)
+    both = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
     return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in both))
 
 
 def _contributions(
-    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None
-) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None,
+    unseen: Sun | None,
+) -> tuple[tuple[Any, Any], tuple[Any, Any]]:  # fmt: skip
     """Contributions to the irradiance from BSDF and emitter sampling, each with its direction."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
-    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False), max_depth, cache)
+    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False, unseen), max_depth, cache)
     ds, value = sample_emitter(scene, si, u_emitter, mi.Bool(True), rays.has_holes(scene))
+    if unseen is not None:
+        value = dr.select(dr.max(value) > 0, unseen.left_out(ds, value), 0.0)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)

@@ -17,6 +17,7 @@ from lambent.bake.bsdfs.edited_plugin import edited_dict
 from lambent.bake.bsdfs.material_plugin import TANGENT_ATTRIBUTE, material_dict, register_material_plugin
 from lambent.bake.bsdfs.table_plugin import table_dict
 from lambent.bake.sky.daylight import sky_image
+from lambent.bake.tracing.ies_emitter import ies_emitter
 from lambent.core.arrays import Floats
 from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
@@ -27,7 +28,9 @@ from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
     Environment,
+    IesLight,
     Light,
+    PointLight,
     Scene,
     SceneObject,
     SunSky,
@@ -93,7 +96,7 @@ class SceneBuilder:
                     bsdfs[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse))
                 bsdf = bsdfs[look]
             self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
-        self._lights = [mi.load_dict(light_dict(light)) for light in scene.lights]
+        self._lights = [emitter_of(light) for light in scene.lights]
         self.environment: Any = _emitter_of(scene.environment)
         if sampling is not None:
             self.environment = sampling.environment
@@ -186,7 +189,12 @@ def _rgb(value: tuple[float, float, float]) -> dict[str, Any]:
     return {"type": "rgb", "value": list(value)}
 
 
-def light_dict(light: Light) -> dict[str, Any]:
+def emitter_of(light: Light) -> Any:
+    """mi.Emitter of a light."""
+    return ies_emitter(light) if isinstance(light, IesLight) else mi.load_dict(light_dict(light))
+
+
+def light_dict(light: PointLight | DirectionalLight) -> dict[str, Any]:
     """Mitsuba's dictionary of a light."""
     if isinstance(light, DirectionalLight):
         return {"type": "directional", "direction": list(light.direction), "irradiance": _rgb(light.irradiance)}

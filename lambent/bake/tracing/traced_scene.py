@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from lambent.bake.light.cache import LightMapCache
+from lambent.bake.sky.sun import sun_of
 from lambent.bake.surfaces.atlas import Atlas
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
 from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
+from lambent.bake.tracing.sun import Sun, SunRays
 from lambent.bake.tracing.visibility import seen, viewing_places, without_hidden
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.inputs import sha256_of
@@ -78,6 +81,18 @@ class TracedScene:
         if self._whole is None:
             self._whole = builder.build()
         return self._whole
+
+    @cached_property
+    def sun(self) -> Sun | None:
+        """The sun whose direct light leaves the light map."""
+        found = sun_of(self.scene)
+        return None if found is None else Sun(found)
+
+    def cache(self, irradiance: Floats, irradiance_back: Floats | None) -> LightMapCache:
+        """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, with the sun that it lacks."""
+        builder = self.builder(diffuse=False)
+        sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
+        return LightMapCache(builder, irradiance, irradiance_back, sun)
 
     @cached_property
     def texels(self) -> Texels:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from lambent.core.colour import luminance
+from lambent.editing.interreflection.folding import Cells
 from lambent.editing.interreflection.picture import frozen_light
 from lambent.editing.interreflection.powers import powers
 from lambent.editing.interreflection.stored import Interreflections
@@ -16,8 +17,9 @@ from lambent.materials.factored.terms import Editable
 
 def light_of(light: Interreflections, materials: Mapping[str, Editable]) -> Pixels:
     """(3, P) interreflections of all points with these materials, part after part, in W/(sr m^2)."""
-    frozen = powers(light.tails, materials, "")  # no material is edited: all monomials are 1
-    parts = [frozen_light(part, materials[name], frozen).sum(axis=0) for name, part in light.parts.items()]
+    frozen = powers(light.tails, materials, "")  # no material is edited: the one monomial is 1
+    all_tails = Cells.of(frozen, np.arange(len(light.tails)))
+    parts = [frozen_light(part, materials[name], frozen, all_tails)[0] for name, part in light.parts.items()]
     return np.concatenate(parts, axis=1)
 
 

@@ -2,30 +2,35 @@
 
     B = sum over monomials q of  m_q(d_i)  sum over bands of  c_j F_jq        (Ben-Artzi 2007, eq. 6.8)
 
-One material i is edited; all others are frozen. Its own pixels are incremental pictures over its active curves, one for
-each monomial; of all other pixels, the inner sums do not change.
+Some curves of one material i are edited, active; all others are frozen. Its own terms with an active curve are
+incremental pictures over the bands of that, and so are all pixels over the bands that it has at second surfaces. Of
+whatever else there is, the inner sums do not change.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
 from lambent.editing.canvas import Canvas, Layer, viewed
-from lambent.editing.incremental import RENEWED_IN, TERMS, IncrementalPicture
-from lambent.editing.interreflection.folding import pixels, rows
-from lambent.editing.interreflection.powers import Powers, bands_of, powers
-from lambent.editing.interreflection.stored import Interreflections, PartLight, TermLight
+from lambent.editing.incremental import TERMS
+from lambent.editing.interreflection.entries import TermLight
+from lambent.editing.interreflection.folding import Cells, add_pixels, halves, rows
+from lambent.editing.interreflection.monomials import MonomialPicture, monomials, step
+from lambent.editing.interreflection.powers import Active, Powers, active_bands, active_of, band_of, bands_of, powers
+from lambent.editing.interreflection.stored import Interreflections, PartLight
 from lambent.editing.products import Pixels
-from lambent.editing.rows import Rows, wavelets_of
+from lambent.editing.rows import wavelets_of
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable, Term
 
 BEYOND_DIRECT = (2, 99)  # least and most surfaces on paths
 Shown = list[tuple[Layer, NDArray[np.float32]]]
+ONE = np.ones((1, 3))
 
 
 class FrozenPicture:
@@ -39,14 +44,14 @@ class FrozenPicture:
         The one that is edited.
     canvas : Canvas
         Makes the layers.
-    active : str, optional
-        Its curve that is edited, in terms that have two.
+    active : names of curves, optional
+        Those that are edited; in terms that have two, the first one.
     hits : (int, int)
         Least and most surfaces on the paths that are shown.
 
     Attributes
     ----------
-    edited, hits, materials
+    edited, active, hits, materials
         As they were given.
     """
 
@@ -56,164 +61,133 @@ class FrozenPicture:
         materials: Mapping[str, Editable],
         edited: str,
         canvas: Canvas,
-        active: str | None = None,
+        active: Collection[str] = (),
         hits: tuple[int, int] = BEYOND_DIRECT,
     ) -> None:
-        self.edited, self.hits, self.materials = edited, hits, materials
-        self._powers = powers(light.tails, materials, edited, hits)
-        self._others: list[list[_Sum]] = []
+        self.edited, self.active, self.hits, self.materials = edited, frozenset(active), hits, materials
+        material = materials[edited]
+        self._powers = powers(light.tails, materials, edited, hits, active_of(material, active))
+        self._idle = _idle(material, self._powers.active)
+        self._pixels = sum(len(part.pixel) for part in light.parts.values())
+        self._others: list[tuple[list[MonomialPicture], np.float32]] = []
         self._terms: list[_TermPicture] = []
         for name, part in light.parts.items():
             if name == edited and part.edited:
-                pairs = zip(materials[edited].terms, part.terms, strict=True)
-                self._terms = [
-                    _TermPicture(*pair, part, materials[edited], self._powers, active, canvas) for pair in pairs
-                ]
+                pairs = zip(material.terms, part.terms, self._powers.active, strict=True)
+                self._terms = [_TermPicture(*one, part, material, self._powers, canvas) for one in pairs]
             else:
-                sums = frozen_light(part, materials[name], self._powers)
-                self._others.append([_Sum(one, part, canvas) for one in sums])
-        self.show(materials[edited])
+                cells = Cells.of(self._powers, np.unique(np.concatenate([term.met for term in part.terms])))
+                held, unit = halves(frozen_light(part, materials[name], self._powers, cells))
+                self._others.append((monomials(held, cells, part, canvas), np.float32(unit)))
+        self.show(material)
         self.draw()
 
     def serves(self, material: Editable, active: str | None = None) -> bool:
-        """Whether the edited material can be shown so: with the same terms, and one of two curves as it was."""
-        return same_quotients(self.materials[self.edited], material) and all(
-            term.serves(material, active) for term in self._terms
-        )
+        """Whether the edited material can be shown so, and curve `active`, if it has that, be edited."""
+        begun = self.materials[self.edited]
+        if not same_quotients(begun, material) or changed(begun, material) & self._idle:
+            return False
+        wanted = active_of(material, () if active is None else {active})
+        return all(at is None or at == mine for at, mine in zip(wanted, self._powers.active, strict=True))
 
     def show(self, material: Editable) -> None:
         """Let the picture go to the material as it is edited now."""
         self._values = self._powers.values(material).astype(np.float32)
+        second = self._powers.second(material)
+        for pictures, _ in self._others:
+            for one in pictures:
+                one.want(second, ONE)
         for term, now in zip(self._terms, material.terms, strict=bool(self._terms)):
-            term.show(material, now)
+            term.show(material, now, second)
 
     def step(self, terms: int = TERMS) -> None:
-        """One frame: the largest changes of each term."""
-        for term in self._terms:
-            term.step(terms)
+        """One frame: as much as adding up `terms` terms in all pixels."""
+        step(self._all, terms * self._pixels)
 
     def draw(self) -> None:
         """The exact picture at once."""
-        for term in self._terms:
-            term.draw()
+        for one in self._all:
+            one.draw()
 
     @property
     def is_exact(self) -> bool:
-        return all(term.is_exact for term in self._terms)
+        return all(one.is_exact for one in self._all)
 
     @property
     def is_settled(self) -> bool:
         """Whether another frame would change no bit."""
-        return all(term.is_settled for term in self._terms)
+        return all(one.is_settled for one in self._all)
 
     @property
     def shown(self) -> Shown:
         """Layers with their scales, to be composed."""
-        others = [
-            (one.layer, value * one.unit)
-            for sums in self._others
-            for one, value in zip(sums, self._values, strict=True)
+        scaled = [*self._others, *((term.pictures, term.scale) for term in self._terms)]
+        return [(one.layer, self._values[one.power] * scale) for pictures, scale in scaled for one in pictures]
+
+    @property
+    def _all(self) -> list[MonomialPicture]:
+        return [one for pictures, _ in self._others for one in pictures] + [
+            one for term in self._terms for one in term.pictures
         ]
-        own = [
-            (layer, value * term.scale)
-            for term in self._terms
-            for layer, value in zip(term.layers, self._values, strict=True)
-        ]
-        return others + own
-
-
-class _Sum:
-    """A picture (3, P) that stays as it is, as a layer."""
-
-    def __init__(self, picture: Pixels, part: PartLight, canvas: Canvas) -> None:
-        held = Rows.of_wavelets(picture[None])
-        self.layer, self.unit = canvas.layer(part.pixel, part.theta_o, None), np.float32(held.unit)
-        products = IncrementalPicture(self.layer.hold(held.values))
-        products.want(np.ones((1, 3)))
-        products.draw()
 
 
 class _TermPicture:
-    """One term of the edited material: an incremental picture for each monomial, over its active curve."""
+    """One term of the edited material, over its active curve if it has one."""
 
     def __init__(
         self,
         term: Term,
         light: TermLight,
+        at: int | None,
         part: PartLight,
         material: Editable,
         power: Powers,
-        active: str | None,
         canvas: Canvas,
     ) -> None:
-        names = [factor.curve for factor in term.factors]
-        self._factors, self._counts = term.factors, light.counts
-        self._at = names.index(active) if active in names else 0
-        self._idle = {name: material.curves[name] for k, name in enumerate(names) if k != self._at}
-        idle = bands_of(term.factors, light.counts, material, but=self._at)
-        row = np.indices(light.counts)[self._at].reshape(-1) if light.counts else np.zeros(1, np.int64)
-        count = light.counts[self._at] if light.counts else 1
-        found, self._unit = rows(light, idle, power.weight, power.power, len(power.exponents), row, count)
-        self.layers = [canvas.layer(part.pixel, part.theta_o, None) for _ in found]
-        self._pictures = [IncrementalPicture(layer.hold(one)) for layer, one in zip(self.layers, found, strict=True)]
+        self._at, self._counts, cells = at, light.counts, Cells.of(power, light.met)
+        idle = bands_of(term.factors, light.counts, material, at)
+        count = light.counts[at] if at is not None else 1
+        held, self._unit = rows(light, idle, power.weight, cells, band_of(light.counts, at), count)
+        self.pictures = monomials(held, cells, part, canvas)
         self._viewer: Curve | None = None
-        self._to_renew = 0
 
-    def serves(self, material: Editable, active: str | None) -> bool:
-        names = [factor.curve for factor in self._factors]
-        if active in names and names.index(active) != self._at:
-            return False
-        return all(
-            material.curves[name] is curve or np.array_equal(material.curves[name].values, curve.values)
-            for name, curve in self._idle.items()
-        )
-
-    def show(self, material: Editable, term: Term) -> None:
+    def show(self, material: Editable, term: Term, second: Floats) -> None:
         self.scale = np.asarray(np.multiply(term.scale, self._unit), np.float32)
         viewer = material.curves[term.viewer] if term.viewer else None
         if viewer is not self._viewer:
             self._viewer = viewer
-            for layer in self.layers:
-                layer.view(viewer)
-        if self._factors:
-            factor = self._factors[self._at]
-            wanted = wavelets_of(material.curves[factor.curve].band_means(self._counts[self._at], factor.polar))
-        else:
-            wanted = np.ones((1, 3))
-        if not np.array_equal(wanted, self._pictures[0].wanted):
-            self._to_renew = RENEWED_IN
-        for picture in self._pictures:
-            picture.want(wanted)
-
-    def step(self, terms: int) -> None:
-        if not self.is_settled:
-            for picture in self._pictures:
-                picture.step(terms)
-            self._to_renew -= 1
-
-    def draw(self) -> None:
-        for picture in self._pictures:
-            picture.draw()
-        self._to_renew = 0
-
-    @property
-    def is_exact(self) -> bool:
-        return all(picture.is_exact for picture in self._pictures)
-
-    @property
-    def is_settled(self) -> bool:
-        return self.is_exact and self._to_renew <= 0
+            for one in self.pictures:
+                one.layer.view(viewer)
+        curve = wavelets_of(active_bands(term, self._counts, material, self._at))
+        for one in self.pictures:
+            one.want(second, curve)
 
 
-def frozen_light(part: PartLight, material: Editable, power: Powers) -> Pixels:
-    """(Q, 3, P) light of a material that is frozen, by monomial."""
-    total = np.zeros((len(power.exponents), 3, len(part.pixel)), np.float32)
+def changed(before: Editable, after: Editable) -> frozenset[str]:
+    """Names of the curves that are not the same in two states of a material."""
+    return frozenset(
+        name
+        for name, curve in after.curves.items()
+        if name not in before.curves
+        or (curve is not before.curves[name] and not np.array_equal(curve.values, before.curves[name].values))
+    )
+
+
+def frozen_light(part: PartLight, material: Editable, power: Powers, cells: Cells) -> Pixels:
+    """(C, 3, P) light of a material that is frozen, by cells."""
+    total = np.zeros((len(cells), 3, len(part.pixel)), np.float32)
     if not part.edited:
-        return total + pixels(part.terms[0], np.ones((1, 3)), power.weight, power.power, len(total))
+        add_pixels(total, part.terms[0], ONE, power.weight, cells, np.ones((3, 1)))
+        return total
     for term, light in zip(material.terms, part.terms, strict=True):
-        found = pixels(light, bands_of(term.factors, light.counts, material), power.weight, power.power, len(total))
         scale = np.asarray(term.scale, np.float32)[:, None]
         if term.viewer:
             scale = scale * viewed(np.ones((3, 1), np.float32), part.theta_o, material.curves[term.viewer])
-        total += found * scale
+        add_pixels(total, light, bands_of(term.factors, light.counts, material), power.weight, cells, scale)
     return total
+
+
+def _idle(material: Editable, active: Active) -> frozenset[str]:
+    """Curves whose values are in the sums."""
+    pairs = zip(material.terms, active, strict=True)
+    return frozenset(factor.curve for term, at in pairs for k, factor in enumerate(term.factors) if k != at)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.materials.factored.albedo import albedo
-from lambent.materials.factored.terms import Editable, Factor
-from lambent.store.tails import FIXED, Tails
+from lambent.materials.factored.terms import Editable, Factor, Term
+from lambent.store.tails import FIXED, SecondBands, Tails
+
+Active = tuple[int | None, ...]  # of each term of a material, the factor whose curve is edited
 
 
 @dataclass(frozen=True)
@@ -21,53 +23,84 @@ class Powers:
     ----------
     material : str
     weight : (Z, 3)
-        Factor of each tail by all other materials.
+        Factor of each tail by all that is frozen.
     power : (Z,)
         Number of each tail's monomial.
     exponents : (Q, slots)
         Of the edited material's slots, by monomial; 0 for all others.
-    band : (Q,)
-        Band of the second surface that a monomial has of the edited material, or -1.
+    row : (Z,)
+        Number, in `second`, of the coefficient that each tail has of the edited material at the second surface.
     """
 
     tails: Tails
     material: str
+    active: Active
     weight: Floats
     power: Indices
     exponents: Indices
-    band: Indices
+    row: Indices
 
     def values(self, material: Editable) -> Floats:
         """(Q, 3) monomials of the material as it is edited."""
         albedos = _albedos(self.tails, {self.material: material})
-        found = np.prod(albedos[None] ** self.exponents[:, :, None], axis=1)
-        if (self.band >= 0).any():
-            second = second_coefficients(self.tails, {self.material: material})
-            found = found * np.where((self.band >= 0)[:, None], second[self.band], 1.0)
-        return np.asarray(found)
+        return np.asarray(np.prod(albedos[None] ** self.exponents[:, :, None], axis=1))
+
+    def second(self, material: Editable) -> Floats:
+        """(R, 3) coefficients of the material as it is edited: 1, then its terms at the second surface.
+
+        A term has one for each band of its active curve; one alone where none is active.
+        """
+        found = [np.ones((1, 3))]
+        for one in self.tails.second:
+            if one.material == self.material:
+                term, at = material.terms[one.term], self.active[one.term]
+                found.append(np.asarray(term.scale) * active_bands(term, one.counts, material, at))
+        return np.concatenate(found)
+
+    def weighing(self, met: Indices) -> Indices:
+        """Of tails by their numbers, those that count."""
+        return met[self.weight[met].any(axis=1)]
 
 
-def powers(tails: Tails, materials: Mapping[str, Editable], edited: str, hits: tuple[int, int] = (2, 99)) -> Powers:
-    """Freeze all materials but one.
+def powers(
+    tails: Tails,
+    materials: Mapping[str, Editable],
+    edited: str,
+    hits: tuple[int, int] = (2, 99),
+    active: Active | None = None,
+) -> Powers:
+    """Freeze all materials but one, and of that one all curves but the active ones.
 
     Parameters
     ----------
+    edited
+        "" freezes all.
     hits
         Least and most surfaces on the paths that count.
+    active
+        By default no curve.
     """
-    own = np.array([material == edited for material, _ in tails.slots], bool)
+    own = np.array([material == edited for material, _ in tails.slots], bool) & bool(edited)
     frozen = {name: material for name, material in materials.items() if name != edited}
+    active = active or (None,) * (len(materials[edited].terms) if edited else 0)
     weight = tails.weights(_albedos(tails, frozen))
-    band = np.full(len(tails), -1)
+    row = np.zeros(len(tails), np.int64)
     if tails.second:
-        owner = np.repeat([one.material == edited for one in tails.second], [one.size for one in tails.second])
-        mine = owner[tails.band_of_second]
-        weight = weight * np.where(mine[:, None], 1.0, second_coefficients(tails, frozen)[tails.band_of_second])
-        band = np.where(mine, tails.band_of_second, -1)
+        coefficient, rows, begin = [], [], 1
+        for one in tails.second:
+            if one.material != edited or not edited:
+                coefficient.append(_coefficients(one, frozen))
+                rows.append(np.zeros(one.size, np.int64))
+                continue
+            term, at = materials[edited].terms[one.term], active[one.term]
+            coefficient.append(bands_of(term.factors, one.counts, materials[edited], at))
+            rows.append(begin + band_of(one.counts, at))
+            begin += one.counts[at] if at is not None else 1
+        weight = weight * np.concatenate(coefficient)[tails.band_of_second]
+        row = np.concatenate(rows)[tails.band_of_second]
     weight = np.where(((tails.hits >= hits[0]) & (tails.hits <= hits[1]))[:, None], weight, 0.0)
-    exponents = np.where(own, tails.exponents, 0)
-    found, power = np.unique(np.column_stack([exponents, band]), axis=0, return_inverse=True)
-    return Powers(tails, edited, weight, power.reshape(-1), found[:, :-1], found[:, -1])
+    exponents, power = np.unique(np.where(own, tails.exponents, 0), axis=0, return_inverse=True)
+    return Powers(tails, edited, active, weight, power.reshape(-1), exponents, row)
 
 
 def _albedos(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
@@ -81,15 +114,33 @@ def _albedos(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
 
 def second_coefficients(tails: Tails, materials: Mapping[str, Editable]) -> Floats:
     """(W, 3) coefficients of the bands of second surfaces; 1 for materials that are not named."""
-    parts = []
-    for one in tails.second:
-        if one.material not in materials:
-            parts.append(np.ones((one.size, 3)))
-            continue
-        material = materials[one.material]
-        term = material.terms[one.term]
-        parts.append(np.asarray(term.scale) * bands_of(term.factors, one.counts, material))
-    return np.concatenate(parts) if parts else np.ones((1, 3))
+    return np.concatenate([_coefficients(one, materials) for one in tails.second] or [np.ones((1, 3))])
+
+
+def _coefficients(one: SecondBands, materials: Mapping[str, Editable]) -> Floats:
+    if one.material not in materials:
+        return np.ones((one.size, 3))
+    material = materials[one.material]
+    term = material.terms[one.term]
+    return np.asarray(term.scale) * bands_of(term.factors, one.counts, material)
+
+
+def active_of(material: Editable, curves: Collection[str]) -> Active:
+    """The first factor of each term that has one of these curves."""
+    return tuple(next((k for k, f in enumerate(t.factors) if f.curve in curves), None) for t in material.terms)
+
+
+def active_bands(term: Term, counts: tuple[int, ...], material: Editable, at: int | None) -> Floats:
+    """(J, 3) coefficients of a term's factor `at`, or a single 1."""
+    if at is None:
+        return np.ones((1, 3))
+    factor = term.factors[at]
+    return material.curves[factor.curve].band_means(counts[at], factor.polar)
+
+
+def band_of(counts: tuple[int, ...], at: int | None) -> Indices:
+    """Of each product of bands, the band of the factor `at`; 0 for none."""
+    return np.asarray(np.indices(counts)[at].reshape(-1) if at is not None else np.zeros(int(np.prod(counts)), int))
 
 
 def bands_of(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import count, takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,41 +12,13 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Indices
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
+from lambent.editing.interreflection.entries import Entries, TermLight
 from lambent.editing.session import Session
 from lambent.materials.factored.terms import Editable
 from lambent.store.contract import view_artefact_name
 from lambent.store.source import environment_note
 from lambent.store.store import Store
 from lambent.store.tails import Tails
-
-
-@dataclass(frozen=True)
-class TermLight:
-    """Light of one term of a material by bands and tails; of a material that is not edited, all its light.
-
-    Attributes
-    ----------
-    ends : (P + 1,) int64
-        Entries of point p are ends[p] to ends[p + 1].
-    codes : (N,) uint32
-        Tail times the number of bands, plus band.
-    values : (N,) uint32
-        RGB9E5 (`core.shared_exponent`), times `units` of the point.
-    units : (P,) float32
-        W/(sr m^2).
-    counts : tuple of int
-        Bands of each of the term's curves; empty where it has none.
-    """
-
-    ends: NDArray[np.int64]
-    codes: NDArray[np.uint32]
-    values: NDArray[np.uint32]
-    units: NDArray[np.float32]
-    counts: tuple[int, ...]
-
-    @property
-    def bands(self) -> int:
-        return int(np.prod(self.counts, dtype=int))
 
 
 @dataclass(frozen=True)
@@ -135,27 +108,23 @@ def interreflections(
 
 def _term(store: Store, name: str, points: int, factors: int) -> tuple[TermLight, int]:
     """The tiles of a term of so many curves one after another, and the samples of the one that has the fewest."""
-    counts, codes, values = np.zeros(points, np.int64), [], []
-    units, done = np.ones(points, np.float32), 0
-    curves = (1,) * factors  # as long as no tile is there
-    samples: list[int] = []
-    while done < points:
-        tile = f"{name}/{len(samples)}"
-        if tile not in store:
-            samples.append(0)
-            break
-        meta, array = store.artefact(tile).meta, store.read(tile)
-        many = int(meta["points"])
-        rest = array[many:]
-        counts[done : done + many], units[done : done + many] = array[:many], meta["unit"]
-        codes.append(rest[: len(rest) // 2])
-        values.append(rest[len(rest) // 2 :])
-        samples.append(int(meta["samples"]))
-        curves, done = tuple(count for _, count in meta["curves"]), done + many
-    ends = np.concatenate([[0], np.cumsum(counts)])
-    empty = [np.zeros(0, np.uint32)]
-    light = TermLight(ends, np.concatenate(codes or empty), np.concatenate(values or empty), units, curves)
-    return light, min(samples, default=0)
+    names = list(takewhile(lambda tile: tile in store, (f"{name}/{k}" for k in count())))
+    said = [store.artefact(tile).meta for tile in names]
+    many = [int(one["points"]) for one in said]
+    samples, units = [int(one["samples"]) for one in said], np.repeat([one["unit"] for one in said], many)
+    missing = points - sum(many)
+    curves = tuple(bands for _, bands in said[0]["curves"]) if said else (1,) * factors
+
+    def tiles() -> Iterator[Entries]:
+        for tile, here in zip(names, many, strict=True):
+            array = store.read(tile)
+            codes, values = np.split(array[here:], 2)
+            yield array[:here], codes, values
+        if missing:
+            yield np.zeros(missing, np.uint32), np.zeros(0, np.uint32), np.zeros(0, np.uint32)
+
+    units = np.concatenate([units, np.ones(missing)]).astype(np.float32)
+    return TermLight.of_tiles(tiles(), units, curves), min(samples if not missing else [0])
 
 
 def _check(store: Store, tile: str, material: str, fixed: str) -> None:

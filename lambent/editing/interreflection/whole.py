@@ -12,7 +12,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from lambent.core.arrays import Image
 from lambent.editing.canvas import Canvas, HostCanvas
 from lambent.editing.incremental import TERMS
-from lambent.editing.interreflection.picture import BEYOND_DIRECT, FrozenPicture, Shown
+from lambent.editing.interreflection.picture import BEYOND_DIRECT, FrozenPicture, Shown, changed
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of
 from lambent.editing.picture import EditedPicture
 from lambent.editing.session import Session
@@ -71,7 +71,7 @@ class WholePicture:
         self._light: Interreflections | None = None
         self._now: dict[str, Editable] = {}
         self._frozen: FrozenPicture | None = None
-        self._wanted: tuple[str, str | None] | None = None  # material and curve to be edited next
+        self._wanted: tuple[str, frozenset[str]] | None = None  # material and curves to be edited next
         self._work: Future[FrozenPicture] | None = None
         self._pool = ThreadPoolExecutor(1)
 
@@ -84,24 +84,24 @@ class WholePicture:
         """Add interreflections, or replace them by better ones; `materials` are all of the view as they are shown."""
         self._light, self._now = light, dict(materials)
         edited = self._frozen.edited if self._frozen is not None else next(iter(light.parts))
-        self._wanted = self._wanted or (edited, None)
+        self._wanted = self._wanted or (edited, self._active)
 
     def see(self, hits: tuple[int, int]) -> None:
         """Show paths that meet so many surfaces, least and most."""
         if hits != self.hits:
             self.hits = hits
             if self._frozen is not None:
-                self._wanted = self._wanted or (self._frozen.edited, None)
+                self._wanted = self._wanted or (self._frozen.edited, self._active)
 
     def show(self, material: str, edited: Editable) -> None:
         """As `EditedPicture.show`, which may refuse."""
         self.direct.show(material, edited)
+        before, frozen = self._now.get(material, edited), self._frozen
         self._now[material] = edited
-        frozen = self._frozen
         if frozen is not None and frozen.edited == material and frozen.serves(edited):
             frozen.show(edited)
-        elif self._light is not None:
-            self._wanted = material, None
+        elif self._light is not None and self._work is None:  # else it is wanted as soon as that is taken
+            self._wanted = material, changed(before, edited)
 
     def activate(self, material: str, curve: str) -> None:
         """As `EditedPicture.activate`."""
@@ -110,7 +110,7 @@ class WholePicture:
         if self._light is None or material not in self._now:
             return
         if frozen is None or frozen.edited != material or not frozen.serves(self._now[material], curve):
-            self._wanted = material, curve
+            self._wanted = material, frozenset({curve})
 
     def step(self, terms: int = TERMS) -> bool:
         """One frame; whether interreflections were replaced in it."""
@@ -173,18 +173,23 @@ class WholePicture:
         self._pool.shutdown(cancel_futures=True)
 
     @property
+    def _active(self) -> frozenset[str]:
+        """Curves that are edited now."""
+        return self._frozen.active if self._frozen is not None else frozenset()
+
+    @property
     def _is_current(self) -> bool:
         return self._work is None and self._wanted is None
 
     def _freezing(self) -> _Freezing | None:
         """The work that is wanted; None where the interreflections are of other terms than a material has now."""
         assert self._wanted is not None
-        (material, curve), light = self._wanted, self._light
+        (material, active), light = self._wanted, self._light
         self._wanted = None
         if light is None or any(not same_quotients(part.start, self._now[name]) for name, part in light.parts.items()):
             self._frozen = None
             return None
-        return _Freezing(light, dict(self._now), material, curve, self.hits, self.direct)
+        return _Freezing(light, dict(self._now), material, active, self.hits, self.direct)
 
     def _take(self, frozen: FrozenPicture) -> None:
         """Go over to a polynomial; what was edited since is shown, or made anew."""
@@ -196,9 +201,9 @@ class WholePicture:
             if name == frozen.edited and frozen.serves(now):
                 frozen.show(now)
             else:
-                self._wanted = self._wanted or (name, None)
+                self._wanted = self._wanted or (name, changed(made, now))
         if frozen.hits != _beyond_direct(self.hits):
-            self._wanted = self._wanted or (frozen.edited, None)
+            self._wanted = self._wanted or (frozen.edited, self._active)
 
 
 class _Freezing:
@@ -209,7 +214,7 @@ class _Freezing:
         light: Interreflections,
         materials: dict[str, Editable],
         edited: str,
-        active: str | None,
+        active: frozenset[str],
         hits: tuple[int, int],
         direct: EditedPicture,
     ) -> None:

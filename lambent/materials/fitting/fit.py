@@ -19,6 +19,7 @@ from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
 from lambent.materials.fitting import account, albedos, gradient, grid, parameters
 from lambent.materials.fitting.albedos import Comparison, Curve
+from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 from lambent.materials.fitting.diffuse import diffuse_mode
 from lambent.materials.fitting.grid import Schedule
 from lambent.materials.fitting.least_squares import Bounds
@@ -98,7 +99,7 @@ def fit(
     lobes: int | Literal["auto"] = 1,
     method: Method = "gradient",
     metric: str = "cuberoot",
-    distribution: Literal["beckmann", "ggx", "best"] = "beckmann",
+    distribution: DistributionChoice = DISTRIBUTION,
     coupled: bool = False,
     fix: Fixed | None = None,
     ranges: Ranges | None = None,

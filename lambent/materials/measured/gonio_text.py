@@ -34,12 +34,14 @@ _HEADER_BYTES = 1 << 16
 
 
 def recognise(head: bytes, size: int) -> bool:
-    """Whether the first line that is no comment names the four angles, and no quantity by another name (BRDF)."""
+    """Whether the first line that is no comment names the four angles, and no quantity by another name (BRDF, f_x)."""
     names = _names(head)
     if names is None or tuple(names[:4]) != ANGLES:
         return False
     values = names[4:]
-    return values in _VALUE_COLUMNS or len(values) not in (1, 3) or quantity_of(values[0]) is None
+    if values in _VALUE_COLUMNS or len(values) not in (1, 3):
+        return True
+    return quantity_of(re.sub(r"_[rgbxyz]$", "", values[0].lower()) if len(values) == 3 else values[0]) is None
 
 
 def _names(head: bytes) -> list[str] | None:

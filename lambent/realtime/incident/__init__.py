@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 from typing import Any, Protocol, cast
 
+from lambent.core.arrays import Floats
 from lambent.core.discovery import known, modules_in
 from lambent.realtime.baked import Probe
 
@@ -37,6 +38,9 @@ class LookUp(Protocol):
 
     def serves(self, probe: Probe) -> bool:
         """Whether the probe has what the look-up needs."""
+
+    def distances(self, probe: Probe, w: Floats) -> Floats:
+        """(M,) metres from the probe's centre to what is known along unit directions w (M, 3); inf for nothing."""
 
     def constants(self, probe: Probe) -> dict[str, int]:
         """Values of the shader's `override` constants."""

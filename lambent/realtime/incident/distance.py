@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from lambent.core.arrays import Floats
 from lambent.core.colour import HALF_MAX
+from lambent.core.cubemap import sample
 from lambent.core.probe_lookups import inverse_depth
 from lambent.realtime.baked import Probe
 from lambent.realtime.uploads import cube_texture
@@ -17,6 +19,12 @@ BINDINGS = ("cube",)
 
 def serves(probe: Probe) -> bool:
     return probe.distance is not None
+
+
+def distances(probe: Probe, w: Floats) -> Floats:
+    assert probe.distance is not None, "this look-up does not serve the probe"
+    found = sample(probe.distance[..., None], w)[:, 0]
+    return np.where(np.isfinite(found) & (found < HALF_MAX), found, np.inf)
 
 
 def constants(probe: Probe) -> dict[str, int]:

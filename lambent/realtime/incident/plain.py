@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from lambent.core.arrays import Floats
 from lambent.realtime.baked import Probe
 
 NAME, COST, PREFERENCE, AIMS = "plain", 0, 0, True
@@ -12,6 +15,10 @@ BINDINGS: tuple[str, ...] = ()
 
 def serves(probe: Probe) -> bool:
     return True
+
+
+def distances(probe: Probe, w: Floats) -> Floats:
+    return np.full(len(w), np.inf)
 
 
 def constants(probe: Probe) -> dict[str, int]:

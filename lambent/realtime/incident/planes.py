@@ -8,6 +8,8 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from lambent.core.arrays import Floats
+from lambent.core.probe_lookups import distances_to_planes
 from lambent.realtime.baked import Probe
 
 NAME, COST, PREFERENCE, AIMS = "planes", 1, 2, True
@@ -17,6 +19,11 @@ STEP = 6  # plane counts are padded to multiples of this: each count is a pipeli
 
 def serves(probe: Probe) -> bool:
     return len(probe.planes) > 0
+
+
+def distances(probe: Probe, w: Floats) -> Floats:
+    planes = about_centre(probe).astype(np.float64)
+    return distances_to_planes(w, planes)
 
 
 def constants(probe: Probe) -> dict[str, int]:

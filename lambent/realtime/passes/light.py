@@ -14,6 +14,7 @@ from lambent.realtime.incident import shader_of
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import draw_seen, set_geometry
 from lambent.realtime.pipelines import pipeline, screen_pipeline
+from lambent.realtime.probe_light import kind_of
 from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
 
@@ -82,7 +83,7 @@ class Shading:
                 code = assemble(*shaders[0], given={"look_up.wgsl": shader_of(draw.look_up)})
                 self._modules[shaders] = layouts.device.create_shader_module(code=code)
             light = self._reflections if self._is_reflecting(draw) else self._light
-            groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS), light]
+            groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS, kind_of(draw.cube)), light]
             self._pipelines[key] = pipeline(
                 layouts.device, self._modules[shaders], stage.entry, groups, formats, constants=constants,
                 compare="greater" if stage.blended else "equal", blend=_OVER if stage.blended else None,
@@ -102,16 +103,23 @@ class LightPass:
 
     def encode(self, context: FrameContext) -> Steps:
         """Draw the bands of the target, which becomes the frame's radiance."""
-        resources, format = context.resources, context.target.radiance.format
-        light = resources.noise_group if context.state.show == LIGHT_MAP_NOISE else resources.light_group
+        resources, format, layouts = context.resources, context.target.radiance.format, self._layouts
+        shows_noise = context.state.show == LIGHT_MAP_NOISE
+        light = resources.noise_group if shows_noise else layouts.group(layouts.light, *context.light)
         masked = resources.masked if context.blends_masks else set()
         fringes = [draw for draw in context.draws if draw.item.record.name in masked]
+        draws, is_whole = context.draws, context.redrawn is None
+        if context.redrawn is not None:
+            draws = [draw for draw in draws if draw.item.record.material in context.redrawn]
         for band in context.slicing.bands("shade", context.state.size):
-            render = context.begin("shade", [context.target.radiance.create_view()], band.load_op, band=band)
+            render = context.begin(
+                "shade", [context.target.radiance.create_view()], band.load_op if is_whole else "load", band=band
+            )
             seen = context.seen(band.shares)
-            self._shade.draw(render, context, context.draws, seen, (format,), light)
-            self._draw_sky(render, context, format)
-            self._fringe.draw(render, context, fringes, seen, (format,), light)
+            self._shade.draw(render, context, draws, seen, (format,), light)
+            if is_whole:  # sky and fringes are there already, and fringes cannot be laid over themselves
+                self._draw_sky(render, context, format)
+                self._fringe.draw(render, context, fringes, seen, (format,), light)
             render.end()
             yield
         context.radiance = context.target.radiance

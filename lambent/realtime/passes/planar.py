@@ -7,7 +7,7 @@ from typing import Any
 
 from lambent.realtime.context import FrameContext
 from lambent.realtime.integrators import Integrator
-from lambent.realtime.layouts import Layouts
+from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.planar_buffer import PlanarBufferPass, PlanarCells
@@ -32,7 +32,7 @@ class PlanarPass:
         # same number, are not read here.
         self._hits = layouts.of("uniform", "flat", "exact", "exact")
         self._shading = Shading(layouts, STAGE, self._hits)
-        self.reflections = layouts.of("layers", "exact layers")
+        self.reflections = layouts.of(*LIGHT, "exact layers")
         found = layouts.of("exact layers")
         self._clean = screen_pipeline(layouts.device, "planar_clean", [found], [FORMAT] * CLEANED)
         self._texture = lru_cache(1)(lambda size: target_texture(layouts.device, size, FORMAT))
@@ -50,7 +50,7 @@ class PlanarPass:
             yield from self._buffers.encode(mirrored, index, view)
             yield from self._encode_hits(context, index, view, how, layers[:FOUND])
         self._encode_clean(context, how, texture, layers[FOUND:])
-        views = context.resources.light_view, texture.create_view(dimension="2d-array")
+        views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
         yield
 

@@ -15,6 +15,7 @@ from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
+from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.pipelines import screen_pipeline
 from lambent.realtime.planar_view import PlanarView, levels_of
 from lambent.realtime.slices import Steps
@@ -114,6 +115,7 @@ class PlanarBufferPass:
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         device = layouts.device
         self._layouts, self._depth = layouts, depth
+        self._sun = SunPass(layouts, "cw")
         self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
         self.buffer = lru_cache(1)(lambda size: PlanarBuffer.of(device, size))
         self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
@@ -125,8 +127,10 @@ class PlanarBufferPass:
     def mirrored(self, context: FrameContext) -> Iterator[FrameContext]:
         """The mirrored frames of a frame, one after the other; `uniform` has the record of each."""
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
-        rings, diffuse = INTEGRATORS["rings"], INTEGRATORS["diffuse"]
-        draws = [d.by(rings if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
+        wanted = INTEGRATORS[context.state.integrator]
+        few = INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"]  # published ones, as they were
+        diffuse = INTEGRATORS["diffuse"]
+        draws = [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
         for index, view in enumerate(context.views):
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
@@ -141,10 +145,12 @@ class PlanarBufferPass:
         context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
         render.end()
         yield
+        yield from self._sun.encode(context)
+        light = self._layouts.group(self._layouts.light, *context.light)
         for band in context.slicing.bands("mirror", view.size):
             render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
             seen = context.seen(band.shares)
-            self._shading.draw(render, context, context.draws, seen, FORMATS, resources.light_group)
+            self._shading.draw(render, context, context.draws, seen, FORMATS, light)
             render.set_pipeline(self._sky)
             render.set_bind_group(1, resources.sky_group)
             render.draw(3)

@@ -75,14 +75,19 @@ fn specular_occlusion(n: vec3f, e: vec3f) -> f32 {
     return select(1.0, clamp(luminance(e) / max(whole, 1e-6), 0.0, 1.0), whole > 0.0);
 }
 
-// Light from local direction w, averaged over the solid angle omega sr; half_log2_omega = log2(omega)/2.
+// Level at which a texel has the solid angle omega, seen from the surface; half_log2_omega = log2(omega)/2.
 // On the cube that is omega t^2/d^2 (seen from the probe, d away) / cos b^3 texels (4.16, 4.17), cos b = max|w|/|w|.
-fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
-    let found = incident_look_up(s.x, to_world(s, w));
+fn level_of_look_up(found: LookUp, half_log2_omega: f32) -> f32 {
     let major = max_norm(found.direction);
     let stretch = found.t * found.t * length(found.direction) / (major * major * major);
-    let level = half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w;
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, max(level, 0.0)).rgb;
+    return max(half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w, 0.0);
+}
+
+// Light from local direction w, averaged over the solid angle omega sr.
+fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
+    let found = incident_look_up(s.x, to_world(s, w));
+    let level = level_of_look_up(found, half_log2_omega);
+    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {

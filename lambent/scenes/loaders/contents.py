@@ -13,7 +13,6 @@ from lambent.materials.document import Material
 from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky, bounds_of
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
-EXPOSURE_EV = 2.0  # sunlit white is about .25 W/(sr m^2) in the sky model's units
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Contents:
     variants: Mapping[str, Mapping[str, tuple[str, Triple]]] = field(default_factory=dict)
 
     def scene(self, name: str) -> Scene:
-        """A scene of this file alone, with daylight, exposure and a camera if it lacks them."""
+        """A scene of this file alone, with daylight and a camera if it lacks them."""
         shines = bool(self.environment or self.lights or any(any(o.emission) for o in self.objects))
         own_light = self.environment is not None or (self.tells_its_light and shines)
         notes = ("nothing in it emits light: it gets daylight",) if self.tells_its_light and not own_light else ()
@@ -48,7 +47,6 @@ class Contents:
             environment=self.environment if own_light else DAYLIGHT,
             lights=self.lights,
             cameras=self.cameras or (overview(*bounds_of(self.objects)),),
-            exposure_ev=0.0 if own_light else EXPOSURE_EV,
             sources=self.sources,
             warnings=(*self.warnings, *notes),
             textures=self.textures,

@@ -8,7 +8,7 @@ recognise(head), which tells a scene by its first bytes.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from importlib.resources import files
@@ -21,6 +21,7 @@ from lambent.core.inputs import foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.meshes.creases import leaning_warnings, with_creases
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject
@@ -28,9 +29,10 @@ from lambent.scenes.validation import size_warnings
 
 BUILTIN_PREFIX = "builtin:"
 TOML = ".toml"
+TOLD = 2  # objects that are named one by one in warnings of one kind
 
 
-def load_scene(path_or_builtin: str | Path) -> Scene:
+def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> Scene:
     """The scene of a file, or a built-in one.
 
     Parameters
@@ -38,6 +40,8 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     path_or_builtin : str or Path
         "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply or Mitsuba's .xml; light
         and a camera, where such a file has none, are added.
+    crease_deg : float, optional
+        Normals that lean far from their faces become smooth only where faces meet at less than this angle, 0 to 180.
 
     Raises
     ------
@@ -46,7 +50,25 @@ def load_scene(path_or_builtin: str | Path) -> Scene:
     """
     scene, text = _load(path_or_builtin), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    return replace(scene, warnings=(*scene.warnings, *size_warnings(scene)), origin=origin)
+    angle = scene.crease_deg if crease_deg is None else crease_deg
+    if angle is not None:
+        scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
+    notes = leaning_warnings(scene.objects) if angle is None else []
+    return replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
+
+
+def counted(warnings: Sequence[str]) -> list[str]:
+    """Warnings, those that more than TOLD objects share as one with their number, where the first of them was."""
+    shared: dict[str, list[str]] = {}
+    for warning in warnings:
+        name, _, what = warning.partition(": ")
+        shared.setdefault(what, []).append(name)
+    told = dict.fromkeys(
+        warning if not (what := warning.partition(": ")[2]) or len(shared[what]) <= TOLD
+        else f"{len(shared[what])} objects: {what} ({', '.join(shared[what][:TOLD])}, ...)"
+        for warning in warnings
+    )  # fmt: skip
+    return list(told)
 
 
 def _load(path_or_builtin: str | Path) -> Scene:

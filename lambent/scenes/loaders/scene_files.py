@@ -15,12 +15,13 @@ HINT = "put the file into the scene's folder or below"
 class SceneFiles:
     """The files of one scene, below the folder `root`, which is that of its first file if not given.
 
-    `sources` are the files used so far, in order.
+    `sources` are the files used so far, in order; `notes` say which of them are spelt otherwise than the scene has it.
     """
 
     def __init__(self, first: Path, root: Path | None = None) -> None:
         self.root = first.resolve().parent if root is None else root
         self.sources = [first]
+        self.notes: list[str] = []
 
     def use(self, path: Path) -> Path:
         """`path`, noted as a source."""
@@ -35,6 +36,8 @@ class SceneFiles:
     def path(self, name: str, file: Path, field: str) -> Path:
         """The path of `name` as written in `file`, which may be Windows's; it need not exist.
 
+        Where it does not, and a file is there whose path differs in upper and lower case alone, it is that file's.
+
         Raises
         ------
         UserError
@@ -45,9 +48,16 @@ class SceneFiles:
         if PureWindowsPath(name).drive:
             raise UserError("path leaves its folder", file=file, field=field, got=name, hint=HINT)
         try:
-            return inside(self.root, str(file.resolve().parent / name.replace("\\", "/")))
+            path = inside(self.root, str(file.resolve().parent / name.replace("\\", "/")))
         except UserError as error:
             raise UserError(error.message, file=file, field=field, got=name, hint=HINT) from error
+        spelt = path if _is_file(path) else _in_other_case(path, self.root)
+        if spelt is None or spelt == path:
+            return path
+        note = f"{name} is {spelt.relative_to(self.root).as_posix()} on this disk"
+        if note not in self.notes:
+            self.notes.append(note)
+        return spelt
 
     def find(self, name: str, file: Path, field: str) -> tuple[Path, bool]:
         """As `path`; a name that leads out, or nowhere, is also looked for beside `file`, without its folders.
@@ -88,3 +98,14 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):  # too long, a zero or half of a character in it
         return False
+
+
+def _in_other_case(path: Path, root: Path) -> Path | None:
+    """The one file below `root` whose path differs from `path` in upper and lower case alone, if there is one."""
+    root = root.resolve()
+    found = [root]
+    for part in path.relative_to(root).parts if path.is_relative_to(root) else ():
+        entries = [entry for folder in found if folder.is_dir() for entry in folder.iterdir()]
+        found = [entry for entry in entries if entry.name.casefold() == part.casefold()]
+    files = [one for one in found if one.is_file()]
+    return files[0] if len(files) == 1 and len(found) == 1 else None

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, Literal, get_args
 
 from lambent.core.progress import Progress
+from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 from lambent.viewer.editor.files import Files
 from lambent.viewer.editor.measurement import Measurement
 from lambent.viewer.editor.shown import Plots, Shown
@@ -20,9 +21,7 @@ from lambent.viewer.screen import Screen
 from lambent.viewer.work import Work, pending
 
 Method = Literal["gradient", "grid"]
-Distribution = Literal["best", "beckmann", "ggx"]
 LOBES = ("auto", "1", "2", "3", "4")
-DISTRIBUTIONS: tuple[Distribution, ...] = get_args(Distribution)
 METHODS: tuple[Method, ...] = get_args(Method)
 
 
@@ -33,7 +32,7 @@ class Fit:
         self._subject, self._screen = subject, screen
         self.lobes = LOBES[1]
         self.method: Method = METHODS[0]
-        self.distribution: Distribution = DISTRIBUTIONS[0]
+        self.distribution: DistributionChoice = DISTRIBUTION
         self.work: Work | None = None
         self.warnings: tuple[str, ...] = ()
         self._keep = False  # the result of a fit that was stopped

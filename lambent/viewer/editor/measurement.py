@@ -38,6 +38,7 @@ class Measurement:
     few: MeasuredSamples  # at most `FEW`
     gathered: tuple[Incidence, ...]  # by incident direction, for disks and curves
     disks: Floats  # (K, pixels, 3) as `readings.Disks.measured` of `FINE_PX` gives it
+    mirrored: Floats  # the same of `Disks.mirrored`
     lambertian: Mapping[str, float]  # metric -> E of the best Lambertian surface
 
     @property
@@ -78,9 +79,10 @@ def read_measurement(path: Path, progress: Progress = silent) -> Measurement:
     progress(2, 5, "gathering incident directions")
     gathered = tuple(incidences(samples))
     progress(3, 5, "drawing disks")
-    disks = Disks(incidents_of(gathered), samples.info.transmits, FINE_PX).measured(gathered)
+    laid_out = Disks(incidents_of(gathered), samples.info.transmits, FINE_PX)
+    disks, mirrored = laid_out.measured(gathered), laid_out.mirrored(gathered)
     progress(4, 5, "the best Lambertian surface")
-    return Measurement(path, samples, few, gathered, disks, lambertian_errors(few))
+    return Measurement(path, samples, few, gathered, disks, mirrored, lambertian_errors(few))
 
 
 def thinned(samples: MeasuredSamples, count: int) -> MeasuredSamples:

@@ -19,12 +19,14 @@ from lambent.materials.bsdf import MaterialBSDF, components, evaluate
 from lambent.materials.document import Material
 from lambent.materials.fitting.disks import brightness, disk_directions, in_plane_directions, measured_disk
 from lambent.materials.fitting.incidence import Incidence
+from lambent.materials.fitting.symmetry import mirrored
 from lambent.materials.lobes import Vector
 from lambent.viewer.mode import Image
 
 FINE_PX = 72  # of a disk at rest
 WHITE_PERCENTILE = 99.8
 UNKNOWN = (56, 68, 90)  # of directions that were not measured
+HATCH_PX = 5  # between lines over what is known by symmetry alone
 THETA_O_DEG = np.linspace(-89.5, 89.5, 359)
 ALBEDO_THETA_DEG = np.linspace(0.0, 85.0, 18)
 WITHOUT_MEASUREMENT_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
@@ -60,6 +62,8 @@ class Disks:
                            for index in range(len(incidents)))  # fmt: skip
         self.columns = int(np.ceil(np.sqrt(len(self.tiles))))
         self._inside = disk_directions(pixels, 0.0, False)[1]
+        rows, columns = np.nonzero(self._inside)
+        self._hatch = (rows + columns) % HATCH_PX == 0
         wi, wo = [], []
         for index, far in self.tiles:
             towards = disk_directions(pixels, incidents[index].phi_deg, far)[0][self._inside]
@@ -76,15 +80,31 @@ class Disks:
 
     def measured(self, gathered: Sequence[Incidence]) -> Floats:
         """(K, inside, 3) brightness, NaN where nothing was measured."""
-        if not gathered:
-            return np.full((len(self.tiles), int(self._inside.sum()), 3), np.nan, np.float32)
-        disks = [measured_disk(gathered[index], far, self.pixels)[self._inside] for index, far in self.tiles]
-        return np.stack([np.broadcast_to(disk, (len(disk), 3)) for disk in disks]).astype(np.float32)
+        return self._of(gathered)
 
-    def picture(self, values: Floats, white: float) -> Image:
-        """RGBA picture of all disks, black to `white`; off the disks it is transparent."""
+    def mirrored(self, gathered: Sequence[Incidence]) -> Floats:
+        """(K, inside, 3) brightness where symmetry tells it from what was measured elsewhere, else NaN."""
+        return self._of([mirrored(entry, gathered) for entry in gathered])
+
+    def _of(self, gathered: Sequence[Incidence | None]) -> Floats:
+        values = np.full((len(self.tiles), int(self._inside.sum()), 3), np.nan, np.float32)
+        for disk, (index, far) in zip(values, self.tiles, strict=True):
+            entry = gathered[index] if gathered else None
+            if entry is not None:
+                disk[:] = measured_disk(entry, far, self.pixels)[self._inside]
+        return values
+
+    def picture(self, values: Floats, white: float, guessed: Floats | None = None) -> Image:
+        """RGBA picture of all disks, black to `white`; off the disks it is transparent.
+
+        Where `values` are NaN, `guessed` stands in for them, hatched.
+        """
+        unknown = np.isnan(values[..., :1])
+        if guessed is not None:
+            values = np.where(unknown, guessed, values)
         shown = np.clip(values / white, 0, 1) * 255
-        unknown = np.isnan(shown[..., :1])
+        hatched = unknown & self._hatch[None, :, None]
+        unknown = np.isnan(shown[..., :1]) | hatched
         shown = np.where(unknown, np.array(UNKNOWN, np.float32), np.nan_to_num(shown))
         side, rows = self.pixels, -(-len(self.tiles) // self.columns)
         cells = np.zeros((rows * self.columns, side, side, 4), np.uint8)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from lambent.core.plain import Triple
@@ -10,6 +10,7 @@ from lambent.materials.document import KINDS, Kind, Material
 from lambent.materials.fitting.parameters import SHAPE, parameter
 
 Value = float | Triple
+Kept = tuple[frozenset[str], tuple[tuple[str, tuple[float, float]], ...]]
 DIFFUSE = ("kd", "kt_d")
 
 
@@ -30,6 +31,16 @@ class Restrictions:
 
     fixed: set[str] = field(default_factory=set)
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    keep: Callable[[Kept], None] = field(default=lambda kept: None, compare=False)  # called after every change
+
+    @property
+    def kept(self) -> Kept:
+        """All of it, frozen."""
+        return frozenset(self.fixed), tuple(sorted(self.ranges.items()))
+
+    def restore(self, kept: Kept) -> None:
+        """Become what was kept."""
+        self.fixed, self.ranges = set(kept[0]), dict(kept[1])
 
     def fix(self, name: str, fixed: bool) -> None:
         """Fix a parameter, or set it free; a fixed one has no interval."""
@@ -38,6 +49,7 @@ class Restrictions:
             self.ranges.pop(name, None)
         else:
             self.fixed.discard(name)
+        self.keep(self.kept)
 
     def narrow(self, name: str, interval: tuple[float, float] | None) -> None:
         """Give a parameter an interval, or none; one with an interval is not fixed."""
@@ -46,6 +58,7 @@ class Restrictions:
         else:
             self.ranges[name] = interval
             self.fixed.discard(name)
+        self.keep(self.kept)
 
     def for_fit(
         self, material: Material, lobes: int
@@ -67,6 +80,7 @@ class Restrictions:
         renamed |= {name: name for name in DIFFUSE}
         self.fixed = {renamed[name] for name in self.fixed if name in renamed}
         self.ranges = {renamed[name]: interval for name, interval in self.ranges.items() if name in renamed}
+        self.keep(self.kept)
 
 
 def _values(material: Material) -> Iterator[tuple[str, Value]]:

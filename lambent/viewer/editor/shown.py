@@ -38,6 +38,7 @@ class Plots:
     chosen: int = 0
     channel: Channel = "mean"
     scale: Scale = "cube root"
+    brighter: float = 0.0  # stops by which p is multiplied in the disks
     visible: bool = True
     fit_axes: bool = True  # the axes have yet to take the extent of the curves
 
@@ -65,6 +66,7 @@ class Shown:
         self.exact_work: Work | None = None
         self._white = 1.0
         self._done: dict[str, Any] = {}  # part -> the inputs it was last made from
+        self._values: dict[str, Floats] = {}  # of the disks of A and B
         self._disks: dict[tuple[bool, int], Disks] = {}
         self._exact_of: Material | None = None
         self._changed_s = 0.0
@@ -77,9 +79,9 @@ class Shown:
         measured = measurement is not None and measurement.samples.info.transmits
         self.transmits = measured or a.transmits or bool(b and b.transmits)
         if measurement is not None:
-            self._update_measured(measurement, plots.chosen)
+            self._update_measured(measurement, plots)
         for name, material in (("A", a), ("B", b)):
-            self._update_material(name, material, plots.chosen, moving)
+            self._update_material(name, material, plots, moving)
         self.exact_work = pending(self.exact_work)
         if measurement is not None:
             self._update_error(measurement, a, b, metric, moving)
@@ -100,14 +102,17 @@ class Shown:
         self._done[part] = made_of
         return True
 
-    def _update_measured(self, measurement: Measurement, chosen: int) -> None:
-        if self._new("measured disks", self.transmits):
+    def _update_measured(self, measurement: Measurement, plots: Plots) -> None:
+        chosen = plots.chosen
+        if self._new("measured disks", self.transmits, plots.brighter):
             disks = self._laid_out(FINE_PX)
-            values = measurement.disks
+            values, guessed = measurement.disks, measurement.mirrored
             if len(values) < len(disks.tiles):  # the model transmits, the table does not
-                values = np.concatenate([values, np.full_like(values, np.nan)])
+                beyond = np.full_like(values, np.nan)
+                values, guessed = np.concatenate([values, beyond]), np.concatenate([guessed, beyond])
             self._white = white_of(values)
-            self.images["measured"], self.layout["measured"] = disks.picture(values, self._white), disks
+            white = self._white * 2 ** (-plots.brighter / 3)  # a disk shows the cube root
+            self.images["measured"], self.layout["measured"] = disks.picture(values, white, guessed), disks
         if measurement.gathered and self._new("measured curve", chosen):
             entry = measurement.gathered[chosen]
             near = [e for e in measurement.gathered if e.phi_deg == entry.phi_deg]
@@ -117,9 +122,9 @@ class Shown:
                 albedos = np.stack([np.broadcast_to(e.albedo(far), 3) for e in near])
                 self.albedos["measured", far] = (theta, albedos)
 
-    def _update_material(self, name: str, material: Material | None, chosen: int, moving: bool) -> None:
+    def _update_material(self, name: str, material: Material | None, plots: Plots, moving: bool) -> None:
         if material is None:
-            for part in (self.images, self.layout):
+            for part in (self.images, self.layout, self._values):
                 part.pop(name, None)
             for curves in (self.curves, self.albedos):
                 curves.pop((name, False), None)
@@ -128,14 +133,17 @@ class Shown:
             return
         scatters = material.model_copy(update={"name": "", "provenance": None})
         pixels = self._moving_px() if moving else FINE_PX
-        incident = self.incidents[chosen]
+        incident = self.incidents[plots.chosen]
         changed = self._new(f"disks {name}", scatters, self.transmits)
         if changed or (not moving and self.layout[name].pixels != FINE_PX):
             disks = self._laid_out(pixels)
-            values = disks.model(material)
+            self._values[name], self.layout[name] = disks.model(material), disks
             if "measured" not in self.images and name == "A":
-                self._white = white_of(values)
-            self.images[name], self.layout[name] = disks.picture(values, self._white), disks
+                self._white = white_of(self._values[name])
+            changed = True
+        if self._new(f"brightness {name}", self._white, plots.brighter) or changed:
+            white = self._white * 2 ** (-plots.brighter / 3)
+            self.images[name] = self.layout[name].picture(self._values[name], white)
         if self._new(f"curves {name}", scatters, incident):
             for far in (False, True):
                 self.curves[name, far] = readings.THETA_O_DEG, readings.in_plane(material, incident, far)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal, cast, get_args
 
 from lambent.materials.document import Kind, Lobe, Material
-from lambent.viewer.editor.restrictions import Restrictions
+from lambent.viewer.editor.restrictions import Kept, Restrictions
 from lambent.viewer.edits import MaterialEdits
 
 B = Literal["nothing", "as loaded", "as saved", "before the last step", "a document"]
@@ -19,17 +20,24 @@ class Subject:
 
     edits: MaterialEdits
     name: str
-    restrictions: Restrictions = field(default_factory=Restrictions)  # of its parameters in a fit
     reference: B = "nothing"  # the choice of the material B
     document: Material | None = None
 
     def __post_init__(self) -> None:
         self.loaded = self.material
+        self._restrictions = Restrictions(keep=partial(self.edits.keep_beside, self.name))
         self._origins = [self.loaded]  # as they were loaded or fitted, with their provenance
 
     @property
     def material(self) -> Material:
         return self.edits.current(self.name)
+
+    @property
+    def restrictions(self) -> Restrictions:
+        """Of the material's parameters in a fit; a change is a step of undo, like one of a number."""
+        kept = cast(Kept | None, self.edits.beside(self.name))
+        self._restrictions.restore(kept or (frozenset(), ()))
+        return self._restrictions
 
     @property
     def compared(self) -> Material | None:
@@ -92,8 +100,11 @@ class Subject:
 
     def _with_lobes(self, lobes: tuple[Lobe, ...], kept: list[int]) -> None:
         after = self.material.model_copy(update={"lobes": lobes})
-        self.restrictions.follow(self.material, after, kept)
-        self.step(after)
+        restrictions, before = self.restrictions, self.material
+        self.edits.end_stroke()
+        self.change(after)
+        restrictions.follow(before, after, kept)
+        self.edits.end_stroke()
 
 
 def same_numbers(a: Material, b: Material) -> bool:

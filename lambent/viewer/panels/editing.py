@@ -10,13 +10,24 @@ from typing import get_args
 from imgui_bundle import imgui
 
 from lambent.materials.document import KINDS, Lobe, Material
+from lambent.materials.fitting.choices import DISTRIBUTION_CHOICES
 from lambent.materials.measured.metrics import METRICS
 from lambent.materials.models.model import Parameter
-from lambent.viewer.editor.editor import DISTRIBUTIONS, LOBES, METHODS, Editor
+from lambent.viewer.editor.editor import LOBES, METHODS, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
 from lambent.viewer.editor.subject import REFERENCES
 from lambent.viewer.panels import parameters
-from lambent.viewer.panels.widgets import DIM, buttons, choice, coloured, explain, path_field, typed_field, wrapped
+from lambent.viewer.panels.widgets import (
+    DIM,
+    buttons,
+    choice,
+    coloured,
+    explain,
+    path_field,
+    press,
+    typed_field,
+    wrapped,
+)
 
 OF_LOBES: tuple[str, ...] = get_args(Lobe.model_fields["distribution"].annotation)
 LABEL_PX = 52
@@ -52,7 +63,7 @@ def _names(editor: Editor) -> None:
     explain("the material; * there is something to save")
     if editor.leave is not None:
         imgui.same_line(imgui.get_content_region_avail().x - 46)
-        if imgui.button("close##editor", (-1, 0)):
+        if press("close##editor", "closes the editor and keeps the material", -1):
             editor.queue(editor.leave)
     text = f"{len(measurement.samples)} tuples of {measurement.samples.info.file}" if measurement else "no measurement"
     coloured(f"reading: {loading.what}" if loading else text, DIM)
@@ -63,8 +74,9 @@ def _names(editor: Editor) -> None:
 
 def _error(editor: Editor) -> None:
     shown, measurement, subject = editor.shown, editor.measurement, editor.subject
-    editor.metric = choice("##metric", editor.metric, tuple(METRICS), 104)
-    explain(f"what an error is, here and in a fit: {METRICS[editor.metric].source}, in {METRICS[editor.metric].unit}")
+    metric = METRICS[editor.metric]
+    meaning = f"what an error is, here and in a fit: {metric.source}, in {metric.unit}"
+    editor.metric = choice("##metric", editor.metric, tuple(METRICS), meaning, 104)
     imgui.same_line()
     if measurement is None or shown.error is None:
         imgui.text_disabled("load a measurement to see the error")
@@ -86,17 +98,26 @@ def _history(editor: Editor) -> None:
     subject, edits = editor.subject, editor.subject.edits
     changed, revert = subject.material != subject.loaded, partial(subject.step, subject.loaded)
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
-    undo = ("undo", edits.can_undo, edits.undo, "Ctrl+Z")
-    redo = ("redo", edits.can_redo, edits.redo, "Ctrl+Shift+Z or Ctrl+Y")
-    buttons([undo, redo, ("revert", changed, revert, "the material as it was loaded; can be undone")], width)
+    undo = ("undo", edits.can_undo, edits.undo, "takes back the last step (Ctrl+Z)")
+    redo = ("redo", edits.can_redo, edits.redo, "does the step again (Ctrl+Shift+Z)")
+    buttons(
+        [undo, redo, ("revert", changed, revert, "returns to the material as it was loaded; this can be undone")], width
+    )
 
 
 def _files(editor: Editor) -> None:
     files = editor.files
-    files.name, wanted = path_field("file", files.name, "save", hint="name.json")
+    meaning = "writes the material as a document (Ctrl+S)"
+    files.name, wanted = path_field("file", files.name, "save", "name.json", meaning)
     if wanted:
         editor.save()
-    text = typed_field("open", files.typed, "load", "another measurement or material...")
+    text = typed_field(
+        "open",
+        files.typed,
+        "load",
+        "another measurement or material...",
+        "reads another measured table or material document; a file can be dropped onto the window, too",
+    )
     if text is not None:
         files.open(text)
 
@@ -105,6 +126,7 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     names = lobe_names(material)
     imgui.set_next_item_width(-LABEL_PX - RANGE_PX)
     changed, name = imgui.input_text("name", material.name)
+    explain("name of the material in its document")
     renamed = material.model_copy(update={"name": name}) if changed and name.strip() else material
     changed, coupled = imgui.checkbox("kd falls off as Fresnel rises", material.kd_coupled)
     explain("couples the diffuse reflection to the lobes: kd is then the albedo from straight above; a fit keeps this")
@@ -142,7 +164,7 @@ def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
     if imgui.small_button(f"{'x' if interval else '<>'}##narrow {parameter}"):
         interval = None if interval else (model.low, model.high)
         restrictions.narrow(parameter, interval)
-    explain("no interval" if interval else f"seek {parameter} only within an interval")
+    explain(f"lets a fit seek {parameter} anywhere" if interval else f"lets a fit seek {parameter} within an interval")
     if interval is None:
         return
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + imgui.get_frame_height() + imgui.get_style().item_spacing.x)
@@ -152,6 +174,7 @@ def _interval(editor: Editor, parameter: str, model: Parameter) -> None:
         f"sought##{parameter}", *interval, 0.002 * (model.high - model.low), model.low, model.high,
         "%.4f" if log else "%.3f", None, imgui.SliderFlags_.always_clamp,
     )  # fmt: skip
+    explain(f"the interval where a fit may seek {parameter}")
     if changed and low < high:
         restrictions.narrow(parameter, (max(low, model.low), min(high, model.high)))
 
@@ -162,15 +185,16 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     imgui.align_text_to_frame_padding()
     imgui.text_unformatted(f"lobe {index + 1}")
     imgui.same_line()
-    turned = choice("##kind", lobe.kind, KINDS, 112)
-    explain("retro: about the direction to the light, not about its mirror image")
+    meaning = "where the lobe points: to the mirror image, through the surface, or back to the light"
+    room = imgui.get_content_region_avail().x
+    turned = choice("##kind", lobe.kind, KINDS, meaning, min(112, 0.37 * room))
     if turned != lobe.kind:
         editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
-    kind = choice("##distribution", lobe.distribution, OF_LOBES, 96)
-    explain("of the microfacets: beckmann falls off as a bell, ggx has long tails")
+    meaning = "distribution of the microfacets: beckmann falls off as a bell, ggx has long tails"
+    kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(96, 0.3 * room))
     imgui.same_line()
-    if imgui.button("remove", (-1, 0)):
+    if press("remove", "takes the lobe away; this can be undone", -1):
         editor.queue(lambda: subject.remove_lobe(index))
     return lobe if kind == lobe.distribution else lobe.model_copy(update={"distribution": kind})
 
@@ -179,21 +203,24 @@ def _new_lobes(editor: Editor) -> None:
     imgui.separator()
     gaps = (len(KINDS) - 1) * imgui.get_style().item_spacing.x
     width, add = (imgui.get_content_region_avail().x - gaps) / len(KINDS), editor.subject.add_lobe
-    buttons([(f"add {kind}", True, partial(editor.queue, partial(add, kind)), "a lobe") for kind in KINDS], width)
+    buttons(
+        [(f"add {kind}", True, partial(editor.queue, partial(add, kind)), f"adds a {kind} lobe") for kind in KINDS],
+        width,
+    )
 
 
 def _compare(editor: Editor) -> None:
     subject, files = editor.subject, editor.files
     imgui.separator_text("compare with B")
-    subject.reference = choice("B", subject.reference, REFERENCES)
+    subject.reference = choice("B", subject.reference, REFERENCES, "the material to hold against this one")
     if subject.reference == "a document":
-        text = typed_field("B", files.typed, "open", "material document (.json)")
+        text = typed_field("B", files.typed, "open", "material document (.json)", "reads the document to compare with")
         if text is not None:
             files.open_compared(text)
     other = subject.compared
     if subject.reference != "nothing" and other is None:
         imgui.text_disabled("there is none yet")
-    if other is not None and imgui.button("take B's numbers", (-1, 0)):
+    if other is not None and press("take B's numbers", "makes the material the same as B; this can be undone", -1):
         named = other.model_copy(update={"name": subject.material.name})
         editor.queue(lambda: subject.step(named))
 
@@ -201,12 +228,12 @@ def _compare(editor: Editor) -> None:
 def draw_fit(editor: Editor) -> None:
     """Options of a fit, its progress, its warnings."""
     fit = editor.fit
-    fit.lobes = choice("lobes", fit.lobes, LOBES)
-    explain("per side; auto adds lobes as long as they take off a share of the error")
-    fit.distribution = choice("distribution", fit.distribution, DISTRIBUTIONS)
-    explain("distribution of the microfacets; best tries both")
-    fit.method = choice("method", fit.method, METHODS)
-    explain("gradient: least squares from several starts; grid: the hierarchical search of the thesis")
+    meaning = "lobes per side; auto adds some as long as they take off a share of the error"
+    fit.lobes = choice("lobes", fit.lobes, LOBES, meaning)
+    meaning = "distribution of the microfacets; best tries both"
+    fit.distribution = choice("distribution", fit.distribution, DISTRIBUTION_CHOICES, meaning)
+    meaning = "gradient: least squares from several starts; grid: the hierarchical search of the thesis"
+    fit.method = choice("method", fit.method, METHODS, meaning)
     restrictions = editor.subject.restrictions
     words = [*sorted(restrictions.fixed)]
     words += [f"{name} {low:.3g}..{high:.3g}" for name, (low, high) in sorted(restrictions.ranges.items())]
@@ -216,7 +243,7 @@ def draw_fit(editor: Editor) -> None:
         imgui.pop_text_wrap_pos()
     work = fit.work
     if work is None:
-        meaning = "under the metric above, with what is fixed and narrowed; the result is one step of undo"
+        meaning = "fits under the metric above, with what is fixed and narrowed; the result is one step of undo"
         start = partial(fit.start, editor.measurement, editor.metric)
         buttons([("fit from here", editor.measurement is not None, start, meaning)], -1)
     else:
@@ -225,5 +252,10 @@ def draw_fit(editor: Editor) -> None:
         goes_on = not work.cancelling
         width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
         cancel, stop = partial(fit.stop, keep=False), partial(fit.stop, keep=True)
-        buttons([("cancel##fit", goes_on, cancel, ""), ("stop, keep the best", goes_on, stop, "")], width)
+        keep = "ends the fit and takes the best material it has"
+        actions = [
+            ("cancel##fit", goes_on, cancel, "ends the fit and leaves the material"),
+            ("stop, keep the best", goes_on, stop, keep),
+        ]
+        buttons(actions, width)
     wrapped(fit.warnings)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
+from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import LEAST, MOST, Range
 from lambent.realtime.planar_integrators import CHOICES as PLANARS
 from lambent.viewer.look import INTEGRATORS, LOOKUPS, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
@@ -28,13 +29,21 @@ def draw(look: Look, screen: Screen) -> None:
 
 
 def draw_exposure(look: Look, key: str = "") -> None:
-    look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -EXPOSURE_EV, EXPOSURE_EV, unit=" EV")
+    ev100 = f"EV100 {ev100_of(look.exposure_ev):.1f}"
+    meaning = f"stops on radiance, brighter or darker; now {ev100}: 15 in the sun, 8 in a room by night"
+    look.exposure_ev = slider(f"exposure{key}", look.exposure_ev, -EXPOSURE_EV, EXPOSURE_EV, meaning, unit=" EV")
+    imgui.text_disabled(ev100)
 
 
 def draw_shown(look: Look) -> None:
-    look.view_transform = choice("transform", look.view_transform, VIEW_TRANSFORMS)
-    look.show = choice("show", look.show, look.shows)
-    explain("all light, a part of it, the light map's irradiance, or its noise before denoising (standard error, %)")
+    draw_transform(look)
+    meaning = "all light, a part of it, the light map's irradiance, or its noise before denoising (standard error, %)"
+    look.show = choice("show", look.show, look.shows, meaning)
+
+
+def draw_transform(look: Look) -> None:
+    meaning = "how light becomes a picture: with highlights rolled off, as it is, or luminance in false colours"
+    look.view_transform = choice("transform", look.view_transform, VIEW_TRANSFORMS, meaning)
 
 
 def draw_range(look: Look, screen: Screen) -> None:
@@ -59,27 +68,29 @@ def draw_range(look: Look, screen: Screen) -> None:
 def draw_reflections(look: Look, *, planar: bool) -> None:
     """Integrator, samples and look-up; with `planar` the method of planar reflectors."""
     imgui.separator_text("reflections")
-    look.integrator = choice("integrator", look.integrator, INTEGRATORS)
+    look.integrator = choice("integrator", look.integrator, INTEGRATORS, "how reflections are summed in motion")
     _samples(look)
-    look.lookup = choice("look-up", look.lookup, LOOKUPS)
-    explain(
+    meaning = (
         "where a reflected ray is taken to end: at the bounding planes, at the probe's distances, or infinitely far"
     )
+    look.lookup = choice("look-up", look.lookup, LOOKUPS, meaning)
     if planar:
-        look.planar = choice("planes", look.planar, PLANARS)
-        explain("how planar reflectors are drawn: by a picture of their own, or (off) by their probes")
+        meaning = "how planar reflectors are drawn: by a picture of their own, or (off) by their probes"
+        look.planar = choice("planes", look.planar, PLANARS, meaning)
 
 
 def _samples(look: Look) -> None:
     counts = SAMPLE_COUNTS
     middle = counts[len(counts) // 2]
     changed, automatic = imgui.checkbox("samples from roughness", look.n is None)
+    explain("takes more samples for wider lobes, instead of as many for all")
     if changed:
         look.n = None if automatic else middle
     imgui.begin_disabled(automatic)
     index = counts.index(look.n if look.n is not None else middle)
     text = "automatic" if automatic else str(counts[index])
     changed, index = imgui.slider_int("samples", index, 0, len(counts) - 1, text)
+    explain("samples per lobe and pixel in motion")
     imgui.end_disabled()
     if changed:
         look.n = counts[index]
@@ -87,9 +98,12 @@ def _samples(look: Look) -> None:
 
 def draw_quality(pace: Pace) -> None:
     imgui.separator_text("quality")
-    pace.refine = check("refine while nothing moves", pace.refine)
-    pace.adaptive = check("fewer pixels in motion where needed", pace.adaptive)
+    pace.refine = check(
+        "refine while nothing moves", pace.refine, "averages unbiased frames until the picture is clean"
+    )
+    meaning = "draws a smaller picture in motion where the adapter is too slow for the frame time"
+    pace.adaptive = check("fewer pixels in motion where needed", pace.adaptive, meaning)
     imgui.begin_disabled(not pace.adaptive)
-    pace.target_ms = slider("frame", pace.target_ms, *FRAME_MS, log=True, unit=" ms")
+    meaning = f"time that a frame in motion is to take; {1e3 * BUDGET_S:.0f} ms are 15 frames a second"
+    pace.target_ms = slider("frame", pace.target_ms, *FRAME_MS, meaning, log=True, unit=" ms")
     imgui.end_disabled()
-    explain(f"time that a frame in motion is to take; {1e3 * BUDGET_S:.0f} ms are 15 frames a second")

@@ -42,6 +42,12 @@ def draw(screen: Screen, first: Sequence[str] = (), *, refining: bool = True) ->
     imgui.end()
 
 
+def over(picture: Rect, texture: imgui.ImTextureRef | None) -> None:
+    """A texture with clear pixels over the whole picture, where there is one."""
+    if texture is not None:
+        imgui.get_background_draw_list().add_image(texture, picture.point(0, 0), picture.point(1, 1))
+
+
 def false_colour_bar(picture: Rect, look: Look) -> None:
     """The scale of a picture in false colours."""
     if look.is_false_coloured:

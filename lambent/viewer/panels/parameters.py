@@ -13,11 +13,14 @@ from imgui_bundle import imgui
 from lambent.materials.document import Lobe, Material
 from lambent.materials.models.kurt import Kurt, KurtRetro
 from lambent.materials.models.model import Parameter, Value
-from lambent.viewer.panels.widgets import check, explain, rgb, slider
+from lambent.viewer.panels.widgets import check, rgb, slider
 
 LOBE = {parameter.name: parameter for parameter in Kurt.parameters}
 RETRO = {parameter.name: parameter for parameter in KurtRetro.parameters}
-DIFFUSE = {"kd": "diffuse reflectance", "kt_d": "diffuse transmittance"}
+DIFFUSE = {
+    "kd": "share of light that is reflected diffusely, in red, green and blue",
+    "kt_d": "share of light that is transmitted diffusely, in red, green and blue",
+}
 # Surrounds the control of a lobe's attribute, or of a diffuse coefficient (lobe None): its line, in the editor.
 Line = Callable[[int | None, str], AbstractContextManager[object]]
 
@@ -40,7 +43,7 @@ def edited(
         with line(None, name):
             changes[name] = rgb(name, getattr(material, name), 1.0, DIFFUSE[name])
     if material.lobes:
-        linked = check("keep the ratio of mx and my", linked)
+        linked = check("keep the ratio of mx and my", linked, "moves both roughnesses by the same factor")
     changes["lobes"] = tuple(_lobe(index, lobe, linked, line, heading) for index, lobe in enumerate(material.lobes))
     return material.model_copy(update=changes), linked
 
@@ -66,9 +69,7 @@ def _parameter(parameter: Parameter, lobe: Lobe) -> Value:
     if parameter.rgb:
         return rgb(parameter.name, value, max(parameter.high, *value), meaning)
     low, high = min(parameter.low, value), max(parameter.high, value)
-    value = slider(parameter.name, value, low, high, log=parameter.scale == "log")
-    explain(meaning)
-    return value
+    return slider(parameter.name, value, low, high, meaning, log=parameter.scale == "log")
 
 
 def _linked(before: Lobe, after: Lobe) -> Lobe:

@@ -14,6 +14,7 @@ from lambent.viewer.editor.shown import CHANNELS, SCALES, Curves, Plots
 from lambent.viewer.mode import Beside, Textures
 from lambent.viewer.panels.widgets import Colour, choice, coloured, explain
 
+BRIGHTER_PX, BRIGHTER_STOPS = 120.0, (0.0, 20.0)
 GAP_PX = 2.0  # around a disk
 CHOSEN, RIM, TEXT, DIM = (1.0, 0.72, 0.2, 1.0), (0.33, 0.35, 0.38, 1.0), (0.8, 0.82, 0.85, 1.0), (0.6, 0.63, 0.68, 1.0)
 ALBEDO_SHARE = 0.34  # of the width below the picture
@@ -23,6 +24,7 @@ RED, GREEN, BLUE = (1.0, 0.42, 0.38, 1), (0.42, 0.86, 0.46, 1), (0.45, 0.62, 1.0
 ONE = {"red": (0, RED), "green": (1, GREEN), "blue": (2, BLUE)}
 LEAST_P = 1e-5  # 1/sr; the lower end of the logarithmic axis
 TICKS = (0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0)
+_CLAMP = imgui.SliderFlags_.always_clamp
 _PLOT = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text
 X, Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 
@@ -44,10 +46,17 @@ def _title(editor: Editor, kind: str) -> str:
 def _disks(editor: Editor, textures: Textures) -> None:
     shown, chosen = editor.shown, editor.plots.chosen
     kinds = [kind for kind in ("measured", "A", "B") if kind in shown.layout and kind in textures]
-    imgui.text_disabled("cube root of p = f cos theta_o")
+    imgui.set_next_item_width(min(BRIGHTER_PX, imgui.get_content_region_avail().x))
+    meaning = "makes all disks brighter by so many stops: what is dark beside a highlight comes out of the black"
+    plots = editor.plots
+    plots.brighter = imgui.slider_float("##brighter", plots.brighter, *BRIGHTER_STOPS, "%+.1f stops", _CLAMP)[1]
+    explain(meaning)
+    imgui.same_line()
+    imgui.text_disabled("cube root of p")
     explain(
-        "p is the transfer probability in 1/sr; theta_o runs from the centre to the rim, light comes from the top;\n"
-        "white is the same in all disks; dark blue was not measured; with transmission the far side stands below"
+        "p = f cos theta_o is the transfer probability in 1/sr; theta_o runs from the centre to the rim, light comes\n"
+        "from the top; white is the same in all disks; dark blue was not measured; hatched is known by symmetry\n"
+        "alone; with transmission the far side stands below"
     )
     imgui.same_line()
     if shown.incidents:
@@ -92,13 +101,11 @@ def _words(laid: Matrix, kinds: list[str], origin: imgui.ImVec2) -> None:
 
 def _curves(editor: Editor, textures: Textures) -> None:
     plots, shown = editor.plots, editor.shown
-    scale = choice("##axis", plots.scale, SCALES, 110)
+    scale = choice("##axis", plots.scale, SCALES, "scale of the axis of p", 110)
     if plots.scale != scale:
         plots.scale, plots.fit_axes = scale, True
-    explain("scale of the axis of p")
     imgui.same_line()
-    plots.channel = choice("##channel", plots.channel, CHANNELS, 90)
-    explain("mean over the channels, all three, or one")
+    plots.channel = choice("##channel", plots.channel, CHANNELS, "mean over the channels, all three, or one", 90)
     imgui.same_line()
     if not shown.curves:  # before the first frame
         return

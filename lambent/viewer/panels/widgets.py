@@ -1,4 +1,7 @@
-"""Controls that more than one panel uses. Each returns the value as it is after this frame."""
+"""Controls that more than one panel uses. Each returns the value as it is after this frame.
+
+Every control has a `meaning`: a sentence that appears while the mouse rests on it.
+"""
 
 from __future__ import annotations
 
@@ -13,46 +16,70 @@ from lambent.core.plain import Triple, triple
 
 Colour = tuple[float, float, float, float]
 Word = TypeVar("Word", bound=str)
+THREE_PX = 150.0  # of three sliders that have room for three digits
 AMBER, DIM = (1.0, 0.75, 0.35, 1.0), (0.62, 0.65, 0.70, 1.0)
 
 
-def choice(label: str, value: Word, options: Sequence[Word], width: float | None = None) -> Word:
+def choice(label: str, value: Word, options: Sequence[Word], meaning: str, width: float | None = None) -> Word:
     """A drop-down list."""
     if width is not None:
         imgui.set_next_item_width(width)
     _, index = imgui.combo(label, options.index(value), list(options))
+    explain(meaning)
     return options[index]
 
 
-def check(label: str, value: bool) -> bool:
+def check(label: str, value: bool, meaning: str) -> bool:
     """A check box."""
-    return imgui.checkbox(label, value)[1]
+    value = imgui.checkbox(label, value)[1]
+    explain(meaning)
+    return value
 
 
-def slider(label: str, value: float, low: float, high: float, *, log: bool = False, unit: str = "") -> float:
+def press(label: str, meaning: str, width: float = 0.0, *, small: bool = False) -> bool:
+    """A button; whether it was pressed."""
+    pressed = imgui.small_button(label) if small else imgui.button(label, (width, 0))
+    explain(meaning)
+    return pressed
+
+
+def listed(label: str, on: bool, meaning: str, flags: int = 0) -> bool:
+    """A line of a list that can be chosen; whether it was."""
+    chosen = imgui.selectable(label, on, flags)[0]
+    explain(meaning)
+    return chosen
+
+
+def slider(
+    label: str, value: float, low: float, high: float, meaning: str, *, log: bool = False, unit: str = ""
+) -> float:
     """A slider; Ctrl+click takes a typed number, kept within the range."""
     flags = imgui.SliderFlags_.always_clamp
     if log:
         flags |= imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.no_round_to_format
     changed, moved = imgui.slider_float(label, value, low, high, ("%.4f" if log else "%.3f") + unit, flags)
+    explain(meaning)
     return min(max(moved, low), high) if changed else value
 
 
 def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
-    """Three sliders of linear coefficients and a swatch that opens a colour picker; `meaning` explains the label.
+    """Three sliders of linear coefficients and a swatch that opens a colour picker.
 
     The picker works on the colour as the display shows it; a coefficient above 1 keeps its scale.
     """
     imgui.push_id(label)
     swatch_px = imgui.get_frame_height()
     imgui.set_next_item_width(imgui.calc_item_width() - swatch_px - imgui.get_style().item_inner_spacing.x)
-    changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, "%.3f", imgui.SliderFlags_.always_clamp)
+    digits = "%.3f" if imgui.calc_item_width() > THREE_PX else "%.2f"
+    changed, moved = imgui.slider_float3("##values", list(value), 0.0, high, digits, imgui.SliderFlags_.always_clamp)
+    explain(meaning)
     value = triple(moved) if changed else value
     scale = max(1.0, *value)
     shown = triple(srgb_encode(np.array(value) / scale))
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     if imgui.color_button("##swatch", (*shown, 1.0), imgui.ColorEditFlags_.no_tooltip, (swatch_px, swatch_px)):
         imgui.open_popup("picker")
+    explain(f"opens a colour picker for {label}")
     if imgui.begin_popup("picker"):
         picked, colour = imgui.color_picker3("##picker", list(shown), imgui.ColorEditFlags_.no_side_preview)
         if picked:
@@ -65,26 +92,27 @@ def rgb(label: str, value: Triple, high: float, meaning: str) -> Triple:
     return value
 
 
-def path_field(label: str, text: str, button: str, *, hint: str = "path of a file") -> tuple[str, bool]:
+def path_field(label: str, text: str, button: str, hint: str, meaning: str) -> tuple[str, bool]:
     """A field for a path with a button at its end; returns the text and whether it is to be opened now."""
     room = imgui.calc_text_size(button).x + 2 * imgui.get_style().frame_padding.x + imgui.get_style().item_spacing.x
     imgui.set_next_item_width(-room)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.elide_left
     entered, text = imgui.input_text_with_hint(f"##{label}", hint, text, flags)
+    explain(meaning)
     imgui.same_line()
-    pressed = imgui.button(f"{button}##{label}", (-1, 0))
+    pressed = press(f"{button}##{label}", meaning, -1)
     return text, bool(entered or pressed)
 
 
-def typed_field(label: str, typed: dict[str, str], button: str, hint: str) -> str | None:
+def typed_field(label: str, typed: dict[str, str], button: str, hint: str, meaning: str) -> str | None:
     """A path field whose text stays in `typed`; the text once it is to be opened."""
-    typed[label], wanted = path_field(label, typed.get(label, ""), button, hint=hint)
+    typed[label], wanted = path_field(label, typed.get(label, ""), button, hint, meaning)
     return typed[label] if wanted else None
 
 
 def explain(text: str) -> None:
-    """Help that appears while the mouse rests on the control before."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+    """Help that appears while the mouse rests on the control before; not in a drag, where it would cover the next."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) and not imgui.is_any_item_active():
         imgui.set_tooltip(text)
 
 
@@ -115,11 +143,9 @@ def buttons(actions: Sequence[tuple[str, bool, Callable[[], None], str]], width:
         if index:
             imgui.same_line()
         imgui.begin_disabled(not possible)
-        if imgui.button(label, (width, 0)):
+        if press(label, meaning, width):
             act()
         imgui.end_disabled()
-        if meaning:
-            explain(meaning)
 
 
 def rows(pairs: Sequence[tuple[str, str]], name: str) -> None:

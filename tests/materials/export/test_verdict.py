@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,16 @@ def test_each_metric_has_limits_and_each_limit_decides() -> None:
         found = verdict_of(PERFECT | {name: 1.01 * usable}, {})
         assert found.word == "unusable" and f"limit {usable:.0%}" in found.reason
     assert verdict_of(PERFECT | {"l1": float("nan")}, {}).word == "unusable"
+
+
+def test_the_page_states_the_limits() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "exporting.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([^|]+) \| (?:within )?(\d+) %[^|]* \| (?:within )?(\d+) % \|$", page, re.MULTILINE)
+    stated = {name.split(":")[0].strip(): (int(low) / 100, int(high) / 100) for name, low, high in rows}
+    names = {"l1": "L1", "l2_ngan": "L2 (Ngan)", "cuberoot": "cube root", "log": "log"}
+    assert stated == {names[name]: limits for name, limits in LIMITS.items()} | {
+        "reflected and transmitted light, each": LIGHT_LIMITS
+    }
 
 
 @pytest.mark.parametrize("side", ["reflection", "transmission"])

@@ -117,6 +117,19 @@ def test_mitsuba(tmp_path: Path, material: Material) -> None:
     assert_costs(samples, mitsuba_f(bsdf, Geometry(samples)), cost.share)
 
 
+@pytest.mark.parametrize("material", [PLASTIC, PAPER], ids=named)
+def test_mitsuba_lights_the_side_that_is_looked_at(tmp_path: Path, material: Material) -> None:
+    """Above all from before the ball, or from behind what transmits; the ball's pole, +z of a sphere, is up."""
+    mitsuba.write(material, tmp_path / "a.xml")
+    ball, lamp, *_ = ET.parse(tmp_path / "a.xml").getroot().findall("shape")
+    eye = ET.parse(tmp_path / "a.xml").getroot().find("sensor/transform/lookat").get("origin")
+    lamp_z, eye_z = (float(text.split(",")[2]) for text in (lamp.find("point").get("value"), eye))
+    assert np.sign(lamp_z * eye_z) == (-1 if material.transmits else 1)
+    turn = ball.find("transform/rotate")
+    angle = np.radians(float(turn.get("angle")))
+    np.testing.assert_allclose([float(turn.get("x")), -np.sin(angle)], [1, 1])  # about x, z becomes y
+
+
 def test_mitsuba_thin_sheet(tmp_path: Path) -> None:
     """Diffuse on both sides: each part's colour times its share of the blend is the material's coefficient."""
     mitsuba.write(PAPER, tmp_path / "a.xml")

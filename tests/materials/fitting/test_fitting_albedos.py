@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -156,3 +157,9 @@ def test_the_derivatives_of_the_kept_albedos_are_those_of_their_error(metric, di
         ]
         slope = (ends[1] - ends[0]) / (2 * step) * 3  # the error is a mean over channels, the gradient a sum
         assert -gradient[i] * METRICS[metric].power == pytest.approx(slope, rel=1e-3, abs=1e-7)
+
+
+def test_the_ratio_is_that_of_the_fit_to_the_table() -> None:
+    table, fitted = np.array([[0.8], [0.4]]), np.array([[0.8], [0.1]])
+    said = str(albedos.Comparison("reflection", np.array([10.0, 60.0]), table, fitted, np.zeros(2, dtype=bool)))
+    assert re.search(r"at worst 0\.2\d times the table's: 0\.100 for the table's 0\.400 at theta_i 60 degrees", said)

@@ -177,6 +177,12 @@ def test_lost_light_is_reported(paint):
     assert not any("times the light" in line for line in fit(paint).warnings)
 
 
+def test_a_peak_that_is_missed_is_reported(paint):
+    lines = fit(paint, fix={"mx": 0.5}).warnings
+    assert any("of the measured peak" in line and "l2_ngan" in line for line in lines)
+    assert not any("of the measured peak" in line for line in fit(paint).warnings)
+
+
 def test_a_coupled_diffuse_term_is_recovered():
     coupled = PAINT.model_copy(update={"kd_coupled": True, "kd": (0.5,) * 3})
     samples = grey(coupled, FEW)

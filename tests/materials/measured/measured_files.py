@@ -62,10 +62,12 @@ def cornell_rows(value: float = 0.2, count: int = 60, wavelengths: int = 5) -> n
 GLOSSY = Material(name="glossy", kd=(0.3, 0.2, 0.1), lobes=(Lobe(k=(0.4, 0.4, 0.4), mx=0.2, my=0.2),))
 
 
-def zemax_text(evaluate, symmetry: str, kind: str = "BRDF", rotations: tuple[int, ...] = (0,)) -> str:
+def zemax_text(
+    evaluate, symmetry: str, kind: str = "BRDF", rotations: tuple[int, ...] = (0,), azimuth: tuple[int, ...] = ()
+) -> str:
     """A Zemax file of f(wi, wo) with 1 or 3 channels; below the horizon it has zeros, TIS is .5 throughout."""
     incident, radial = (10, 40, 70), np.array([0, 5, 15, 30, 50, 70, 90])
-    azimuth = np.arange(0, 181 if symmetry == "PlaneSymmetrical" else 360, 30)
+    azimuth = azimuth or tuple(range(0, 181 if symmetry == "PlaneSymmetrical" else 360, 30))
     r, a = (np.radians(grid) for grid in np.meshgrid(radial, azimuth))
     side = -1 if kind == "BTDF" else 1
     blocks = []

@@ -14,6 +14,8 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured import load
 from tests.materials.measured.measured_files import GLOSSY
 
+# of linear Rec. 709 (IEC 61966-2-1)
+D65_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 GRID = np.array(
     [(a, 0, b, c) for a in (0, 30, 60) for b in (0, 20, 40, 60) for c in (0, 60, 120, 180, 240, 300)], float
 )
@@ -67,6 +69,16 @@ def test_colour_and_spectra(tmp_path: Path) -> None:
         samples = load(path).samples()
         expected = MaterialBSDF(GLOSSY).eval(samples.wi, samples.wo) if "r" in names else 0.25
         np.testing.assert_allclose(samples.f, np.broadcast_to(expected, samples.f.shape), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("names", "matrix"), [("bsdf_X bsdf_Y bsdf_Z", D65_XYZ), ("brdf_r brdf_g brdf_b", np.eye(3))])
+def test_colours_below_the_angles_of_gonio_text(tmp_path: Path, names: str, matrix: np.ndarray) -> None:
+    """Other names of the quantity than that format's, or X, Y and Z, which become linear RGB."""
+    rgb = f_of(GRID)
+    text = table_text(f"theta_i phi_i theta_o phi_o {names}", np.column_stack([GRID, rgb @ matrix.T]))
+    (tmp_path / "a").write_text(text)
+    samples = load(tmp_path / "a").samples()
+    np.testing.assert_allclose(samples.f, MaterialBSDF(GLOSSY).eval(samples.wi, samples.wo), rtol=1e-3)
 
 
 def test_a_scan_in_the_plane_needs_no_phi(tmp_path: Path) -> None:

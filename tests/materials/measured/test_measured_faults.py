@@ -12,6 +12,7 @@ import pytest
 from lambent.core.directions import direction
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured import load
+from lambent.materials.measured.faults import too_bright
 from lambent.materials.measured.inspection import inspect_table
 from lambent.materials.measured.synthetic import ISOTROPIC, record, synthesise
 from tests.materials.measured.measured_files import GLOSSY
@@ -142,3 +143,8 @@ def peaks_of(curve: np.ndarray) -> int:
     """Local maxima above a fifth of the highest."""
     inner = curve[1:-1]
     return int(((inner > curve[:-2]) & (inner >= curve[2:]) & (inner > curve.max() / 5)).sum())
+
+
+def test_one_channel_that_returns_more_than_arrives_is_said() -> None:
+    (said,) = too_bright(np.array([10.0, 20.0, 30.0]), np.array([[0.5, 0.5, 0.5], [0.5, 1.2, 0.5], [1.1, 0.5, 0.5]]))
+    assert "1.2 of the light (green) at theta_i = 20 degrees" in said and "over 1 at 20, 30 degrees" in said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,8 @@ def test_lighttools(tmp_path: Path) -> None:
     check_lighttools(both, side=-1)
     assert any("from the back are not used" in note for note in both.info.notes)
     check_lighttools(load(written(tmp_path, lighttools(sides=("Back",)))), scale=10)
+    from_the_front = re.sub(r"AOI (\d+)", lambda aoi: f"AOI {180 - int(aoi[1])}", lighttools(sides=("Back",)))
+    check_lighttools(load(written(tmp_path, from_the_front)), scale=10)
 
 
 def test_lighttools_in_colour(tmp_path: Path) -> None:

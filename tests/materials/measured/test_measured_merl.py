@@ -36,6 +36,15 @@ def test_values_stand_at_bin_centres(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.eval(wi, wo)[seen], f[seen], rtol=1e-5)
 
 
+def test_the_last_bin_of_phi_d_is_followed_by_the_first(tmp_path: Path) -> None:
+    """phi_d and phi_d + pi are one pair of directions, exchanged: at 0 f lies between the last bin and the first."""
+    f = np.random.default_rng(2).uniform(0.1, 2, (*SHAPE, 3))
+    table = load(_saved(tmp_path / "a", f))
+    theta_h, theta_d, _ = (grid[4:8, 3:6, 0] for grid in _centres())
+    wi, wo = directions_of(theta_h, theta_d, np.full(theta_h.shape, 1e-9))
+    np.testing.assert_allclose(table.eval(wi, wo), f[4:8, 3:6, [0, -1]].mean(axis=2), rtol=1e-5)
+
+
 def test_bins_follow_the_square_root() -> None:
     """theta_h = floor(90 sqrt(2 theta_h / pi)): the map that MERL's own look-up code uses."""
     theta_h = np.radians([0.0, 0.02, 1.0, 22.5, 89.9])

@@ -18,7 +18,15 @@ from lambent.materials.measured.sheets import ScatteredSheet, Sheet
 from lambent.materials.measured.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.table import MARKS
 from tests.materials.measured.lbnl_files import lbnl_xml, words
-from tests.materials.measured.measured_files import cornell_rows, cornell_text, fred_text, merl_bytes, zemax_text
+from tests.materials.measured.measured_files import (
+    cornell_rows,
+    cornell_text,
+    fred_text,
+    merl_bytes,
+    rgl_fields,
+    tensor_bytes,
+    zemax_text,
+)
 
 COUNT = 12
 GREY, RGB = (TableInfo("a", "test", True, False, channels, "f") for channels in (1, 3))
@@ -37,6 +45,17 @@ def test_a_negative_channel_does_not_cost_the_tuple() -> None:
     assert samples.left_out.total == 0 and samples.counts["used"] == COUNT and samples.counts["below_zero"] == 8
     assert negative_readings(samples) == "8 of 12 tuples (67 %) are below zero: blue in 8, down to -0.005 /sr"
     assert negative_readings(collected(np.abs(f))) == ""
+
+
+def test_a_channel_that_is_negative_throughout_does_not_cost_the_file(tmp_path: Path) -> None:
+    fields = rgl_fields(np.zeros(1))
+    fields["rgb"][:, :, 2] = -0.005
+    (tmp_path / "yellow.bsdf").write_bytes(tensor_bytes(fields))
+    table = load(tmp_path / "yellow.bsdf")
+    samples = table.samples()
+    assert samples.left_out.not_finite == 0 and samples.counts["below_zero"] == samples.counts["used"] > 0
+    light = table.eval(samples.wi, samples.wo)
+    assert (light[:, :2] > 0).all() and (light[:, 2] == 0).all()
 
 
 def test_noise_keeps_its_mean() -> None:

@@ -58,6 +58,25 @@ def test_transmission_and_light_from_the_back(tmp_path: Path) -> None:
     assert any("turned over" in note for note in table.info.notes)
 
 
+def test_a_specimen_lit_from_the_back_is_turned_over_about_phi_0(tmp_path: Path) -> None:
+    """x stays, y and z change their signs, so that the sense of the azimuths does too."""
+    over = np.array([1, -1, -1])
+
+    def skewed(wi, wo):
+        return glossy(wi, wo) * (1.5 + 0.4 * wi[..., 1] + wo[..., 1])
+
+    text = "".join(
+        beam(180 - theta, phi, lambda wi, wo: skewed(wi * over, wo * over), "BSDF", head="#upphi 90\n")
+        for theta in (0, 40)
+        for phi in (range(0, 360, 30) if theta else (0,))
+    )
+    table = load(written(tmp_path, text))
+    assert table.symmetry == "none"
+    for phi_i, phi_o in ((0, 60), (120, 225), (120, 15)):
+        wi, wo = direction(np.radians(40), np.radians(phi_i)), direction(np.radians(36), np.radians(phi_o))
+        np.testing.assert_allclose(table.eval(wi, wo)[0], skewed(wi, wo), rtol=2e-3)
+
+
 def test_up_is_at_90_degrees(tmp_path: Path) -> None:
     """The same specimen, measured with up at 0 (the default) and at 90, is the same table."""
     tables = []

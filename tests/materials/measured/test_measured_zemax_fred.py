@@ -210,10 +210,11 @@ def test_weights_of_half_a_turn_are_those_of_the_whole(tmp_path: Path) -> None:
     assert total["PlaneSymmetrical"][1] < 0.65 * total["Asymmetrical"][1]
 
 
-def test_mirror_images_lie_across_the_plane_of_incidence(tmp_path: Path) -> None:
+@pytest.mark.parametrize("azimuth", [(), (0, 10, 30, 70, 130, 180)])
+def test_mirror_images_lie_across_the_plane_of_incidence(tmp_path: Path, azimuth: tuple[int, ...]) -> None:
     """Half a turn that is written becomes a whole one: f at azimuth -a is that at a, not at 180 - a."""
     path = tmp_path / "a"
-    path.write_text(zemax_text(tilted_lobe, "PlaneSymmetrical"))
+    path.write_text(zemax_text(tilted_lobe, "PlaneSymmetrical", azimuth=azimuth))
     table = load(path)
     for theta, (sheet,) in zip(table.theta_i_deg, table.reflected, strict=True):
         wo, f = sheet.directions, sheet.values

@@ -90,7 +90,7 @@ class _Reading:
             tuple(self._lights),
             tuple(self._cameras),
             tuple(self._gltf.files.sources),
-            (*self._warnings, *self._renamings(), *made.notes, *images.notes),
+            (*self._warnings, *self._renamings(), *made.notes, *images.notes, *self._gltf.files.notes),
             made.textures,
             variants=self._variants,
         )

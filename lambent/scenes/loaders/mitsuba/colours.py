@@ -82,7 +82,7 @@ def _file(element: Element, document: Document, emitted: bool) -> Floats:
     written = element.attributes["filename"]
     path = document.files.path(written, element.file, f"line {element.line} <{element.tag}> filename")
     if not path.is_file():
-        raise element.error("file not found", got=written)
+        raise element.error(f"file not found: {written}")
     lines = read_bytes(path, SPECTRUM_BYTES).decode("utf-8", "replace").splitlines()
     rows = [line.replace(",", " ").split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     try:

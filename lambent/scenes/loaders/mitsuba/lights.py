@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from lambent.core.camera import Camera
 from lambent.core.directions import Floats, normalize
+from lambent.core.photometry import LM_PER_W
 from lambent.core.plain import Triple, triple
 from lambent.scenes.loaders.contents import DAYLIGHT
 from lambent.scenes.loaders.mitsuba.textures import colour
 from lambent.scenes.loaders.mitsuba.values import Plugin
 from lambent.scenes.loaders.surfaces.surface import rgb
 from lambent.scenes.scene import (
+    LEAST_SUN_DEG,
+    MOST_SUN_DEG,
+    SUN_RADIUS_DEG,
     ConstantEnvironment,
     DirectionalLight,
     Environment,
@@ -25,6 +30,7 @@ from lambent.scenes.scene import (
 
 ENVIRONMENTS = ("envmap", "constant", "sunsky", "sky", "sun")
 UPRIGHT = 0.9995  # cosine of a tilt that does not matter
+SKY_UNIT = 683.0 * 106.856 / LM_PER_W  # W/(sr m^2) of 1 W/(sr m^2 nm): what a file with a sky has all its light in
 
 
 def environment_of(plugin: Plugin, world: Floats) -> Environment | None:
@@ -77,20 +83,32 @@ def _daylight(plugin: Plugin, world: Floats, matrix: Floats) -> SunSky:
         plugin.note("its sun is below the horizon: it stands on it")
         towards = normalize(np.array([towards[0] + 1e-9, 0.0, towards[2]]))
     scale = plugin.number("scale", 1.0)
-    plugin.ignore("resolution", "sun_radius_scale", "stretch", "sun_aperture")
+    plugin.ignore("resolution", "stretch")
+    plugin.note("a diffuse ground of its albedo lies below the horizon, where Mitsuba has none")
     return SunSky(
         triple(towards),
         turbidity=min(max(plugin.number("turbidity", 3.0), 1.0), 10.0),
         albedo=float(np.clip(colour(plugin, "albedo", 0.3).mean.mean(), 0, 1)),
         sun_scale=0.0 if plugin.type == "sky" else scale * plugin.number("sun_scale", 1.0),
         sky_scale=0.0 if plugin.type == "sun" else scale * plugin.number("sky_scale", 1.0),
+        sun_radius_deg=_sun_radius_deg(plugin),
     )
 
 
-def light_of(plugin: Plugin, world: Floats) -> Light | None:
+def _sun_radius_deg(plugin: Plugin) -> float:
+    """Of `sunRadiusScale` (0.6) or `sun_aperture`, the whole angle in degrees (3); neither changes the sun's power."""
+    aperture_deg = plugin.number("sun_aperture", 2 * SUN_RADIUS_DEG)
+    wanted = aperture_deg / 2 * plugin.number("sun_radius_scale", 1.0)
+    radius_deg = min(max(wanted, LEAST_SUN_DEG), MOST_SUN_DEG)
+    if radius_deg != wanted:
+        plugin.note(f"its sun's radius of {wanted:g} degrees is {radius_deg:g} here")
+    return radius_deg
+
+
+def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | None:
     """A light without extent; None, and a warning, if its kind is unknown."""
     matrix = world @ plugin.transform()
-    made: Light
+    made: PointLight | DirectionalLight
     if plugin.type == "point":
         position = plugin.vector("position")
         at = matrix[:3, 3] if position is None else matrix[:3, :3] @ position + matrix[:3, 3]
@@ -111,6 +129,18 @@ def light_of(plugin: Plugin, world: Floats) -> Light | None:
         return None
     plugin.note_unread()
     return made
+
+
+def in_sky_units(light: PointLight | DirectionalLight) -> Light:
+    """A light of a file that has a sky."""
+    if isinstance(light, PointLight):
+        return replace(light, intensity=scaled(light.intensity))
+    return replace(light, irradiance=scaled(light.irradiance))
+
+
+def scaled(light: Triple) -> Triple:
+    """Light of a file that has a sky, in Lambent's units."""
+    return triple(SKY_UNIT * np.array(light))
 
 
 def emission_of(shape: Plugin) -> Triple:

@@ -26,7 +26,7 @@ from lambent.scenes.loaders.mitsuba.values import Plugin, Reading, children_of
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.surfaces.made_materials import MadeMaterials
 from lambent.scenes.loaders.surfaces.surface import Surface
-from lambent.scenes.scene import Environment, Light, SceneObject
+from lambent.scenes.scene import DirectionalLight, Environment, Light, PointLight, SceneObject, SunSky
 
 GROUPS = ("shapegroup", "instance", "merge")
 LEVEL = 0.05  # how far from horizontal a camera's sideways axis may lie along the axis that is up
@@ -69,7 +69,11 @@ class _Scene:
             self._add_shape(shape, self._world)
         if not self._objects:
             raise UserError("holds no triangles", file=self._path, hint="; ".join(self._notes()) or None)
-        environment, point_lights = self._lights()
+        environment, found = self._lights()
+        point_lights: list[Light] = [*found]
+        if isinstance(environment, SunSky):
+            point_lights = [lights.in_sky_units(light) for light in found]
+            self._take_sky_units(bool(found))
         cameras = self._cameras(sensors)
         self._say_the_rest()
         return Contents(
@@ -85,7 +89,7 @@ class _Scene:
         )
 
     def _notes(self) -> list[str]:
-        return self._warnings + self._reading.notes + self._reading.images.notes
+        return [*self._warnings, *self._reading.notes, *self._reading.images.notes, *self._reading.files.notes]
 
     def _add_shape(self, shape: Plugin, world: Floats) -> None:
         if shape.type == "instance":
@@ -138,9 +142,9 @@ class _Scene:
             self._made.make(name, lambda _: Surface.grey() if bsdf is None else surface_of(bsdf))
         return self._by_element[key]
 
-    def _lights(self) -> tuple[Environment | None, list[Light]]:
+    def _lights(self) -> tuple[Environment | None, list[PointLight | DirectionalLight]]:
         environment: Environment | None = None
-        found: list[Light] = []
+        found: list[PointLight | DirectionalLight] = []
         for plugin in children_of(self._reading, "emitter"):
             if plugin.type not in lights.ENVIRONMENTS:
                 light = lights.light_of(plugin, self._world)
@@ -150,6 +154,12 @@ class _Scene:
             else:
                 environment = lights.environment_of(plugin, self._world)
         return environment, found
+
+    def _take_sky_units(self, lit: bool) -> None:
+        """Bring emission beside a sky into its unit: Mitsuba has all light in W/(sr m^2 nm) then."""
+        if lit or any(any(o.emission) for o in self._objects):
+            self._warnings.append("its lamps are taken to be in the unit of its sky, W/(sr m2 nm): 1 is 73 kcd/m2")
+        self._objects = [replace(o, emission=lights.scaled(o.emission)) for o in self._objects]
 
     def _cameras(self, sensors: list[Plugin]) -> list[Camera]:
         names = UniqueNames()

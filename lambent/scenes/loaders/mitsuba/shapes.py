@@ -20,6 +20,12 @@ from lambent.scenes.scene import Mesh
 
 AROUND, ROWS = 80, 40  # quads of a sphere
 UNSCALED = 1e-18  # determinant of a transform that leaves nothing
+
+
+class MissingFile(Exception):
+    """The file of a shape is not there; its name as written."""
+
+
 Made = tuple[Mesh | None, list[str], bool]  # the mesh, notes of repairs, whether its normals come from its faces
 
 
@@ -38,7 +44,11 @@ def mesh_of_shape(plugin: Plugin, name: str, world: Floats, known: dict[int, Mad
         plugin.ignore("center", "radius", "p0", "p1", "filename", "shape_index", "face_normals", "flip_tex_coords")
         notes = []
     else:
-        local, notes, from_faces = known[key] = make(plugin, name)
+        try:
+            made: Made = make(plugin, name)
+        except MissingFile as missing:
+            made = None, [f"{name}: left out, its file {missing} is not there"], False
+        local, notes, from_faces = known[key] = made
     if local is None:
         return None, notes
     if abs(np.linalg.det(to_world[:3, :3])) < UNSCALED:
@@ -101,7 +111,7 @@ def _turned(uv: Floats) -> Floats:
 def _file(plugin: Plugin) -> Path:
     path = plugin.file()
     if not path.is_file():
-        raise plugin.element.error("file not found", got=plugin.text("filename"))
+        raise MissingFile(plugin.text("filename"))
     return plugin.reading.files.use(path)
 
 

@@ -65,7 +65,7 @@ class Library:
 
     @property
     def warnings(self) -> list[str]:
-        return [*self._notes, *self.made.notes, *self._images.notes]
+        return [*self._notes, *self.made.notes, *self._images.notes, *self._files.notes]
 
     def add(self, obj: Path, names: str, line: int) -> None:
         """Read the libraries that a line names: one name with blanks in it, or several."""

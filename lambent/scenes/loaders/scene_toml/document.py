@@ -13,18 +13,38 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from lambent.core.camera import overview
 from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
+from lambent.core.geometry import triangle_areas
 from lambent.core.inputs import read_bytes, read_head
 from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
-from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.ies import read_ies
+from lambent.scenes.loaders.contents import DAYLIGHT, Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
-from lambent.scenes.loaders.scene_toml.schema import GeometrySection, ImageSection, SceneDocument, known_keys
-from lambent.scenes.scene import Environment, ImageEnvironment, PointLight, ReflectorRule, Scene, SceneObject
+from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
+from lambent.scenes.loaders.scene_toml.schema import (
+    GeometrySection,
+    ImageSection,
+    ObjectSection,
+    SceneDocument,
+    known_keys,
+)
+from lambent.scenes.scene import (
+    Environment,
+    ImageEnvironment,
+    Light,
+    Mesh,
+    PointLight,
+    ReflectorRule,
+    Scene,
+    SceneObject,
+    bounds_of,
+)
 
 _DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
@@ -39,7 +59,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         Where the file is not TOML, has an unknown key or an impossible value, or names what is not there.
     """
     document, files = _parse(path), SceneFiles(path)
-    contents = [_geometry(entry, path, files, read_geometry) for entry in document.geometry]
+    there, missing = _there(document, path, files)
+    contents = [_geometry(entry, path, files, read_geometry) for entry in there]
     for source in (s for c in contents for s in c.sources):
         files.use(source)
     environment = _environment(document, path, files) or next((c.environment for c in contents if c.environment), None)
@@ -53,6 +74,10 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     if isinstance(environment, ImageEnvironment):
         files.use(environment.file)
     cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
+    lights = (*(light for c in contents for light in c.lights), *_lights(document, path, files))
+    notes = (*whole.warnings, *unfit, *missing)
+    if environment is None and not lights and not any(any(o.emission) for o in objects):
+        environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
     _check_names([c.name for c in cameras], path, "cameras")
     _check_names([p.name for p in document.paths], path, "paths")
     return Scene(
@@ -60,18 +85,32 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         objects=objects,
         materials=materials,
         environment=environment,
-        lights=(*(light for c in contents for light in c.lights), *(section.light() for section in document.lights)),
-        cameras=cameras,
+        lights=lights,
+        cameras=cameras or (overview(*bounds_of(objects)),),
         paths=tuple(section.path() for section in document.paths),
-        exposure_ev=document.exposure_ev,
+        exposure_ev=document.exposure,
         sources=tuple(files.sources),
-        warnings=(*whole.warnings, *unfit),
+        warnings=(*notes, *files.notes),
         textures={name: t for name, t in whole.textures.items() if name not in described},
         measured=_measured(document, materials, path, files),
         probe_planes=planes,
         probe_centres=centres,
         reflector_rules=_reflector_rules(document, objects, path),
+        crease_deg=document.crease_angle,
     )
+
+
+def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[str | GeometrySection], list[str]]:
+    """The geometry files that are there, and a note of each that is not; a `UserError` where none is."""
+    names = [entry if isinstance(entry, str) else entry.file for entry in document.geometry]
+    gone = [
+        name for name in names
+        if not name.startswith("builtin:") and not files.path(name, path, "geometry").is_file()
+    ]  # fmt: skip
+    if len(gone) == len(names):
+        raise UserError(f"names no file that is there: {', '.join(gone)}", file=path, field="geometry")
+    there = [entry for entry, name in zip(document.geometry, names, strict=True) if name not in gone]
+    return there, [f"geometry {name} is not there: left out" for name in gone]
 
 
 def _parse(path: Path) -> SceneDocument:
@@ -164,8 +203,10 @@ def _apply(
     for pattern, section in document.objects.items():
         settings = section.model_dump(exclude_none=True)
         centre, own_planes = settings.pop("probe_centre", None), settings.pop("probe_planes", None)
+        for key in ("luminance", "lumens", "colour"):
+            settings.pop(key, None)
         for name in fitting(pattern, by_name, path, f"objects.{pattern}"):
-            by_name[name] = replace(by_name[name], **settings)
+            by_name[name] = replace(by_name[name], **settings, **_light_of(by_name[name].mesh, section))
             if centre is not None:
                 centres[name] = centre
             if own_planes is not None:
@@ -187,13 +228,36 @@ def _unit_planes(planes: Any) -> Any:
     return array / np.linalg.norm(array[:, :3], axis=-1, keepdims=True)
 
 
+def _lights(document: SceneDocument, path: Path, files: SceneFiles) -> list[Light]:
+    found: list[Light] = []
+    for section in document.lights:
+        if isinstance(section, IesSection):
+            file = files.path(section.file, path, "lights.file")
+            if not file.is_file():
+                raise UserError("file not found", file=path, field="lights.file", got=section.file)
+            files.use(file)
+            found.append(section.luminaire(read_ies(file)))
+        else:
+            found.append(section.light())
+    return found
+
+
+def _light_of(mesh: Mesh, section: ObjectSection) -> dict[str, Any]:
+    """The emission of an object that its section says in photometric units."""
+    if section.luminance is None and section.lumens is None:
+        return {}
+    area_m2 = float(triangle_areas(mesh.corners).sum())
+    of_flux = (section.lumens or 0.0) / max(np.pi * area_m2, 1e-12)
+    return {"emission": coloured(section.luminance if section.luminance is not None else of_flux, section.colour)}
+
+
 def _environment(document: SceneDocument, path: Path, files: SceneFiles) -> Environment | None:
     section = document.environment
     if not isinstance(section, ImageSection):
         return None if section is None else section.environment()
     file = files.path(section.file, path, "environment.file")
     if not file.is_file():
-        raise UserError("file not found", file=path, field="environment.file", got=section.file)
+        raise UserError(f"file not found: {section.file}", file=path, field="environment.file")
     return ImageEnvironment(file, section.scale, section.rotation_deg, section.layout, section.up)
 
 

@@ -4,37 +4,36 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
-from lambent.core.plain import Triple, triple
+from lambent.core.exposure import exposure_of
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.interiors import INTERIORS
-from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, DirectionalLight, PointLight, SunSky
+from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
+from lambent.scenes.loaders.scene_toml.sections import (
+    Colour,
+    Finite,
+    NotNegative,
+    Place,
+    Plane,
+    Positive,
+    Section,
+    Vector,
+    not_zero,
+    unit,
+)
+from lambent.scenes.scene import (
+    LEAST_SUN_DEG,
+    MOST_SUN_DEG,
+    SUN_RADIUS_DEG,
+    ComputedEnvironment,
+    ConstantEnvironment,
+    Ground,
+    SunSky,
+)
 
 FORMAT = "lambent-scene"
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Vector = tuple[Finite, Finite, Finite]
-Colour = tuple[NotNegative, NotNegative, NotNegative]
-Plane = tuple[Finite, Finite, Finite, Finite]
-
-
-def _not_zero(vector: Any) -> Any:
-    if not any(vector):
-        raise ValueError("a direction cannot be zero")
-    return vector
-
-
-def _unit(vector: Triple) -> Triple:
-    return triple(np.asarray(vector, float) / np.linalg.norm(vector))
-
-
-class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class GeometrySection(Section):
@@ -53,16 +52,18 @@ class SunSkySection(Section):
     albedo: Annotated[float, Field(ge=0, le=1)] = 0.3
     sun_scale: NotNegative = 1.0
     sky_scale: NotNegative = 1.0
+    sun_radius_deg: Annotated[float, Field(ge=LEAST_SUN_DEG, le=MOST_SUN_DEG)] = SUN_RADIUS_DEG
+    ground: Ground = "diffuse"
 
     @field_validator("sun_direction")
     @classmethod
     def _above_horizon(cls, vector: Any) -> Any:
         if vector[1] < 0:
             raise ValueError("the sun is below the horizon (its y is negative)")
-        return _not_zero(vector)
+        return not_zero(vector)
 
     def environment(self) -> SunSky:
-        return SunSky(_unit(self.sun_direction), self.turbidity, self.albedo, self.sun_scale, self.sky_scale)
+        return SunSky(**{**self.model_dump(exclude={"kind"}), "sun_direction": unit(self.sun_direction)})
 
 
 class ImageSection(Section):
@@ -107,65 +108,33 @@ class ObjectSection(Section):
     """Settings of the objects whose name fits a pattern; those left out stay as in the geometry file."""
 
     material: str | None = None
-    emission: Colour | None = None
+    emission: Colour | None = None  # W/(sr m^2); or luminance, cd/m^2; or lumens of each object, with a colour
+    luminance: NotNegative | None = None
+    lumens: NotNegative | None = None
+    colour: Colour | None = None
     light_map_scale: Positive | None = None
     probe_centre: Vector | None = None
     probe_planes: tuple[Plane, ...] | None = None
+
+    @model_validator(mode="after")
+    def _one_light(self) -> ObjectSection:
+        one_of(self, "emission", "luminance", "lumens", needed=False)
+        return self
 
     @field_validator("probe_planes")
     @classmethod
     def _planes(cls, planes: Any) -> Any:
         for plane in planes or ():
-            _not_zero(plane[:3])
+            not_zero(plane[:3])
         return planes
-
-
-class PointSection(Section):
-    kind: Literal["point"]
-    position: Vector
-    intensity: Colour
-
-    def light(self) -> PointLight:
-        return PointLight(self.position, self.intensity)
-
-
-class SpotSection(Section):
-    kind: Literal["spot"]
-    position: Vector
-    intensity: Colour
-    direction: Vector
-    inner_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
-    outer_deg: Annotated[float, Field(gt=0, le=90)] = 45.0
-
-    _direction = field_validator("direction")(_not_zero)
-
-    @model_validator(mode="after")
-    def _cone(self) -> SpotSection:
-        if self.inner_deg > self.outer_deg:
-            raise ValueError("inner_deg is larger than outer_deg")
-        return self
-
-    def light(self) -> PointLight:
-        return PointLight(self.position, self.intensity, _unit(self.direction), self.inner_deg, self.outer_deg)
-
-
-class DirectionalSection(Section):
-    kind: Literal["directional"]
-    direction: Vector
-    irradiance: Colour
-
-    _direction = field_validator("direction")(_not_zero)
-
-    def light(self) -> DirectionalLight:
-        return DirectionalLight(_unit(self.direction), self.irradiance)
 
 
 class ViewSection(Section):
     """A camera without a name."""
 
-    position: Vector
-    target: Vector
-    up: Vector = (0.0, 1.0, 0.0)
+    position: Place
+    target: Place
+    up: Place = (0.0, 1.0, 0.0)
     fov_y_deg: Annotated[float, Field(ge=1, le=150)] = 45.0
 
     @model_validator(mode="after")
@@ -202,7 +171,7 @@ class ReflectorSection(Section):
     @classmethod
     def _plane(cls, plane: Any) -> Any:
         if plane is not None:
-            _not_zero(plane[:3])
+            not_zero(plane[:3])
         return plane
 
 
@@ -216,17 +185,30 @@ class SceneDocument(Section):
     version: Literal[1]
     name: str = "scene"
     geometry: Annotated[tuple[str | GeometrySection, ...], Field(min_length=1)]
-    exposure_ev: Annotated[float, Field(ge=-30, le=30)] = 0.0
+    exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
+    exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None
     environment: Annotated[EnvironmentSection, Field(discriminator="kind")] | None = None
+    crease_angle: Annotated[float, Field(ge=0, le=180)] | None = None  # degrees; edges of larger ones are hard
     variant: str | None = None  # a material set of the geometry files
     materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
     measured: dict[str, str] = Field(default_factory=dict)  # material -> file of the table it scatters by in bakes
     assign: dict[str, str] = Field(default_factory=dict)  # pattern over objects and materials -> material
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
-    lights: tuple[Annotated[PointSection | SpotSection | DirectionalSection, Field(discriminator="kind")], ...] = ()
+    lights: tuple[Annotated[LightSection, Field(discriminator="kind")], ...] = ()
     cameras: tuple[CameraSection, ...] = ()
     reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()
+
+    @property
+    def exposure(self) -> float | None:
+        """Stops on radiance; None: by the first picture."""
+        return self.exposure_ev if self.exposure_ev100 is None else exposure_of(self.exposure_ev100)
+
+    @model_validator(mode="after")
+    def _one_exposure(self) -> SceneDocument:
+        if self.exposure_ev is not None and self.exposure_ev100 is not None:
+            raise ValueError("says its exposure twice, by exposure_ev and exposure_ev100")
+        return self
 
     @field_validator("geometry", mode="before")
     @classmethod

@@ -6,7 +6,7 @@ from imgui_bundle import imgui
 
 from lambent.bake.interreflection.proposal import Proposal
 from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN, Bounced
-from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, explain, wrapped
+from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, wrapped
 
 SHARES = ("in view", "passes on")
 MOST_ROWS = 8  # of materials, before they scroll
@@ -16,17 +16,18 @@ def draw_interreflections(bounced: Bounced) -> None:
     """The choice and its costs, then the bake, then what is shown."""
     imgui.begin_disabled(bounced.baking is not None)
     series = SERIES if bounced.series in SERIES else (*SERIES, bounced.series)
-    bounced.change(choice("series", bounced.series, series))
-    explain("bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo")
-    bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES]))
+    meaning = "bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo"
+    bounced.change(choice("series", bounced.series, series, meaning))
+    meaning = "paths per pixel that the bake ends with"
+    bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES], meaning))
     if bounced.proposal is not None and bounced.fixed is not None:
         _draw_materials(bounced, bounced.proposal, bounced.fixed)
     imgui.end_disabled()
     wanted = bounced.samples < bounced.wanted
     buttons([
         ("continue" if bounced.samples else "bake", not bounced.on and wanted, bounced.start,
-         "in the background; the picture is shown after every pass, with less noise each time"),
-        ("stop", bounced.on, bounced.stop, "finished passes stay"),
+         "bakes in the background; the picture is shown after every pass, with less noise each time"),
+        ("stop", bounced.on, bounced.stop, "ends the bake; finished passes stay"),
     ])  # fmt: skip
     if bounced.baking is None:  # below the buttons, which stay where they are
         _draw_costs(bounced)
@@ -35,8 +36,8 @@ def draw_interreflections(bounced: Bounced) -> None:
         noise = f", noise {bounced.noise:.1%} of the mean" if bounced.noise is not None else ""
         lines.append(f"{bounced.samples} samples a pixel{noise}")
     wrapped(lines, DIM)
-    bounced.shown = choice("shown", bounced.shown, list(SHOWN))
-    explain("light that met so many surfaces; each is shown once it is baked")
+    meaning = "light that met so many surfaces; each is shown once it is baked"
+    bounced.shown = choice("shown", bounced.shown, list(SHOWN), meaning)
     wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
 
 
@@ -54,8 +55,8 @@ def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str])
     imgui.table_headers_row()
     for row in proposal.rows:
         imgui.table_next_column()
-        edited = check(f"{row.material}##edited", row.material not in fixed)
-        explain("edits of it change the light on other surfaces; else it scatters there as it is in the scene")
+        meaning = "edits of it change the light on other surfaces; else it scatters there as it is in the scene"
+        edited = check(f"{row.material}##edited", row.material not in fixed, meaning)
         if edited != (row.material not in fixed):
             bounced.choose(row.material, edited)
         for share in (row.in_view, row.passed_on):

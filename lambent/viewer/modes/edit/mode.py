@@ -27,6 +27,7 @@ SHORTCUTS = (
     ("Tab", "the next material"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
     ("Ctrl+S", "save the session"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show everything but the picture"),
 )
@@ -97,9 +98,7 @@ class EditMode(Mode):
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
-        outline = textures.get("outline")
-        if outline is not None and state.outlined:
-            imgui.get_background_draw_list().add_image(outline, place.point(0, 0), place.point(1, 1))
+        overlay.over(place, textures.get("outline") if state.outlined else None)
         if state.pointed is not None:
             x, y = imgui.get_mouse_pos()
             shadowed(imgui.get_background_draw_list(), (x + 14, y + 4), state.pointed[1], (1, 1, 1, 1))
@@ -127,6 +126,13 @@ class EditMode(Mode):
     def drop(self, path: str) -> None:
         self.state.files.open(path, self.state.material)
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        return ("the session",) if self.state.files.unsaved else ()
+
+    def save(self) -> None:
+        self.state.files.save()
+
     def rescue(self) -> None:
         rescued("the unsaved session", self.state.files.rescue)
         self.state.stop_baking()
@@ -138,11 +144,16 @@ class EditMode(Mode):
 def columns(state: EditState) -> tuple[Panel, ...]:
     """The column, each panel on the state."""
     return (
-        Panel("Scene", partial(panels.draw_scene, state), opened=True),
-        Panel("Interreflections", partial(draw_interreflections, state.bounced)),
-        Panel("Compare", partial(panels.draw_compare, state), opened=True),
-        Panel("Save", partial(panels.draw_files, state), opened=True),
-        Panel("Material", partial(panels.draw_material, state, panels.Curves(state)), opened=True),
-        Panel("View", partial(panels.draw_look, state), opened=True),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+        Panel(
+            "Material",
+            partial(panels.draw_material, state, panels.Curves(state)),
+            "the selected material and its curves",
+            opened=True,
+        ),
+        Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
+        Panel("Compare", partial(panels.draw_compare, state), "the picture against an earlier state", opened=True),
+        Panel("Save", partial(panels.draw_files, state), "the session, and the material as a document", opened=True),
+        Panel("Interreflections", partial(draw_interreflections, state.bounced), "light that met other surfaces"),
+        Panel("Scene", partial(panels.draw_scene, state), "the view, its light, and its transport", opened=True),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )

@@ -6,7 +6,6 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from lambent.viewer.look import VIEW_TRANSFORMS
 from lambent.viewer.modes.edit.curves.editor import CurveEditor
 from lambent.viewer.modes.edit.state import OFF, EditState
 from lambent.viewer.panels import look as looks
@@ -17,11 +16,14 @@ from lambent.viewer.panels.widgets import (
     check,
     choice,
     coloured,
-    explain,
+    press,
     rows,
     typed_field,
     wrapped,
 )
+
+HISTORY = ("undo", "redo")
+LEAST_CHOICE_PX = 80.0
 
 
 def draw_scene(state: EditState) -> None:
@@ -38,7 +40,17 @@ def draw_scene(state: EditState) -> None:
         coloured(state.baking.line, DIM)
         imgui.pop_text_wrap_pos()
     wrapped([line for line in (state.trouble, *state.subject.scene.warnings[:3]) if line], AMBER)
-    text = typed_field("environment", state.files.typed, "light", "another .hdr or .exr, lat-long...")
+    text = typed_field(
+        "environment",
+        state.files.typed,
+        "light",
+        "another .hdr or .exr, lat-long...",
+        "lights the scene with an image from then on; this can be undone",
+    )
+    if text is not None:
+        state.files.open(text, state.material)
+    meaning = "lets the material begin as something else; a file can be dropped onto the window, too"
+    text = typed_field("become", state.files.typed, "open", "a material document or a table...", meaning)
     if text is not None:
         state.files.open(text, state.material)
 
@@ -50,35 +62,36 @@ def draw_material(state: EditState, curves: Curves) -> None:
         return
     if state.material not in names:
         state.material = names[0]
-    chosen = choice("material", state.material, names)
+    meaning = "the material whose curves are pulled (Tab takes the next)"
+    room = imgui.get_content_region_avail().x - sum(imgui.calc_text_size(word).x for word in ("material", *HISTORY))
+    room -= 2 * imgui.get_style().item_spacing.x + 6 * imgui.get_style().frame_padding.x
+    chosen = choice("material", state.material, names, meaning, max(room, LEAST_CHOICE_PX))
     if chosen != state.material:
         state.select(chosen)
+    if room >= LEAST_CHOICE_PX:
+        imgui.same_line()
+    history, session = state.session.history, state.session
+    buttons([
+        (HISTORY[0], history.can_undo, session.undo, "takes back the last step (Ctrl+Z)"),
+        (HISTORY[1], history.can_redo, session.redo, "does the step again (Ctrl+Shift+Z)"),
+    ])  # fmt: skip
     fixed = state.session.original(chosen).fixed
     if fixed:
         coloured(f"stays as it is: {', '.join(fixed)}", DIM)
-    history, session = state.session.history, state.session
-    buttons([
-        ("undo", history.can_undo, session.undo, "Ctrl+Z"),
-        ("redo", history.can_redo, session.redo, "Ctrl+Shift+Z"),
-    ])  # fmt: skip
     curves.draw(chosen)
-    text = typed_field("become", state.files.typed, "open", "a material document or a table...")
-    explain("let the material begin as something else; a file can be dropped onto the window, too")
-    if text is not None:
-        state.files.open(text, state.material)
 
 
 def draw_compare(state: EditState) -> None:
     """What the picture A shows, and whether B shows its difference to A."""
     compared = state.compared
     before = compared.chosen
-    compared.chosen = choice("A", compared.chosen, compared.choices)
+    compared.chosen = choice("A", compared.chosen, compared.choices, "what the picture is held against")
     compared.divider.a_label, compared.divider.b_label = compared.chosen, "now"
-    buttons([("snapshot", bool(state.now), lambda: compared.keep(state.now), "keep this state, to compare with")])
+    buttons([("snapshot", bool(state.now), lambda: compared.keep(state.now), "keeps this state, to compare with")])
     imgui.same_line()
     imgui.begin_disabled(compared.chosen == OFF)
-    shown = check("difference", state.is_difference)
-    explain("by how much the picture is above A, in false colours: blue is darker, orange brighter, black the same")
+    meaning = "shows how much the picture is above A, in false colours: blue is darker, orange brighter, black the same"
+    shown = check("difference", state.is_difference, meaning)
     if compared.chosen != OFF:
         compared.is_difference = shown
     imgui.end_disabled()
@@ -86,28 +99,28 @@ def draw_compare(state: EditState) -> None:
         compared.scale = None
     if state.is_difference:
         imgui.same_line()
-        if imgui.button("fit scale"):
+        if press("fit scale", "sets the colours' range to the largest difference but the outermost half percent"):
             compared.scale = None
-        explain("colours up to the largest difference but the outermost half percent")
 
 
 def draw_look(state: EditState) -> None:
     """Exposure, view transform, size."""
     look = state.look
     looks.draw_exposure(look)
-    look.view_transform = choice("transform", look.view_transform, VIEW_TRANSFORMS)
+    looks.draw_transform(look)
     if look.is_false_coloured:
         looks.draw_range(look, state.screen)
-    state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact)
+    meaning = "shows the picture unscaled, instead of as large as the window allows"
+    state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact, meaning)
 
 
 def draw_files(state: EditState) -> None:
     """The session, and the material as a document."""
     files = state.files
     buttons([
-        ("save session", True, files.save, "Ctrl+S; never onto a file that it did not come from"),
+        ("save session", True, files.save, "saves the session (Ctrl+S), never onto a file that it did not come from"),
         ("hand over", not files.busy and bool(state.material), lambda: files.hand_over(state.material),
-         "save the material as a document that every other command opens; lobes are fitted where needed"),
+         "saves the material as a document that every other command opens; lobes are fitted where needed"),
     ])  # fmt: skip
     if files.home is not None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, SignedRange
 from lambent.core.photometry import photometric
 from lambent.editing.document import SessionDocument
@@ -76,7 +77,8 @@ class EditState:
         backend: Backend | None = None,
     ) -> None:
         self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
-        self.look = Look(exposure_ev=subject.scene.exposure_ev, shows=("full",))
+        self.look = Look(exposure_ev=subject.scene.exposure_ev or 0.0, shows=("full",))
+        self._metered = subject.scene.exposure_ev is not None
         self.pixel_exact = False
         self.material = next(iter(self.session.document.materials), "")
         self.pointed: tuple[str, str] | None = None  # object and material under the mouse
@@ -181,6 +183,9 @@ class EditState:
         compared, frame = self.compared, self.painter.frame
         if frame is not None and frame.wish is self._wish and frame.settled:
             compared.fit(frame)
+            if not self._metered:
+                self._metered = True
+                look.exposure_ev = metered(frame.radiance) or 0.0
         wish = Wish(
             self._now, compared.materials, compared.chosen == DIRECT, compared.scale if self.is_difference else None,
             look.view_transform, look.exposure_ev, look.scale, surfaces,

@@ -24,7 +24,7 @@ from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels import editing, overlay, statistics
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels.plots import beside
-from lambent.viewer.panels.widgets import check, choice, explain, rows, typed_field
+from lambent.viewer.panels.widgets import check, choice, rows, typed_field
 from lambent.viewer.screen import Screen
 from lambent.viewer.work import POLL_S
 
@@ -36,6 +36,7 @@ SHORTCUTS = (
     ("Ctrl+click on a slider", "type a number"),
     ("Ctrl+Z, Ctrl+Shift+Z", "undo, redo a step"),
     ("Ctrl+S", "save the material"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show everything but the picture"),
 )
@@ -131,6 +132,13 @@ class MaterialMode(Mode):
     def drop(self, path: str) -> None:
         self.state.editor.files.open(path)
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        return (self.title,) if self.state.editor.subject.unsaved else ()
+
+    def save(self) -> None:
+        self.state.editor.save()
+
     def rescue(self) -> None:
         subject = self.state.editor.subject
         names = [subject.name] if subject.unsaved else []
@@ -138,7 +146,7 @@ class MaterialMode(Mode):
 
     def close(self) -> None:
         self.state.editor.close()
-        if self.state.editor.subject.unsaved:
+        if self.unsaved:
             sys.stderr.write(f"lambent: note: {self.title} was changed and not saved\n")
 
 
@@ -146,22 +154,24 @@ def panels(state: MaterialState) -> tuple[Panel, ...]:
     """The column, each panel on the parts of the state that it needs."""
     editor = state.editor
     return (
-        Panel("Material", partial(editing.draw, editor), opened=True),
-        Panel("Fit", partial(editing.draw_fit, editor), opened=True),
-        Panel("Preview", partial(draw_preview, state.preview, editor, state.look), opened=True),
-        Panel("View", partial(looks.draw, state.look, state.screen)),
-        Panel("Statistics", partial(statistics.draw, state.screen, editor)),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+        Panel("Material", partial(editing.draw, editor), "every number of the material", opened=True),
+        Panel("Fit", partial(editing.draw_fit, editor), "numbers that come nearest to the measurement", opened=True),
+        Panel("Preview", partial(draw_preview, state.preview, editor, state.look), "a shape in its light", opened=True),
+        Panel("View", partial(looks.draw, state.look, state.screen), "how the preview is drawn"),
+        Panel("Statistics", partial(statistics.draw, state.screen, editor), "cost of the last frame"),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )
 
 
 def draw_preview(preview: Preview, editor: Editor, look: Look) -> None:
     """The shape, its light, and the exposure."""
-    preview.shape = choice("shape", preview.shape, tuple(SHAPES))
-    preview.environment = choice("light", preview.environment, preview.environments)
-    explain("every environment is scaled to the same mean radiance")
-    text = typed_field("environment", editor.files.typed, "add", "another .hdr or .exr, lat-long, angular or cube...")
+    looks.draw_exposure(look, "##preview")
+    preview.shape = choice("shape", preview.shape, tuple(SHAPES), "what wears the material")
+    meaning = "the environment around it; every one is scaled to the same mean radiance"
+    preview.environment = choice("light", preview.environment, preview.environments, meaning)
+    hint = "another .hdr or .exr, lat-long, angular or cube..."
+    text = typed_field("environment", editor.files.typed, "add", hint, "adds an environment to the list, and shows it")
     if text is not None:
         editor.files.open(text)
-    looks.draw_exposure(look, "##preview")
-    editor.plots.visible = check("disks and curves beside the picture", editor.plots.visible)
+    meaning = "shows the plots of the material and of its measurement"
+    editor.plots.visible = check("disks and curves beside the picture", editor.plots.visible, meaning)

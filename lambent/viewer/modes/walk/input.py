@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-from lambent.core.camera import rays_through
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera, rays_through
+from lambent.core.plain import Triple, triple
 from lambent.viewer import cameras
+from lambent.viewer.framing import framed
 from lambent.viewer.input import CLICK_PX, Input
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.walls import Walls
@@ -15,20 +21,26 @@ from lambent.viewer.picking import Geometry
 SHORTCUTS = (
     ("W A S D, arrows", "walk; with Shift faster"),
     ("E, Space / Q, C", "up / down, while flying"),
-    ("F", "fly, or come down onto the floor"),
-    ("O", "orbit the target, or walk"),
-    ("left drag", "look around; in orbit turn about the target"),
+    ("F", "frame the selected object, and orbit it"),
+    ("O", "orbit, or walk"),
+    ("G", "leave the ground to fly, or come down onto the floor"),
+    ("left drag", "look around; in orbit turn about the selected object, or the target"),
     ("right, middle drag", "shift the view (orbit)"),
-    ("wheel", "nearer to the target, or away (orbit)"),
+    ("wheel", "nearer to what orbit turns about, or away"),
     ("click", "select the object under the mouse"),
     ("Esc", "select nothing"),
     ("1 ... 9", "jump to a camera of the scene, or a saved view"),
     ("V", "save the view"),
     ("R", "record the way, or stop"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo a material edit"),
+    ("Ctrl+S", "save the selected material"),
+    ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
 )
+LARGE = 0.5  # radius of an object, as a share of its distance, from which orbit turns about where it was clicked
+PIECE_PX = 12.0  # of a drag in orbit, between two looks for walls
+TAP_S = 0.05  # that a key counts for at least
 
 
 class WalkInput(Input):
@@ -38,26 +50,31 @@ class WalkInput(Input):
         super().__init__(state.screen, state.navigation, state.materials.edits)
         self._state, self._geometry, self._walls = state, geometry, Walls(geometry.triangles)
         self.held: set[str] = set()
+        self._tapped: set[str] = set()  # pressed since the last step: a key may be released before a slow frame ends
         self._fast = self._on_divider = self._flew = False
 
     @property
     def walking(self) -> bool:
-        return any(key in cameras.KEYS for key in self.held)
+        return any(key in cameras.KEYS for key in self.held | self._tapped)
 
     def walk(self, dt_s: float) -> None:
         """Let the held keys carry the eye for `dt_s` seconds; whoever has just stopped flying comes down."""
-        navigation = self.navigation
+        navigation, keys, held = self.navigation, self.held | self._tapped, bool(self.held)
+        if not held:
+            dt_s = TAP_S
+        if dt_s > 0:
+            self._tapped.clear()
         camera, bounds, flying = navigation.camera, navigation.bounds, navigation.flying
         height_m, walks = navigation.walker.eye_height_m, navigation.movement == "walk"
         flew, self._flew = self._flew, flying and walks
         if flew and walks and not flying and not navigation.playing:
             floor_y = self._walls.floor_below(camera.position, height_m)
             navigation.move(camera := cameras.standing(camera, bounds, floor_y, height_m))
-        if not self.walking or not walks:
+        if not keys or not walks:
             return
         floor_y = None if flying else self._walls.floor_below(camera.position, height_m)
         moved = cameras.walk(
-            camera, navigation.walker, self.held, dt_s, bounds=bounds, floor_y=floor_y, flying=flying,
+            camera, navigation.walker, keys, dt_s, bounds=bounds, floor_y=floor_y, flying=flying,
             fast=self._fast, allowed=lambda eye, step: self._walls.allowed(eye, step, height_m),
         )  # fmt: skip
         navigation.move(moved)
@@ -85,8 +102,45 @@ class WalkInput(Input):
             return
         camera, place = self.navigation.camera, self.screen.picture
         towards = rays_through(camera, x, y, place.width, place.height)
-        found = self._geometry.pick(camera.position, towards)
-        self._state.selection.choose(found.name if found else None)
+        found, distance_m = self._geometry.hit(camera.position, towards)
+        if found is None:
+            self._state.selection.choose(None)
+            return
+        radius_m = math.dist(*found.bounds) / 2
+        at = triple(np.array(camera.position) + distance_m * towards)
+        self._state.selection.choose(found.name, at if radius_m > LARGE * distance_m else None)
+
+    @property
+    def pivot(self) -> Triple:
+        return self._state.selection.pivot or super().pivot
+
+    def turned(self, dx: float, dy: float) -> Camera:
+        """Who is within the scene stays there, and goes nearer to the pivot where a wall is in the way."""
+        navigation, pivot = self.navigation, self.pivot
+        camera, bounds = navigation.camera, navigation.bounds
+        pieces = math.ceil(math.hypot(dx, dy) / PIECE_PX)
+        for _ in range(pieces):
+            after = cameras.orbit(camera, dx / pieces, dy / pieces, pivot)
+            if cameras.is_within(camera.position, bounds):
+                after = cameras.nearer(after, pivot, self._walls.share(pivot, camera.position, after.position, bounds))
+            camera = after
+        return camera
+
+    def _frame(self) -> None:
+        """Show the selected object as a whole, and orbit it."""
+        navigation, place, found = self.navigation, self.screen.picture, self._state.selection.record
+        if found is None:
+            self.screen.say("nothing to frame: click an object first")
+            return
+        eye, bounds = navigation.camera.position, navigation.bounds
+        around = cameras.is_within(eye, found.bounds)  # such as walls: seen from within
+
+        def free_m(point: Floats, direction: Floats) -> float:
+            out_m = cameras.way_out_m(point, direction, bounds) if cameras.is_within(eye, bounds) else math.inf
+            return min(self._geometry.free_m(point, direction, "" if around else found.name), out_m)
+
+        navigation.move(framed(navigation.camera, found.bounds, place.width / place.height, free_m))
+        navigation.movement, self._state.selection.pointed = "orbit", None
 
     def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
         self._fast = "Shift" in event["modifiers"]
@@ -94,13 +148,17 @@ class WalkInput(Input):
             self.held.discard(key)
         elif ui_has_keys:
             self.held.clear()
+            self._tapped.clear()
         super().keys(key, event, ui_has_keys)
 
     def pressed_key(self, key: str) -> None:
         state, navigation = self._state, self.navigation
         if key in cameras.KEYS:
             self.held.add(key)
+            self._tapped.add(key)
         elif key == "f":
+            self._frame()
+        elif key == "g":
             navigation.flying = not navigation.flying
         elif key == "o":
             navigation.movement = "walk" if navigation.movement == "orbit" else "orbit"
@@ -114,5 +172,8 @@ class WalkInput(Input):
             navigation.jump(state.recordings.cameras[int(key) - 1])
 
     def saved(self) -> None:
-        if self._state.materials.editor is not None:
-            self._state.materials.editor.save()
+        materials, name = self._state.materials, self._state.selection.material
+        if materials.editor is not None:
+            materials.editor.save()
+        elif name is not None:
+            materials.save(name)

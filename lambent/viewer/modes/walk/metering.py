@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, fitting_range
-from lambent.core.photometry import LM_PER_W, LUMINANCE, Quantity, photometric
+from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.viewer.modes.walk.glare import GlareMeter
 
-KEY = 0.18  # middle grey: where the meter puts the log-average (Reinhard et al. 2002)
 PIXELS = 60_000  # that a reading looks at, evenly spread
 BINS_PER_DECADE = 12
-LIMIT_EV = 12.0
 
 
 @dataclass(frozen=True)
@@ -28,17 +28,14 @@ class Reading:
     counts: Floats = field(compare=False)
     edges: Floats = field(compare=False)
     ranges: tuple[Range, Range] = (Range(), Range())  # that hold the picture: by decades, by even steps
-
-    @property
-    def exposure_ev(self) -> float:
-        """Exposure that shows the log-average as middle grey."""
-        return min(max(math.log2(KEY * LM_PER_W / self.log_mean), -LIMIT_EV), LIMIT_EV)
+    exposure_ev: float = 0.0  # that shows the middle as middle grey (core.exposure)
 
 
 def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
     """Reading of a picture (H, W, 3) of radiance, or of another quantity; None where all of it is black."""
     every = max(1, math.isqrt(radiance.shape[0] * radiance.shape[1] // PIXELS))
-    values = photometric(np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64), quantity).ravel()
+    some = np.asarray(radiance[every // 2 :: every, every // 2 :: every], np.float64)
+    values = photometric(some, quantity).ravel()
     values = values[np.isfinite(values)]
     lit = values[values > 0]
     if not lit.size:
@@ -55,6 +52,7 @@ def read(radiance: Floats, quantity: Quantity = LUMINANCE) -> Reading | None:
         np.histogram(np.clip(lit, edges[0], None), edges)[0].astype(float),
         edges,
         (fitting_range(values), fitting_range(values, log=False)),
+        metered(some) or 0.0,
     )
 
 
@@ -70,3 +68,4 @@ class Meter:
     cursor: tuple[float, float] | None = None  # of the mouse, as shares of the picture
     readout_on: bool = False  # false colour shows it always
     under_cursor: tuple[float, float, float] | None = None  # radiance there
+    glare: GlareMeter = field(default_factory=GlareMeter)

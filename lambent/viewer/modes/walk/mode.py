@@ -71,6 +71,7 @@ class WalkMode(Mode):
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
+        overlay.over(place, textures.get("outline"))
         marks.draw(state.marks, state.selection.name, place, textures)
         comparison, recorder, filming = state.comparison, state.recordings.recorder, state.films.under_way
         if comparison.mode == "error map" and comparison.figures is not None:
@@ -98,6 +99,19 @@ class WalkMode(Mode):
         if self.state.materials.editor is not None:
             self.state.materials.editor.files.open(path)
 
+    @property
+    def unsaved(self) -> tuple[str, ...]:
+        walk = ("the recorded walk",) if self.state.recordings.unsaved else ()
+        return (*self.state.materials.unsaved, *walk)
+
+    def save(self) -> None:
+        for name in self.state.materials.unsaved:
+            self.state.materials.save(name)
+        self.state.recordings.keep()
+
+    def discard(self) -> None:
+        self.state.recordings.drop()
+
     def rescue(self) -> None:
         rescued("an unsaved material", self.state.materials.rescue)
         rescued("the recorded walk", self.state.recordings.rescue)
@@ -115,12 +129,36 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     """The column, each panel on the parts of the state that it needs."""
     about = (state.missing, state.scene.warnings)
     return (
-        Panel("Scene", partial(scene.draw, state.navigation, state.recordings, *about), opened=True),
-        Panel("View", partial(view.draw, state), opened=True),
-        Panel("Material", partial(material.draw, state.selection, state.materials), opened=True),
-        Panel("Light meter", partial(metering.draw, state.meter, state.look)),
-        Panel("Compare", partial(compare.draw, state.comparison)),
-        Panel("Film", partial(film.draw, state.films, state.recordings, state.navigation, state.screen)),
-        Panel("Statistics", lambda: statistics.draw(state.screen, state.materials.editor, state.notes)),
-        Panel("Help", partial(rows, SHORTCUTS, "shortcuts")),
+        Panel(
+            "Material",
+            partial(material.draw, state.selection, state.materials),
+            "the objects, and every number of the selected one's material",
+            opened=True,
+        ),
+        Panel("View", partial(view.draw, state), "what the picture shows, and how bright", opened=True),
+        Panel(
+            "Scene",
+            partial(scene.draw, state.navigation, state.recordings, *about),
+            "ways to move, cameras, saved views and walks",
+            opened=True,
+        ),
+        Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
+        Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
+        Panel(
+            "Light meter",
+            partial(metering.draw, state.meter, state.look, state.navigation),
+            "luminances of the picture in numbers, and glare",
+        ),
+        Panel("Compare", partial(compare.draw, state.comparison), "the picture beside another integrator's"),
+        Panel(
+            "Film",
+            partial(film.draw, state.films, state.recordings, state.navigation, state.screen),
+            "a film along the chosen camera path",
+        ),
+        Panel(
+            "Statistics",
+            lambda: statistics.draw(state.screen, state.materials.editor, state.notes),
+            "cost of the last frame, and noise of the light map",
+        ),
+        Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )

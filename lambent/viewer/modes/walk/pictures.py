@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +15,12 @@ from lambent.core.images import write_shown
 from lambent.core.plain import triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
-from lambent.viewer.mode import Divider, Image
+from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
+from lambent.viewer.modes.walk.glare import GlareDrawing
 from lambent.viewer.modes.walk.metering import read
+from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
@@ -35,13 +39,17 @@ class Pictures(Pair):
         self._b: Picture | None = None
         self.shown = (self._a,)
         self._film_renderer: Renderer | None = None
+        self._outlining = Outlining(renderer)
         self._read_version, self._read_s = -1, -1e9
+        self._glare = GlareDrawing(state.meter.glare)
+        self._glare_renderer: Renderer | None = None
 
     @property
-    def images(self) -> Mapping[str, Image]:
-        """Mirror balls, and the error map in the place of the picture."""
+    def images(self) -> Mapping[str, Any]:
+        """Mirror balls, the outline of what is selected, and the error map in the place of the picture."""
         error = self._state.comparison.map
-        return self._state.marks.images | ({} if error is None else {"picture A": error})
+        own = {} if error is None else {"picture A": error}
+        return {**self._state.marks.images, **self._outlining.images, **own}
 
     @property
     def divider(self) -> Divider | None:
@@ -53,6 +61,7 @@ class Pictures(Pair):
         state = self._state
         self._film()
         wanted = self._frame(size_px(place, pixel_ratio))
+        self._outlining.update(wanted, state.selection.name)
         if state.comparison.on and state.films.under_way is None:
             self._compare(wanted)
         else:
@@ -61,15 +70,19 @@ class Pictures(Pair):
             self.shown = (self._a,)
             self._a.update(wanted, refine=None if state.films.under_way is None else False)
         look, size = state.look, (max(1, place.width), max(1, place.height))
-        state.marks.update(state.navigation.camera, size, look.display_transform, look.exposure_ev)
+        exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
+        state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
         self._meter()
+        if self._glare.busy:
+            self._glare_renderer = self._glare_renderer or self._another_renderer()
+            self._glare.step(self._glare_renderer, wanted)
 
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
         return state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
 
     def wait_s(self) -> float | None:
-        if self._state.films.under_way is not None:
+        if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
         return least(super().wait_s(), 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
 

@@ -9,13 +9,14 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.plain import triple
+from lambent.viewer.cameras import LONGEST_STEP_S
 from lambent.viewer.edits import rescue_file
 from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import Screen
 
 KEY_S = 0.1  # between two keys of a path
-STILL_S = 0.1  # a longer gap between two frames is standing still, not a slow frame
+STILL_S = LONGEST_STEP_S  # what moves longer than this between two frames stood still before
 LONGEST_S = 600.0
 DRAFT = "recorded"
 SMOOTH_S = 0.3  # standard deviation of the bell that takes the jerks out
@@ -27,18 +28,22 @@ class Recording:
 
     times_s: list[float] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
+    still_s: float = 0.0  # when the last camera was seen last
 
     def take(self, camera: Camera, time_s: float) -> None:
-        """The camera at this moment. Frames in which nothing moves need not be told of."""
+        """The camera at this moment. Each frame is told of, so that a slow one is not taken for standing still."""
         if self.cameras and camera == self.cameras[-1]:
+            self.still_s = max(time_s, self.still_s)
             return
-        if self.cameras and time_s - self.times_s[-1] > STILL_S:
-            self.times_s.append(time_s - STILL_S / 2)
+        still_s = max(self.still_s, time_s - STILL_S)
+        if self.cameras and self.times_s[-1] < still_s < time_s:
+            self.times_s.append(still_s)
             self.cameras.append(self.cameras[-1])
         if self.times_s and time_s <= self.times_s[-1]:
             return
         self.times_s.append(time_s)
         self.cameras.append(camera)
+        self.still_s = time_s
 
     @property
     def seconds(self) -> float:
@@ -57,9 +62,9 @@ class Recording:
         Keys stand `KEY_S` apart. Positions, lines of sight and angles of view are averaged with a bell of standard
         deviation `smooth_s`; the ends stay where they were.
         """
-        if self.seconds < 2 * KEY_S:
+        if self.seconds <= 0:
             return None
-        count = round(self.seconds / KEY_S) + 1
+        count = max(1, round(self.seconds / KEY_S)) + 1
         times = np.linspace(0.0, self.seconds, count)
         at = np.array(self.times_s) - self._start_s
         values = np.array([(*camera.position, *camera.target, camera.fov_y_deg) for camera in self.cameras])
@@ -184,6 +189,12 @@ class Recordings:
             self.navigation.scrub(added, 0.0)
             self.screen.say(f"saved the path {added.name}")
 
+    @property
+    def unsaved(self) -> bool:
+        """Whether there is a recording that closing would lose."""
+        recorder = self.recorder
+        return recorder.draft is not None or (recorder.on and recorder.recording.path(DRAFT) is not None)
+
     def keep(self) -> str | None:
         """Save an unsaved recording because the window closes; returns the path's name."""
         if self.recorder.on:
@@ -212,7 +223,8 @@ class Recordings:
         return (f"{file}, a views.json for a store",)
 
     def drop(self) -> None:
-        """Forget the draft."""
+        """Forget the draft, or what is being recorded."""
+        self.recorder.on = False
         path = self.navigation.path
         if path is not None and path.path == self.recorder.draft:
             self.navigation.path = None

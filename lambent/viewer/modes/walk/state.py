@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from lambent.core.errors import UserError
-from lambent.core.plain import plain_name
+from lambent.core.plain import Triple, plain_name, triple
 from lambent.store.contract import ObjectRecord, SceneRecord
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import document_file, with_account
@@ -30,14 +32,25 @@ class Selection:
     objects: tuple[ObjectRecord, ...]
     name: str | None = None
     reveal: bool = False
+    pointed: Triple | None = None  # where it was clicked, if its middle is not to be turned about
 
-    def choose(self, name: str | None) -> None:
-        self.name, self.reveal = name, name is not None
+    def choose(self, name: str | None, pointed: Triple | None = None) -> None:
+        self.name, self.reveal, self.pointed = name, name is not None, pointed
+
+    @property
+    def record(self) -> ObjectRecord | None:
+        return next((item for item in self.objects if item.name == self.name), None)
+
+    @property
+    def pivot(self) -> Triple | None:
+        """What orbit turns about: the middle of the object, or where it was clicked."""
+        found = self.record
+        return self.pointed if found is None or self.pointed else triple(np.mean(found.bounds, axis=0))
 
     @property
     def material(self) -> str | None:
         """Name of the selected object's material."""
-        return next((item.material for item in self.objects if item.name == self.name), None)
+        return None if self.record is None else self.record.material
 
 
 @dataclass
@@ -123,11 +136,12 @@ class WalkState:
     @classmethod
     def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
         """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
+        look, meter = Look(scene.exposure_ev or 0.0), Meter(expose_wanted=scene.exposure_ev is None)
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
         fault = views.load()
         return cls(
-            scene, screen, Look(scene.exposure_ev), navigation, Selection(scene.objects),
+            scene, screen, look, navigation, Selection(scene.objects),
             Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen),
-            Marks({}, scene.reflectors),
+            Marks({}, scene.reflectors), meter=meter,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

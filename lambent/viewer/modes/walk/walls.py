@@ -13,7 +13,9 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry import area_vectors
-from lambent.viewer.picking import first_hit
+from lambent.core.plain import Triple
+from lambent.viewer.cameras import NEAREST_M, WALL_M, Bounds, is_within, way_out_m
+from lambent.viewer.picking import first_hit, hits
 
 STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 BODY_M = 0.22
@@ -25,9 +27,9 @@ class Walls:
     """Triangles (T, 3, 3) to stand on and to be stopped by."""
 
     def __init__(self, triangles: Floats) -> None:
-        self._plan = triangles[:, :, [0, 2]]
+        self._triangles, self._plan = triangles, triangles[:, :, [0, 2]]
         self._low, self._high = triangles.min(axis=1), triangles.max(axis=1)
-        normals = area_vectors(triangles)
+        normals = self._normals = area_vectors(triangles)
         # Floors are at most 45 degrees steep, on either side: some are modelled upside down.
         level = np.abs(normals[:, 1]) > np.cos(np.pi / 4) * np.maximum(np.linalg.norm(normals, axis=-1), 1e-20)
         self._floors, self._floors_low, self._floors_high = triangles[level], self._low[level], self._high[level]
@@ -54,6 +56,32 @@ class Walls:
         for _ in range(pieces):
             at = at + _slid(at, move / pieces, outlines)
         return np.array([at[0] - start[0], 0.0, at[1] - start[1]])
+
+    def share(self, pivot: Triple, before: Triple, after: Triple, bounds: Bounds) -> float:
+        """Share of the way from `pivot` to the eye `after` that is open to an eye that comes from `before`.
+
+        It ends `WALL_M` before the bounds, and before a triangle that the eye would pass through.
+        """
+        way = np.subtract(after, pivot)
+        arm_m = max(float(np.linalg.norm(way)), 1e-9)
+        open_m = arm_m
+        if is_within(pivot, bounds):
+            open_m = min(arm_m, way_out_m(np.array(pivot), way / arm_m, bounds) - WALL_M)
+        start, step = np.array(before), np.subtract(after, before)
+        length_m = max(float(np.linalg.norm(step)), 1e-9)
+        step = step / length_m * (length_m + WALL_M)
+        low, high = np.minimum(start, start + step), np.maximum(start, start + step)
+        near = np.flatnonzero(np.all((self._low <= high) & (self._high >= low), axis=1))
+        if len(near):
+            t = hits(start, step, self._triangles[near])
+            nearest = near[np.argmin(t)]
+            if t.min() <= 1:
+                corner, normal = self._triangles[nearest, 0], self._normals[nearest]
+                along = float(normal @ way) / arm_m
+                if abs(along) > 1e-9:
+                    plane_m = float(normal @ (corner - np.array(pivot))) / along
+                    open_m = min(open_m, plane_m - WALL_M) if plane_m > 0 else open_m
+        return max(open_m, NEAREST_M) / arm_m if open_m < arm_m else 1.0
 
     def _near(self, centre: Floats, reach: float, knee_y: float, eye_y: float) -> Floats:
         low, high = self._low, self._high

@@ -14,7 +14,7 @@ from lambent.viewer.modes.edit.curves.state import CurveState, Shown
 from lambent.viewer.panels.widgets import AMBER, coloured, explain
 
 WIDE_PX, CONTROLS_PX = 680.0, 340.0  # wider than that, the controls stand left of the plot
-LEAST_PX, MOST_PX = 220.0, 420.0  # height of a plot in a column
+LEAST_PX, MOST_PX = 200.0, 420.0  # height of a plot in a column
 MOST_ROWS = 7
 HINTS = {
     "translate": "Drag in the region: Shift keeps angles, Ctrl values. Drag beside it: a new region.",
@@ -75,7 +75,7 @@ class CurveEditor:
             imgui.end_child()
         else:
             self._curves(shown, material, name)
-            self._plot(session, material, shown, name, min(max(0.75 * room.x, LEAST_PX), MOST_PX) + 110)
+            self._plot(session, material, shown, name, min(max(0.6 * room.x, LEAST_PX), MOST_PX) + 110)
             self._controls(session, material, shown, name)
         imgui.pop_id()
 

@@ -13,7 +13,7 @@ from lambent.editing.session import Session
 from lambent.materials.models.model import Parameter
 from lambent.viewer.modes.edit.curves.state import CurveState, Shown
 from lambent.viewer.panels import parameters
-from lambent.viewer.panels.widgets import explain, rgb, slider, wrapped
+from lambent.viewer.panels.widgets import rgb, slider, wrapped
 
 MOST_TINT = 2.0
 LABEL_PX = 88.0
@@ -69,6 +69,5 @@ def _parameter(parameter: Parameter, value: Any) -> Any:
     unit = "" if parameter.unit == "1" else f" ({parameter.unit})"
     if parameter.rgb:
         return rgb(parameter.name, value, parameter.high, parameter.meaning + unit)
-    moved = slider(parameter.name, value, parameter.low, parameter.high, log=parameter.scale == "log")
-    explain(parameter.meaning + unit)
-    return moved
+    low, high, meaning = parameter.low, parameter.high, parameter.meaning + unit
+    return slider(parameter.name, value, low, high, meaning, log=parameter.scale == "log")

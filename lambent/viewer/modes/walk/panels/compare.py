@@ -6,19 +6,21 @@ from imgui_bundle import imgui
 
 from lambent.viewer.look import INTEGRATORS
 from lambent.viewer.modes.walk.comparison import KINDS, MODES, Comparison
-from lambent.viewer.panels.widgets import choice, explain, rows
+from lambent.viewer.panels.widgets import choice, rows
 
 
 def draw(comparison: Comparison) -> None:
-    comparison.mode = choice("compare", comparison.mode, MODES)
+    comparison.mode = choice(
+        "compare", comparison.mode, MODES, "shows this picture beside another integrator's, or how far they are apart"
+    )
     if not comparison.on:
         imgui.text_wrapped("Off: the picture refines by itself while nothing moves.")
         return
-    comparison.integrator = choice("with B", comparison.integrator, INTEGRATORS)
-    explain("qmc is unbiased and accumulates while nothing moves; A stays the integrator of motion")
+    meaning = "integrator of B; qmc is unbiased and accumulates while nothing moves, A stays that of motion"
+    comparison.integrator = choice("with B", comparison.integrator, INTEGRATORS, meaning)
     if comparison.mode == "error map":
-        comparison.kind = choice("map", comparison.kind, KINDS)
-        explain("the difference of luminance in percent of B's, or what a viewer notices (FLIP)")
+        meaning = "the difference of luminance in percent of B's, or what a viewer notices (FLIP)"
+        comparison.kind = choice("map", comparison.kind, KINDS, meaning)
     figures = comparison.figures
     if figures is None:
         imgui.text_disabled("figures come while nothing moves")

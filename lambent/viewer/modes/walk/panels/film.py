@@ -8,7 +8,7 @@ from lambent.core.plain import plain_name
 from lambent.viewer.modes.walk.filming import FPS, QUALITIES, SIZES, Filming, Films
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.navigation import Navigation
-from lambent.viewer.panels.widgets import choice, explain, path_field
+from lambent.viewer.panels.widgets import choice, path_field, press
 from lambent.viewer.screen import Screen
 
 
@@ -25,13 +25,14 @@ def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: S
         return
     path = followed.path if followed and followed.path.name in [p.name for p in paths] else paths[0]
     imgui.text_disabled(f"along {path.name}, {path.seconds:.1f} s (chosen under Scene)")
-    films.size = choice("size", films.size, tuple(SIZES))
-    films.fps = int(choice("frames/s", str(films.fps), tuple(map(str, FPS))))
-    films.quality = choice("quality", films.quality, tuple(QUALITIES))
-    explain("the integrator and samples chosen under View, or the unbiased one: slow, without grain at 256")
+    films.size = choice("size", films.size, tuple(SIZES), "width and height of the film in pixels")
+    films.fps = int(choice("frames/s", str(films.fps), tuple(map(str, FPS)), "frames of the film per second"))
+    meaning = "the integrator and samples chosen under Drawing, or the unbiased one: slow, without grain at 256"
+    films.quality = choice("quality", films.quality, tuple(QUALITIES), meaning)
     text = films.file_name or f"{plain_name(path.name)}.mp4"
-    films.file_name, wanted = path_field("film file", text, "make film", hint="tour.mp4, tour-####.png or .exr")
-    explain(".mp4, or pictures in a row: tour-####.png as shown, tour-####.exr as linear radiance")
+    hint = "tour.mp4, tour-####.png or .exr"
+    meaning = "draws the film into an .mp4, or pictures in a row: tour-####.png as shown, .exr as linear radiance"
+    films.file_name, wanted = path_field("film file", text, "make film", hint, meaning)
     if wanted:
         films.wanted = path
 
@@ -41,4 +42,4 @@ def _progress(film: Filming) -> bool:
     left = "" if film.left_s is None else f", {int(film.left_s) // 60}:{int(film.left_s) % 60:02} left"
     imgui.progress_bar(film.done / film.total, (-1, 0), f"frame {film.done} of {film.total}{left}")
     imgui.text_disabled(film.file.name)
-    return imgui.button("cancel the film", (-1, 0))
+    return press("cancel the film", "ends the film; a sequence of images keeps those that are done", -1)

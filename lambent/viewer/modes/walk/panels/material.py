@@ -8,9 +8,9 @@ from imgui_bundle import imgui
 
 from lambent.viewer.modes.walk.state import Materials, Selection
 from lambent.viewer.panels import editing, parameters
-from lambent.viewer.panels.widgets import buttons, explain, path_field
+from lambent.viewer.panels.widgets import buttons, explain, listed, path_field, press
 
-LISTED = 7
+LISTED = 5
 
 
 def draw(selection: Selection, materials: Materials) -> None:
@@ -34,8 +34,11 @@ def draw(selection: Selection, materials: Materials) -> None:
     elif not imgui.is_any_item_active():
         edits.end_stroke()
     imgui.separator()
-    reset = ("reset", name in edits.edited, partial(edits.reset, name), "")
-    buttons([("undo", edits.can_undo, edits.undo, ""), ("redo", edits.can_redo, edits.redo, ""), reset])
+    buttons([
+        ("undo", edits.can_undo, edits.undo, "takes back the last step (Ctrl+Z)"),
+        ("redo", edits.can_redo, edits.redo, "does the step again (Ctrl+Shift+Z)"),
+        ("reset", name in edits.edited, partial(edits.reset, name), "returns to the material that the store has"),
+    ])  # fmt: skip
     _save(materials, name)
     _compare(materials, name)
 
@@ -44,8 +47,9 @@ def _objects(selection: Selection) -> None:
     objects = selection.objects
     imgui.begin_child("objects", (0, min(len(objects), LISTED) * imgui.get_text_line_height_with_spacing()))
     for index, item in enumerate(objects):
-        if imgui.selectable(f"{item.name}##{index}", item.name == selection.name)[0]:
-            selection.name = item.name
+        if listed(f"{item.name}##{index}", item.name == selection.name, f"selects {item.name}, of {item.material}"):
+            selection.choose(item.name)
+            selection.reveal = False  # it is in sight
         if item.name == selection.name and selection.reveal:
             imgui.set_scroll_here_y()
             selection.reveal = False
@@ -57,18 +61,20 @@ def _objects(selection: Selection) -> None:
 def _save(materials: Materials, name: str) -> None:
     imgui.set_next_item_width(-64)
     changed, file_name = imgui.input_text("##file", materials.file_name(name))
+    explain("name of the file that the material is saved as")
     if changed:
         materials.file_names[name] = file_name
     imgui.same_line()
-    if imgui.button("save", (-1, 0)):
+    if press("save", "writes the material as a document, and leaves the store as it is (Ctrl+S)", -1):
         materials.save(name)
 
 
 def _compare(materials: Materials, name: str) -> None:
     """The door to the editor: a measured file to hold against this material."""
+    meaning = "opens the material editor: disks, curves and error of this material against a measurement, and the fit"
+    hint = "compare with a measured file..."
     materials.typed_measurement, wanted = path_field(
-        "measurement", materials.typed_measurement, "compare", hint="compare with a measured file..."
+        "measurement", materials.typed_measurement, "compare", hint, meaning
     )
-    explain("opens the material editor: disks, curves and error of this material against a measurement, and the fit")
     if wanted:
         materials.open_editor(name)

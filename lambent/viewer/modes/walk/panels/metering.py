@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from imgui_bundle import imgui
 
+from lambent.core.camera import Camera
+from lambent.core.exposure import ev100_of
 from lambent.core.false_colour import number
 from lambent.core.photometry import photometric
 from lambent.viewer.look import Look
+from lambent.viewer.modes.walk.glare import GlareMeter
 from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels.overlay import SHADE
-from lambent.viewer.panels.widgets import explain, rows
+from lambent.viewer.panels.widgets import explain, press, rows
 from lambent.viewer.screen import Rect
 
 GRAPH_PX = 90
 
 
-def draw(meter: Meter, look: Look) -> None:
+def draw(meter: Meter, look: Look, navigation: Navigation) -> None:
+    _glare(meter.glare, navigation.camera)
     meter.wanted = True
     reading, unit = meter.reading, look.quantity.unit
     if reading is None:
@@ -26,7 +33,7 @@ def draw(meter: Meter, look: Look) -> None:
         ("mean", f"{number(reading.mean)} {unit}"),
         ("log-average", f"{number(reading.log_mean)} {unit}"),
         ("darkest, brightest", f"{number(reading.low)}, {number(reading.high)} {unit}"),
-        *([] if look.shows_noise else [("log-average is grey at", f"{reading.exposure_ev:+.2f} EV")]),
+        *([] if look.shows_noise else [("middle is grey at", f"EV100 {ev100_of(reading.exposure_ev):.2f}")]),
     ]
     rows(table, "meter")
     counts = np.asarray(reading.counts, np.float32)
@@ -37,6 +44,29 @@ def draw(meter: Meter, look: Look) -> None:
     imgui.same_line(width - imgui.calc_text_size(last).x)
     imgui.text_disabled(last)
     explain("pixels by luminance, in even steps of its logarithm; what is black is left out")
+
+
+def _glare(meter: GlareMeter, camera: Camera) -> None:
+    """Button and ratings; those of an eye that has moved on are dim."""
+    if press("Glare at the eye", "rate what a person glares at who stands here and looks ahead: DGP and UGR"):
+        meter.wanted = True
+    if meter.share is not None:
+        imgui.same_line()
+        imgui.text_disabled(f"{meter.share:.0%}")
+    if (found := meter.found) is None:
+        return
+    here = meter.camera is not None and replace(meter.camera, name="") == replace(camera, name="")
+    imgui.push_style_color(
+        imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text if here else imgui.Col_.text_disabled)
+    )
+    table = [
+        ("DGP", f"{found.dgp:.2f}, {found.comfort}"),
+        ("UGR", f"{found.ugr:.0f}"),
+        ("at the eye", f"{number(found.illuminance_lx)} lx"),
+        ("sources of glare", str(len(found.sources))),
+    ]
+    rows(table, "glare")
+    imgui.pop_style_color()
 
 
 def draw_readout(meter: Meter, look: Look, picture: Rect) -> None:

@@ -9,11 +9,12 @@ from imgui_bundle import imgui
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.modes.walk.views import Kind
 from lambent.viewer.navigation import Navigation
-from lambent.viewer.panels.widgets import check, explain, path_field, slider, wrapped
+from lambent.viewer.panels.widgets import check, explain, listed, path_field, press, slider, wrapped
 
 LISTED = 6
 SMOOTHEST_S = 2.0
 RED = (1.0, 0.35, 0.3, 1.0)
+UNFOLDS = "unfolds what the loader said about the scene's file"
 WARNINGS = 3  # more are folded away: the panels below them would be out of sight
 
 
@@ -31,19 +32,24 @@ def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str],
     if len(warnings) <= WARNINGS:
         wrapped(warnings)
     elif imgui.tree_node(f"{len(warnings)} notes on the scene's file###warnings"):
+        explain(UNFOLDS)
         wrapped(warnings)
         imgui.tree_pop()
+    else:
+        explain(UNFOLDS)
 
 
 def _movement(navigation: Navigation) -> None:
     if imgui.radio_button("walk", navigation.movement == "walk"):
         navigation.movement = "walk"
+    explain("the mouse looks around and the keys walk (O)")
     imgui.same_line()
     if imgui.radio_button("orbit", navigation.movement == "orbit"):
         navigation.movement = "orbit"
+    explain("the mouse turns about the selected object, or the camera's target (O)")
     if navigation.movement == "walk":
         imgui.same_line()
-        navigation.flying = check("fly", navigation.flying)
+        navigation.flying = check("fly", navigation.flying, "leaves the ground, and passes through walls (G)")
 
 
 def _cameras(navigation: Navigation, recordings: Recordings) -> None:
@@ -54,15 +60,16 @@ def _cameras(navigation: Navigation, recordings: Recordings) -> None:
     for index, camera in enumerate(cameras):
         key = f"{index + 1}  " if index < 9 else "    "
         mark = "  (saved)" if index >= own else ""
-        if imgui.selectable(f"{key}{camera.name}{mark}##{index}", camera == navigation.camera)[0]:
+        meaning = f"jumps to {camera.name}" + (f" ({index + 1})" if index < 9 else "")
+        if listed(f"{key}{camera.name}{mark}##{index}", camera == navigation.camera, meaning):
             navigation.jump(camera)
     imgui.end_child()
 
 
 def _saving(navigation: Navigation, recordings: Recordings) -> None:
     views, hint = recordings.views, "name of this view..."
-    recordings.view_name, wanted = path_field("view name", recordings.view_name, "save view", hint=hint)
-    explain("keeps where you stand, beside the store (V); `lambent render --camera NAME` shows it")
+    meaning = "keeps where you stand, beside the store (V); `lambent render --camera NAME` shows it"
+    recordings.view_name, wanted = path_field("view name", recordings.view_name, "save view", hint, meaning)
     if wanted:
         recordings.save_view()
     chosen = next((c.name for c in views.saved.cameras if c == navigation.camera), None)
@@ -74,16 +81,17 @@ def _rename_or_delete(recordings: Recordings, kind: Kind, name: str) -> None:
     """Two buttons, or the field where a new name is typed."""
     views = recordings.views
     if views.renaming == (kind, name):
-        views.typed_name, wanted = path_field(f"new {kind} name", views.typed_name, "rename", hint="new name")
+        meaning = f"renames {name}; Esc leaves its name"
+        views.typed_name, wanted = path_field(f"new {kind} name", views.typed_name, "rename", "new name", meaning)
         if imgui.is_key_pressed(imgui.Key.escape):
             views.renaming = None
         if wanted:
             recordings.rename(kind, name)
         return
-    if imgui.small_button(f"rename...##{kind}"):
+    if press(f"rename...##{kind}", f"gives {name} another name", small=True):
         views.renaming, views.typed_name = (kind, name), name
     imgui.same_line()
-    if imgui.small_button(f"delete##{kind}"):
+    if press(f"delete##{kind}", f"removes {name} from the store's views; this cannot be undone", small=True):
         recordings.delete(kind, name)
     imgui.same_line()
     imgui.text_disabled(name)
@@ -94,17 +102,19 @@ def _follow(recordings: Recordings) -> None:
     names = [path.name for path in paths]
     name = navigation.path.path.name if navigation.path else names[0]
     changed, index = imgui.combo("path", names.index(name) if name in names else 0, names)
+    explain("the camera path to play, and to film")
     chosen = paths[index]
     if changed:
         navigation.scrub(chosen, 0.0)
     imgui.begin_disabled(recordings.recorder.on)
-    if imgui.button("pause" if navigation.playing else "play", (64, 0)):
+    if press("pause" if navigation.playing else "play", "follows the camera path, or halts on it", 64):
         navigation.toggle(chosen)
     imgui.end_disabled()
     imgui.same_line()
     imgui.set_next_item_width(-1)
     time_s = min(navigation.path.time_s, chosen.seconds) if navigation.path else 0.0
     moved, time_s = imgui.slider_float("##time", time_s, 0.0, chosen.seconds, "%.1f s", imgui.SliderFlags_.always_clamp)
+    explain("moment of the camera path; drag to stand there")
     if moved:
         navigation.scrub(chosen, time_s)
     if chosen.name in [path.name for path in recordings.views.saved.paths]:
@@ -125,15 +135,15 @@ def _record(recordings: Recordings) -> None:
         recordings.record()
     if recorder.draft is None:
         return
-    smooth_s = slider("smooth", recorder.smooth_s, 0.0, SMOOTHEST_S, unit=" s")
+    smooth_s = slider("smooth", recorder.smooth_s, 0.0, SMOOTHEST_S, "how far jerks are averaged out", unit=" s")
     if smooth_s != recorder.smooth_s:
         played = navigation.path if navigation.path and navigation.path.path == recorder.draft else None
         recorder.smooth(smooth_s)
         if played is not None:
             navigation.scrub(recorder.draft, played.time_s)
-    explain("how far jerks are averaged out")
-    recorder.name, wanted = path_field("path name", recorder.name, "save path", hint="name of the path")
+    meaning = "keeps the recorded walk beside the store"
+    recorder.name, wanted = path_field("path name", recorder.name, "save path", "name of the path", meaning)
     if wanted:
         recordings.save()
-    if recorder.draft is not None and imgui.button("throw the recording away", (-1, 0)):
+    if recorder.draft is not None and press("throw the recording away", "forgets the recorded walk", -1):
         recordings.drop()

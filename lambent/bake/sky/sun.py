@@ -1,0 +1,168 @@
+"""The sun of a scene, which leaves the light map: a directional light, or a compact bright spot of the environment.
+
+The sun's picture is what it adds to the environment's: both are interpolated alike, so that the light that is left out
+of the light map is exactly the light that the renderer adds again, whatever disc stands for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from lambent.bake.tracing.scene_builder import environment_dict
+from lambent.core.arrays import Floats, Image, Indices
+from lambent.core.colour import luminance
+from lambent.core.directions import normalize
+from lambent.core.latlong import lat_long_direction
+from lambent.core.plain import triple
+from lambent.scenes.scene import DirectionalLight, Environment, Scene
+from lambent.store.contract import SunRecord
+
+BRIGHT = 8.0  # times the mean radiance: less is no sun
+SHARE = 0.05  # of the light from all around that a sun brings: with less, its shadow hardly shows
+LARGEST_RAD = np.radians(5.0)
+HALO = 3.0  # times the radius that holds half of the light: beyond it lies a halo, which is left in the sky
+ALIGNED = 1e-6  # of 1 - cos: directional lights from there are one sun
+RING_PX = 3.0  # around the sun, whose median is the sky behind it
+
+
+@dataclass(frozen=True, eq=False)
+class SunPicture:
+    """What a sun adds to a picture of `size` (H, W): `pixels` (h, w, 3) from `corner` (row, column) on.
+
+    Rows and columns are those of Mitsuba's `envmap`; columns go round. `turn` (3, 3) takes its directions to the world.
+    """
+
+    pixels: Image
+    corner: tuple[int, int]
+    size: tuple[int, int]
+    turn: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FoundSun:
+    """A sun, and its picture where it is a part of the environment."""
+
+    record: SunRecord
+    picture: SunPicture | None = None
+
+
+def sun_of(scene: Scene) -> FoundSun | None:
+    """The sun that brings a scene the most light; None where there is none. Others stay in the light map."""
+    lights = [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
+    suns = [FoundSun(_of_lights(light, lights)) for light in lights]
+    if scene.environment is not None and (found := _of_environment(scene.environment)) is not None:
+        suns.append(found)
+    return max(suns, key=lambda one: float(luminance(np.array(one.record.irradiance))), default=None)
+
+
+def _of_lights(light: DirectionalLight, lights: list[DirectionalLight]) -> SunRecord:
+    """The sun that a light is, with all that shine along it."""
+    towards = [-normalize(np.asarray(one.direction, float)) for one in (light, *lights)]
+    along = [one for one, w in zip(lights, towards[1:], strict=True) if w @ towards[0] > 1 - ALIGNED]
+    irradiance = np.sum([one.irradiance for one in along], axis=0)
+    return SunRecord(direction=triple(towards[0]), irradiance=triple(irradiance), radius_rad=0.0)
+
+
+@lru_cache(maxsize=4)
+def _of_environment(environment: Environment) -> FoundSun | None:
+    description = environment_dict(environment)
+    turn = np.array(description["to_world"].matrix, float)[:3, :3]
+    return sun_in(np.array(description["bitmap"])[..., :3] * np.float32(description["scale"]), turn)
+
+
+def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
+    """The sun of a lat-long picture (H, W, 3) as Mitsuba reads it, turned by `turn` (3, 3); None where there is none.
+
+    Rows reach from pole to pole, so the first and the last are at the poles themselves. A sun is the connected spot
+    over BRIGHT times the mean that holds the most light, as far as HALO reaches.
+    """
+    height, width = picture.shape[:2]
+    light = luminance(np.asarray(picture, float)) * _solid_angles(height, width)[:, None]
+    total = float(light.sum())
+    row, column = _brightest_spot(picture, light, BRIGHT * total / (4 * np.pi))
+    if not len(row):
+        return None
+    w, flux = _directions(row, column, height, width), light[row, column]
+    reach = _angles(w, normalize(flux @ w))
+    order = np.argsort(reach)
+    half = reach[order][np.searchsorted(np.cumsum(flux[order]), flux.sum() / 2)]
+    limit = HALO * max(float(half), np.pi / height)
+    row, column, w, flux = (values[reach <= limit] for values in (row, column, w, flux))
+    about = normalize(flux @ w)
+    added = np.maximum(picture[row, column] - _behind(picture, row, column, about), 0).astype(np.float32)
+
+    arriving = added * _solid_angles(height, width)[row, None]
+    left_out = luminance(arriving.astype(float))
+    if left_out.sum() < SHARE * total:
+        return None
+    about = normalize(left_out @ w)
+    # of a disc with the second moment of the pixels, each of which is spread by its interpolation
+    spread = (np.pi / height) ** 2 * (1 + (2 * np.sin(row * np.pi / height) * height / width) ** 2) / 6
+    radius_rad = float(np.sqrt(2 * (left_out @ (_angles(w, about) ** 2 + spread)) / left_out.sum()))
+    if radius_rad > LARGEST_RAD:
+        return None
+    irradiance = triple(((w @ about)[:, None] * arriving).sum(axis=0))
+    record = SunRecord(direction=triple(normalize(turn @ about)), irradiance=irradiance, radius_rad=radius_rad)
+    return FoundSun(record, _cut_out(row, column, added, (height, width), turn))
+
+
+def _brightest_spot(picture: Image, light: Floats, least: float) -> tuple[Indices, Indices]:
+    """Rows and columns of the connected pixels over `least` that hold the most `light` (H, W); none where none is."""
+    from scipy.ndimage import label
+
+    bright = luminance(picture) > least
+    names, count = label(bright, np.ones((3, 3)))
+    if not count:
+        return np.zeros(0, int), np.zeros(0, int)
+    strongest = 1 + int(np.argmax(np.bincount(names.ravel(), light.ravel())[1:]))
+    peak = np.unravel_index(np.argmax(np.where(names == strongest, light, -1)), light.shape)
+    shift = light.shape[1] // 2 - int(peak[1])  # the spot may lie across the edge of the picture
+    names, _ = label(np.roll(bright, shift, axis=1), np.ones((3, 3)))
+    row, column = np.nonzero(names == names[peak[0], light.shape[1] // 2])
+    return row, (column - shift) % light.shape[1]
+
+
+def _behind(picture: Image, row: Indices, column: Indices, about: Floats) -> Floats:
+    """(3,) median of what lies RING_PX around a spot about a direction."""
+    height, width = picture.shape[:2]
+    pixel = np.pi / height
+    near = np.arange(max(0, int(row.min() - 2 * RING_PX)), min(height, int(row.max() + 2 * RING_PX + 1)))
+    rows, columns = (grid.ravel() for grid in np.meshgrid(near, np.arange(width), indexing="ij"))
+    spot = np.zeros((height, width), bool)
+    spot[row, column] = True
+    away = _angles(_directions(rows, columns, height, width), about)
+    own = _angles(_directions(row, column, height, width), about).max()
+    ring = ~spot[rows, columns] & (away > own + pixel) & (away < own + (1 + RING_PX) * pixel)
+    around = picture[rows[ring], columns[ring]]
+    return np.median(around, axis=0) if len(around) else np.zeros(3)
+
+
+def _cut_out(row: Indices, column: Indices, added: Image, size: tuple[int, int], turn: Floats) -> SunPicture:
+    """The picture of the pixels `added` (n, 3), with a black rim."""
+    first = (int(column[np.argmax(luminance(added))]) - size[1] // 2) % size[1]
+    columns = (column - first) % size[1]  # the spot in the middle
+    top, left = int(row.min()) - 1, int(columns.min()) - 1
+    pixels = np.zeros((int(row.max()) - top + 2, int(columns.max()) - left + 2, 3), np.float32)
+    pixels[row - top, columns - left] = added
+    return SunPicture(pixels, (top, (left + first) % size[1]), size, turn)
+
+
+def _solid_angles(height: int, width: int) -> Floats:
+    """(H,) integral over the sphere of what a pixel of a row is interpolated with."""
+    step = np.pi / (height - 1)
+    band = 2 * np.sin(np.arange(height) * step) * (1 - np.cos(step)) / step
+    band[[0, -1]] = 1 - np.sin(step) / step
+    return np.asarray(band * (2 * np.pi / width))
+
+
+def _directions(row: Indices, column: Indices, height: int, width: int) -> Floats:
+    """Unit directions (n, 3) of pixels in the frame of the picture."""
+    return lat_long_direction(row * (np.pi / (height - 1)), (column + 0.5) * (2 * np.pi / width))
+
+
+def _angles(w: Floats, about: Floats) -> Floats:
+    """Angles (n,) in radians between unit vectors; exact for small ones."""
+    return np.asarray(2 * np.arcsin(np.clip(np.linalg.norm(w - about, axis=-1) / 2, 0, 1)))

@@ -1,0 +1,258 @@
+"""Charts: parts of objects that lie flat in the light map.
+
+xatlas parametrises. Its time is quadratic in the size of a smooth chart, and it overruns its memory on a chart of
+80,000 triangles: large meshes are cut into pieces first. A cut costs a seam, nothing else.
+
+Charts of a few texels are mostly border. Flat ones of one object are merged by the six directions that faces look
+to, projected along them: faces of one merged chart share texels where one lies behind another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xatlas
+
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import normalize
+from lambent.core.errors import UserError
+from lambent.core.geometry import area_vectors, cross_2d, triangle_areas, triangle_normals
+from lambent.scenes.scene import Mesh, SceneObject
+
+PIECE_FACES = 1500  # more per piece is slower, fewer cost seams
+SMALL = 12.0  # texels: a smaller chart may be merged with others
+FLAT_DEG = 25.0  # between its normals and their mean, as long as a chart is merged
+SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
+ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
+LONGEST = 24.0  # texels: a merged chart with a longer side is halved even where that takes a little more...
+TRIED = 1.03  # ...up to this, because halves of halves may take less
+MIXED = 0.1  # texels that one texel is worth whose faces are mixed over a depth of one texel
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Some faces (K,) of the object with this number, near each other."""
+
+    owner: int
+    faces: Indices
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Faces (K,) of an object, their corners on the chart (K, 3, 2) in texels, and which corners are one vertex (K, 3).
+
+    Vertices are counted within the object's charts of one kind; no two charts share one.
+    """
+
+    owner: int
+    faces: Indices
+    corners: Floats
+    vertices: Indices
+
+
+def pieces_of(objects: tuple[SceneObject, ...], longest_m: float = np.inf) -> list[Piece]:
+    """All faces in spatially compact pieces of at most PIECE_FACES (halved at the median of the longest side).
+
+    The middles of a piece's faces are no further apart than `longest_m`.
+    """
+    pieces = []
+    for owner, o in enumerate(objects):
+        centres = o.mesh.positions[o.mesh.faces].mean(axis=1)
+        left: list[Indices] = [np.arange(len(o.mesh.faces))]
+        while left:
+            part = left.pop()
+            extent = np.ptp(centres[part], axis=0)
+            if len(part) <= PIECE_FACES and extent.max() <= longest_m:
+                pieces.append(Piece(owner, np.sort(part)))
+                continue
+            axis = np.argmax(extent)
+            order = part[np.argsort(centres[part, axis], kind="stable")]
+            left += [order[len(order) // 2 :], order[: len(order) // 2]]
+    return pieces
+
+
+def charts_of(objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Floats) -> list[Chart]:
+    """Charts of all faces; `sizes_m` (N,) is the size of a texel on each piece, in metres."""
+    unwrapped = _unwrapped(objects, pieces)
+    charts = []
+    for owner, o in enumerate(objects):
+        mine = [i for i, piece in enumerate(pieces) if piece.owner == owner]
+        size = np.zeros(len(o.mesh.faces))
+        for i in mine:
+            size[pieces[i].faces] = sizes_m[i]
+        first = np.cumsum([0] + [len(unwrapped[i][0]) for i in mine])
+        own = [
+            c
+            for i, n in zip(mine, first, strict=False)
+            for c in _charts(o.mesh, pieces[i], unwrapped[i], sizes_m[i], n)
+        ]
+        charts += _merged(o.mesh, owner, own, size)
+    return charts
+
+
+def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tuple[Floats, Indices, Floats]]:
+    """By piece as xatlas has it: the vertex of each of its vertices, faces, and coordinates.
+
+    Pieces are scaled to one size: xatlas ignores triangles below 1.2e-7 of its units squared.
+    """
+    atlas = xatlas.Atlas()
+    for piece in pieces:
+        o = objects[piece.owner]
+        vertices, faces = np.unique(o.mesh.faces[piece.faces], return_inverse=True)
+        at = o.mesh.positions[vertices].astype(np.float64)
+        at = (at - at.mean(axis=0)) / max(float(np.ptp(at, axis=0).max()), 1e-30)
+        faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.uint32)
+        try:
+            atlas.add_mesh(at.astype(np.float32), faces, o.mesh.normals[vertices])
+        except (RuntimeError, ValueError) as error:
+            raise UserError(f"object cannot be unwrapped ({error})", field=o.name) from error
+    packing = xatlas.PackOptions()
+    packing.resolution, packing.padding, packing.bilinear = 16 * int(np.ceil(np.sqrt(len(pieces)))), 0, False
+    atlas.generate(xatlas.ChartOptions(), packing, False)
+    return [atlas[i] for i in range(len(pieces))]
+
+
+def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], size_m: float, first: int) -> list[Chart]:
+    """The charts of a piece, its vertices counted from `first`. Charts without area have no corners (K, 0, 2)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    vertex_of, indices, uv = found
+    indices = indices.astype(np.int64)
+    edges = np.concatenate([indices[:, :2], indices[:, 1:]])
+    shape = (len(vertex_of), len(vertex_of))
+    graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=shape)
+    label = connected_components(graph, directed=False)[1][indices[:, 0]]
+    corners = _in_metres(mesh.positions[mesh.faces[piece.faces]].astype(float), uv[indices].astype(float), label)
+    order = np.argsort(label, kind="stable")
+    charts = []
+    for mine in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
+        here = corners[mine] / size_m if np.isfinite(corners[mine]).all() else np.zeros((len(mine), 0, 2))
+        charts.append(Chart(piece.owner, piece.faces[mine], here, first + indices[mine]))
+    return charts
+
+
+def _in_metres(world: Floats, uv: Floats, label: Indices) -> Floats:
+    """Corners (F, 3, 2) of charts as long as the triangles (F, 3, 3) are, by least squares; NaN where that fails.
+
+    xatlas fits small charts into whole texels of its own, each axis by itself: lengths^2 = a du^2 + b dv^2.
+    """
+    edge = np.roll(world, -1, axis=1) - world
+    run = (np.roll(uv, -1, axis=1) - uv) ** 2
+    length = (edge**2).sum(axis=2)
+    total = np.bincount(label, length.sum(axis=1))[label][:, None]
+
+    def summed(values: Floats) -> Floats:
+        return np.asarray(np.bincount(label, (values / np.maximum(total, 1e-300)).sum(axis=1)), float)
+
+    uu, uv_, vv = summed(run[..., 0] ** 2), summed(run[..., 0] * run[..., 1]), summed(run[..., 1] ** 2)
+    ul, vl = summed(run[..., 0] * length), summed(run[..., 1] * length)
+    twice = np.abs(cross_2d(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]))
+    in_map, in_world = np.bincount(label, twice), np.bincount(label, 2 * triangle_areas(world))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        determinant = uu * vv - uv_**2
+        a, b = (ul * vv - vl * uv_) / determinant, (vl * uu - ul * uv_) / determinant
+        even = in_world / in_map
+        found = (a > 0) & (b > 0) & (determinant > 1e-9 * uu * vv)
+        scale = np.sqrt(np.stack([np.where(found, a, even), np.where(found, b, even)], axis=1))
+        scale *= np.sqrt(in_world / (in_map * scale.prod(axis=1)))[:, None]
+    scale[(in_map <= 0) | (in_world <= 0)] = np.nan
+    return np.asarray(uv * scale[label][:, None])
+
+
+def texels_taken(extents: Floats) -> Floats:
+    """Texels of rectangles (..., 2) as they are packed: sides are a texel long at least."""
+    return np.asarray((np.maximum(extents, 1) + 1).prod(axis=-1))
+
+
+def upright(corners: Floats) -> Floats:
+    """A chart (K, 3, 2) turned so that the rectangle around it takes fewest texels, of ANGLES and its longest edge."""
+    edges = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
+    longest = edges[(edges**2).sum(axis=1).argmax()]
+    turns = _turns(np.append(ANGLES, np.arctan2(longest[1], longest[0])))
+    taken = texels_taken(np.ptp(corners.reshape(-1, 2) @ turns, axis=1))
+    return np.asarray(corners @ turns[taken.argmin()])
+
+
+def _turns(angles: Floats) -> Floats:
+    """(N, 2, 2) rotations by -angles, of rows from the left."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+
+
+def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list[Chart]:
+    """Charts of an object, small ones merged where that takes fewer texels."""
+    kept, small, lost, taken = [], [], [], 0.0
+    for chart in charts:
+        if not chart.corners.size:
+            lost.append(chart.faces)
+            continue
+        edge = chart.corners - chart.corners[:, :1]
+        area = float(np.abs(cross_2d(edge[:, 1], edge[:, 2])).sum() / 2)
+        here = float(texels_taken(np.ptp(chart.corners.reshape(-1, 2), axis=0)))
+        if (area < SMALL or area < SLIM * here) and _is_flat(mesh, chart.faces):
+            small.append(chart)
+            taken += here
+        else:
+            kept.append(chart)
+    if small:
+        merged = _by_direction(mesh, owner, np.concatenate([chart.faces for chart in small]), size_m, 1)
+        extents = np.array([np.ptp(chart.corners.reshape(-1, 2), axis=0) for chart in merged])
+        kept += merged if texels_taken(extents).sum() < taken else small
+    if lost:
+        kept += _by_direction(mesh, owner, np.concatenate(lost), size_m, 2 + len(charts))
+    return kept
+
+
+def _is_flat(mesh: Mesh, faces: Indices) -> bool:
+    """Whether all these faces look almost one way: on rounded things, seams along six directions would be seen."""
+    vectors = area_vectors(mesh.positions[mesh.faces[faces]].astype(float))
+    return bool((normalize(vectors) @ normalize(vectors.sum(axis=0)) > np.cos(np.radians(FLAT_DEG))).all())
+
+
+def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
+    """Merged charts of some faces; vertices of different `first` differ. `size_m` (F,) is of all faces."""
+    corners, size_m = mesh.positions[mesh.faces[faces]].astype(float), size_m[faces]
+    normals, areas = triangle_normals(corners), triangle_areas(corners)
+    axis = np.abs(normals).argmax(axis=1)
+    towards = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
+    charts: list[Chart] = []
+    for direction in np.unique(towards):
+        for mine in _clusters(corners, areas, size_m, np.flatnonzero(towards == direction), direction // 2):
+            flat = np.delete(corners[mine], direction // 2, axis=2) / _mean_size(areas[mine], size_m[mine])
+            number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
+            charts.append(Chart(owner, faces[mine], upright(flat), -number))  # negative: none of a chart by xatlas
+    return charts
+
+
+def _mean_size(areas: Floats, size_m: Floats) -> float:
+    return float(np.average(size_m, weights=areas)) if areas.sum() > 0 else float(size_m.mean())
+
+
+def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, depth: int) -> list[Indices]:
+    """Faces in groups that lie close together, each halved as long as that costs less."""
+    centres, turns = (corners.min(axis=1) + corners.max(axis=1)) / 2, _turns(ANGLES)
+
+    def cost(mine: Indices) -> tuple[float, float]:
+        size = _mean_size(areas[mine], size_m[mine])
+        points = corners[mine].reshape(-1, 3) / size
+        sides = np.ptp(np.delete(points, depth, axis=1) @ turns, axis=1)
+        mixed = areas[mine].sum() / size**2 * np.ptp(points[:, depth])
+        return float(texels_taken(sides).min() + MIXED * mixed), float(sides[0].max())
+
+    left, found = [(faces, *cost(faces))], []
+    while left:
+        mine, price, side = left.pop()
+        best: tuple[float, list[tuple[Indices, float, float]]] = (np.inf, [])
+        for axis in range(3):
+            along = centres[mine, axis]
+            lower: Flags = along < (along.min() + along.max()) / 2
+            if lower.any() and not lower.all():
+                halves = [(half, *cost(half)) for half in (mine[lower], mine[~lower])]
+                best = min(best, (halves[0][1] + halves[1][1], halves), key=lambda one: one[0])
+        if best[1] and best[0] < (TRIED * price if side > LONGEST else price):
+            left += best[1]
+        else:
+            found.append(mine)
+    return found

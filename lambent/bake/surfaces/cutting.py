@@ -1,0 +1,101 @@
+"""Very large triangles, cut so that the part near viewers is apart from the rest: only then can it have finer texels.
+
+A floor that is a plain of two triangles is halved along longest edges (Rivara 1984), until no triangle near viewers is
+longer than they see, and none far away longer than its distance. Neighbours are cut along with it: there are no
+T-junctions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import normalize
+from lambent.scenes.scene import Mesh
+
+LEAST_M = 10.0  # a shorter triangle is never cut
+TIMES = 4.0  # as long as viewers see, from where on an object's triangles are cut
+MOST_FACES = 20_000  # of an object, after which nothing more is cut
+ROUNDS = 64
+
+
+def lengths_of(corners: Floats) -> Floats:
+    """(F,) longest edge of triangles (F, 3, 3)."""
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1, initial=0))
+
+
+def is_too_long(mesh: Mesh, reach_m: float = 0.0) -> bool:
+    """Whether triangles of a mesh are so long that they are cut where viewers see `reach_m` far."""
+    return bool(lengths_of(mesh.corners.astype(float)).max(initial=0) > max(LEAST_M, TIMES * reach_m))
+
+
+def cut(mesh: Mesh, eyes: Floats, reach_m: float) -> Mesh:
+    """The mesh with no triangle longer than `reach_m` and its distance from the nearest of the eyes (E, 3)."""
+    for _ in range(ROUNDS):
+        corners = mesh.corners.astype(float)
+        middles = corners.mean(axis=1)
+        length, radius = lengths_of(corners), np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+        large = np.flatnonzero(length > max(reach_m, LEAST_M / TIMES))
+        away = np.linalg.norm(middles[large, None] - eyes, axis=2).min(axis=1) - radius[large]
+        wanted = np.zeros(len(corners), bool)
+        wanted[large] = length[large] > away
+        if not wanted.any() or len(corners) > MOST_FACES:
+            break
+        mesh = _halved(mesh, wanted)
+    return mesh
+
+
+def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
+    """Triangles `wanted` (F,) halved across their longest edge, and others as often as keeps edges whole."""
+    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
+    place = place.reshape(-1).astype(np.int64)
+
+    def edges(faces: Indices) -> Indices:
+        """(F, 3) numbers of the edges opposite to corner 2, 0, 1, whatever vertices they have."""
+        ends = np.sort(np.stack([place[faces], place[np.roll(faces, -1, axis=1)]], axis=-1), axis=-1)
+        return np.asarray((ends[..., 0] << 32) + ends[..., 1])
+
+    faces = mesh.faces.astype(np.int64)
+    corners = mesh.corners.astype(float)
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).argmax(axis=1)
+    number, rows = edges(faces), np.arange(len(faces))
+    marked = np.unique(number[wanted, longest[wanted]])
+    while True:
+        touched = np.isin(number, marked).any(axis=1)
+        more = np.unique(number[touched, longest[touched]])
+        if np.isin(more, marked).all():
+            break
+        marked = np.union1d(marked, more)
+    faces = np.take_along_axis(faces, (longest[:, None] + np.arange(3)) % 3, axis=1)[rows]  # longest edge first
+    for _ in range(2):  # first the longest edge, then what is left of the others
+        hit = np.isin(edges(faces), marked)
+        first = hit.argmax(axis=1)
+        faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+        a, b, c = faces[hit.any(axis=1)].T
+        mesh, middle = _with_middles(mesh, a, b)
+        place = np.concatenate([place, place.max() + 1 + np.arange(len(mesh.positions) - len(place))])
+        halves = [np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)]
+        faces = np.concatenate([faces[~hit.any(axis=1)], *halves])
+    return replace(mesh, faces=faces.astype(np.uint32))
+
+
+def _with_middles(mesh: Mesh, a: Indices, b: Indices) -> tuple[Mesh, Indices]:
+    """The mesh with vertices between vertices a and b (N,), one for each pair, and their numbers (N,)."""
+    pairs, index = np.unique(np.sort(np.stack([a, b], axis=1), axis=1), axis=0, return_inverse=True)
+
+    def between(values: Floats) -> Floats:
+        return np.asarray((values[pairs[:, 0]] + values[pairs[:, 1]]) / 2)
+
+    def longer(old: Floats, new: Floats) -> Floats:
+        return np.concatenate([old, new]).astype(old.dtype)
+
+    longer_mesh = Mesh(
+        longer(mesh.positions, between(mesh.positions)),
+        longer(mesh.normals, normalize(between(mesh.normals))),
+        longer(mesh.tangents, normalize(between(mesh.tangents))),
+        longer(mesh.uv, between(mesh.uv)),
+        mesh.faces,
+    )
+    return longer_mesh, len(mesh.positions) + index.reshape(-1)

@@ -1,0 +1,85 @@
+"""The sun that leaves the light map: what paths leave out of their first light, and its light by shadow rays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.sky.sun import ALIGNED, FoundSun
+from lambent.bake.tracing import rays
+from lambent.core.directions import basis
+
+
+class Sun:
+    """A sun on the device, in whatever scenes its scene is built into."""
+
+    def __init__(self, found: FoundSun) -> None:
+        self.record, self._picture = found.record, found.picture
+        self.direction = mi.Vector3f(*found.record.direction)
+        if found.picture is not None:
+            pixels = mi.TensorXf(found.picture.pixels)
+            self._texels = mi.Texture2f(pixels, wrap_mode=dr.WrapMode.Clamp)
+            self._turn = [[float(x) for x in axis] for axis in found.picture.turn.T]
+
+    def radiance(self, w: Any) -> Any:
+        """What the sun adds to the environment's radiance (mi.Color3f) in unit directions w (mi.Vector3f)."""
+        if self._picture is None:
+            return mi.Color3f(0.0)
+        (height, width), (top, left) = self._picture.size, self._picture.corner
+        x, y, z = (axis[0] * w.x + axis[1] * w.y + axis[2] * w.z for axis in self._turn)
+        around = dr.atan2(x, -z) / (2 * dr.pi)
+        column = (around - dr.floor(around)) * width - 0.5 - left
+        column -= dr.floor(column / width) * width
+        row = dr.safe_acos(y) * ((height - 1) / dr.pi) - top
+        h, w_ = self._picture.pixels.shape[:2]
+        inside = (row > 0) & (row < h - 1) & (column > 0) & (column < w_ - 1)
+        place = mi.Point2f((column + 0.5) / w_, (row + 0.5) / h)
+        return dr.select(inside, mi.Color3f(self._texels.eval(place, inside)), 0.0)
+
+    def left_out(self, ds: Any, value: Any) -> Any:
+        """Light over density (mi.Color3f) of emitter samples ds (mi.DirectionSample3f), without the sun's."""
+        if self._picture is not None:
+            return value - dr.select(ds.emitter.is_environment(), self.radiance(ds.d) / ds.pdf, 0.0)
+        directional = mi.has_flag(ds.emitter.flags(), mi.EmitterFlags.DeltaDirection)
+        return dr.select(directional & (dr.dot(ds.d, self.direction) > 1 - ALIGNED), 0.0, value)
+
+    def sky_share(self, environment: Any, w: Any) -> Any:
+        """Share (mi.Color3f) of the environment's radiance in unit directions w that is not the sun's."""
+        if self._picture is None:
+            return mi.Color3f(1.0)
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(w))
+        si.wi = -w
+        return dr.clip(1 - self.radiance(w) / dr.maximum(environment.eval(si), 1e-20), 0, 1)
+
+    def is_light(self, emitter: Any, w: Any) -> Any:
+        """Whether emitters (mi.EmitterPtr) that light arrives from along w are the sun."""
+        directional = mi.has_flag(emitter.flags(), mi.EmitterFlags.DeltaDirection)
+        return directional & (self._picture is None) & (dr.dot(w, self.direction) > 1 - ALIGNED)
+
+
+class SunRays:
+    """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random places of its disc."""
+
+    def __init__(self, sun: Sun, scene: Any) -> None:
+        self._sun, self._scene, self._holes = sun, scene, rays.has_holes(scene)
+        across, up = basis(np.array(sun.record.direction))
+        self._across, self._up = mi.Vector3f(*map(float, across)), mi.Vector3f(*map(float, up))
+        self._tangent = float(np.tan(sun.record.radius_rad))
+        self._irradiance = mi.Color3f(*sun.record.irradiance)
+
+    def __call__(self, si: Any, active: Any) -> Any:
+        """Irradiance (mi.Color3f), the cosine of the shading normal included: negative where it falls on the back.
+
+        Each place of a surface has one random direction of its own.
+        """
+        bits = [dr.reinterpret_array(mi.UInt32, x) for x in (si.p.x, si.p.y, si.p.z)]
+        u = mi.Point2f(mi.sample_tea_float32(bits[0] ^ bits[1], bits[2]), mi.sample_tea_float32(bits[2], bits[0]))
+        on_disc = mi.warp.square_to_uniform_disk_concentric(u) * self._tangent
+        w = dr.normalize(self._sun.direction + self._across * on_disc.x + self._up * on_disc.y)
+        cosine = dr.dot(si.sh_frame.n, self._sun.direction)
+        lit = active & (cosine != 0)
+        lit &= ~rays.in_shadow(self._scene, rays.leaving(self._scene, si.p, si.n, w), lit, self._holes)
+        return dr.select(lit, self._irradiance * cosine, 0.0)

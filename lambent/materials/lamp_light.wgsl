@@ -1,0 +1,42 @@
+// A lobe under one small lamp, in closed form: see lamp_light.py, which is the truth; tests compare the two. Needs lobes.wgsl.
+
+const LAMBENT_GGX_WIDER = 1.7;
+const LAMBENT_HORIZON = 1.2;
+const LAMBENT_LAMP_COS_MIN = 1e-3;
+const LAMBENT_REACH_MIN = 1e-5;
+
+// Mean of f |cos_i| over a lamp, 1/sr: wi its mean direction where the lobe is one about the mirror direction, a and b
+// the deviations of its directions in the same frame.
+fn lambent_lamp_response(lobe: LambentLobe, wo: vec3f, wi: vec3f, a: vec3f, b: vec3f) -> vec3f {
+    let reach = LAMBENT_HORIZON * (abs(a.z) + abs(b.z)) + LAMBENT_REACH_MIN;
+    let cos_i = max(select(wi.z, 0.5 * (wi.z + reach), wi.z < reach), LAMBENT_LAMP_COS_MIN);
+    let cos_o = max(wo.z, LAMBENT_LAMP_COS_MIN);
+    let total = vec3f(wi.xy + wo.xy, cos_i + cos_o);
+    let length2 = dot(total, total);
+    // one division for four reciprocals: on a processor they are most of the work
+    let per_pair = vec2f(reach * total.z, cos_i * length2);
+    let inverse = 1.0 / (per_pair.x * per_pair.y);
+    let per_length2 = per_pair.x * cos_i * inverse;
+    let per_cos_i = per_pair.x * length2 * inverse;
+    let per_z = per_pair.y * reach * inverse;
+    let up = clamp(0.5 + 0.5 * wi.z * per_pair.y * total.z * inverse, 0.0, 1.0);
+    let rise = up * vec2f(a.z, b.z);
+    let middle = total.xy * per_z;
+    let ja = (a.xy - middle * rise.x) * per_z;
+    let jb = (b.xy - middle * rise.y) * per_z;
+    let along = vec2f(dot(a.xy, total.xy), dot(b.xy, total.xy)) + rise * total.z;
+    let bent = along * (3.0 * per_length2) - rise * (4.0 * per_z - (1.0 - lobe.alpha) * per_cos_i);
+    let tilt = clamp(bent, vec2f(-1.0), vec2f(1.0));
+    let slope = middle + tilt.x * ja + tilt.y * jb;
+    let is_ggx = lobe.distribution == LAMBENT_GGX;
+    let wider = select(2.0, 2.0 * LAMBENT_GGX_WIDER, is_ggx);
+    let m = vec2f(lobe.mx * lobe.mx, lobe.my * lobe.my) + wider * (ja * ja + jb * jb);
+    let xy = wider * (ja.x * ja.y + jb.x * jb.y);
+    let per_det = 1.0 / (m.x * m.y - xy * xy);
+    let distance2 = max(dot(m.yx, slope * slope) - 2.0 * xy * slope.x * slope.y, 0.0) * per_det;
+    let exponent = 0.72134752 * dot(tilt, tilt) + (1.0 - lobe.alpha) * log2(cos_i) - lobe.alpha * log2(cos_o);
+    let fall = select(1.44269504 * distance2, 2.0 * log2(1.0 + distance2), is_ggx);
+    let per_z2 = per_z * per_z;
+    let size = sqrt(per_det * length2 * length2 * length2) * per_z2 * per_z2 * (0.5 / LAMBENT_PI);
+    return up * exp2(exponent - fall) * size * lambent_tint(min(0.5 * sqrt(length2), 1.0), lobe);
+}

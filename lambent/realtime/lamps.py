@@ -1,0 +1,135 @@
+"""A probe's lamps outside of its cube map, for shaders/lamps.wgsl.
+
+Lamps of similar radius form a group. Groups leave the cube map one after the other, the smallest first, as lobes get
+wider than they are; there is a cube map for each number of groups that have left, and lobes between two of them mix
+both (`groups_out`), so that nothing pops while a roughness is dragged.
+
+The table that the shader reads has the rows
+    radii of the groups, a large number where there is none
+    (lamps up to and with each group)
+and per lamp
+    mean place about the probe's centre, m, or direction; 1 where it is a place
+    excess flux, W/m^2 on a surface at the probe's centre that faces the lamp; its group
+    two principal deviations a, b of its places or directions; of places their w are e^3/|n.p| and a.a + b.b
+Seen from x a place p has e^2 = |p - x|^2 + a.a + b.b, which bounds what is touched, and n = a x b: the flux changes
+with |n.(p - x)|/e^3, as a surface of that normal does.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.core.colour import luminance
+from lambent.core.directions import normalize
+from lambent.core.lamps import MOST, Lamp, corners, find_lamps, moments
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import Probe
+from lambent.realtime.cube_mips import finite, smooth_chain
+from lambent.realtime.incident import LookUp
+
+GROUPS = 4
+GROUP_RATIO = 1.25  # of radii, from which on two lamps may be in two groups
+FIRST, LAST = 0.54, 0.62  # widths of a lobe, in radii of a group, between which the group leaves
+NONE = 1e9
+HEAD_ROWS, LAMP_ROWS = 2, 4
+
+
+class ProbeLamps:
+    """The lamps of a probe, their groups, and the cube maps without them."""
+
+    def __init__(self, radiance: Floats) -> None:
+        self.radiance = finite(radiance)[0]
+        self.lamps = find_lamps(self.radiance)
+        self.group = group_of([lamp.radius_rad for lamp in self.lamps])
+
+    @property
+    def groups(self) -> int:
+        return int(self.group.max(initial=-1)) + 1
+
+    @cached_property
+    def radii(self) -> Floats:
+        """(GROUPS,) largest radius of each group."""
+        radii = np.full(GROUPS, NONE)
+        for number in range(self.groups):
+            radii[number] = max(
+                lamp.radius_rad for lamp, of in zip(self.lamps, self.group, strict=True) if of == number
+            )
+        return radii
+
+    def serve(self, material: Material, textured: bool) -> bool:
+        """Whether a lamp leaves the cube for any lobe of a material, whose widths textures may change."""
+        return self.groups > 0 and (textured or any(groups_out(lobe, self.radii) > 0 for lobe in material.lobes))
+
+    def all_out(self, material: Material, textured: bool) -> bool:
+        """Whether no lamp is in the cube map of any lobe."""
+        return not textured and all(groups_out(lobe, self.radii) == self.groups for lobe in material.lobes)
+
+    def mixes(self, material: Material, textured: bool) -> bool:
+        """Whether a lobe may be between two of the cube maps."""
+        return textured or any(groups_out(lobe, self.radii) % 1 > 0 for lobe in material.lobes)
+
+    def chain(self) -> list[Floats]:
+        """Levels (6 (groups + 1), n, n, 3): cube maps with 0, 1, ... groups taken out, one after the other."""
+        cubes = [self.radiance]
+        for number in range(self.groups):
+            left = cubes[-1].reshape(-1, 3).copy()
+            for lamp, of in zip(self.lamps, self.group, strict=True):
+                if of == number:
+                    left[lamp.texels] -= lamp.excess
+            cubes.append(np.maximum(left, 0).reshape(self.radiance.shape))
+        return [np.concatenate(levels) for levels in zip(*map(smooth_chain, cubes), strict=True)]
+
+    def table(self, probe: Probe, look_up: LookUp) -> NDArray[np.float32]:
+        """(HEAD_ROWS + LAMP_ROWS MOST, 4) rows as above, lamps where the look-up finds them."""
+        counts = [np.count_nonzero(self.group <= number) for number in range(GROUPS)]
+        rows = [np.array([self.radii, counts])]
+        n = self.radiance.shape[1]
+        rows += [
+            placed(lamp, int(group), n, probe, look_up) for lamp, group in zip(self.lamps, self.group, strict=True)
+        ]
+        table = np.zeros((HEAD_ROWS + LAMP_ROWS * MOST, 4), np.float32)
+        filled = np.concatenate(rows)
+        table[: len(filled)] = filled
+        return table
+
+
+def group_of(radii: list[float]) -> NDArray[np.intp]:
+    """(K,) group of each of the radii, which rise: cut at the widest gaps."""
+    gaps = np.diff(np.log(np.maximum(radii, 1e-6)))
+    widest = np.argsort(-gaps, kind="stable")[: GROUPS - 1]
+    cut = np.zeros(len(radii), np.intp)
+    cut[1 + widest[gaps[widest] > np.log(GROUP_RATIO)]] = 1
+    return np.cumsum(cut)
+
+
+def groups_out(lobe: Lobe, radii: Floats) -> float:
+    """Groups that have left the cube map for a lobe; fractions are shares of the last (groups_out of lamps.wgsl)."""
+    share = np.clip((np.sqrt(lobe.mx * lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
+    return float(np.sum(share * share * (3 - 2 * share)))
+
+
+def placed(lamp: Lamp, group: int, n: int, probe: Probe, look_up: LookUp) -> Floats:
+    """(LAMP_ROWS, 4) rows of a lamp of a cube map of n x n faces, where a look-up finds what the probe sees."""
+    w = normalize(corners(lamp.texels, n).reshape(-1, 3))
+    weight = np.repeat(luminance(lamp.flux), 4)
+    distance = look_up.distances(probe, w)
+    near = np.isfinite(distance)
+    is_near = bool(weight[near].sum() > 0.5 * weight.sum())
+    points = w[near] * distance[near, None] if is_near else w
+    mean, covariance = moments(points, weight[near] if is_near else weight)
+    value, vector = np.linalg.eigh(covariance)
+    axes = (vector * np.sqrt(np.maximum(value, 0))).T[:0:-1]
+    scale = extent2 = 0.0
+    if is_near:
+        length = float(np.linalg.norm(mean))
+        facing = np.linalg.norm(np.cross(*axes)) * max(abs(float(mean @ vector[:, 0])), 0.05 * length)
+        extent2 = float((axes * axes).sum())
+        scale = (length**2 + extent2) ** 1.5 / max(facing, 1e-12)
+    else:
+        mean = mean / np.linalg.norm(mean)
+    flux = lamp.flux.sum(axis=0)
+    return np.array([[*mean, is_near], [*flux, group], [*axes[0], scale], [*axes[1], extent2]])

@@ -1,0 +1,24 @@
+"""What a frame is drawn over, where the objects of some materials alone are drawn anew."""
+
+from __future__ import annotations
+
+from lambent.realtime.context import FrameContext
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.pipelines import screen_pipeline
+from lambent.realtime.slices import Steps
+
+
+class BasePass:
+    """Enlarges the last frame into the target where it was smaller; else it is in the target already."""
+
+    def __init__(self, layouts: Layouts) -> None:
+        self._layouts = layouts
+        self._pipeline = screen_pipeline(layouts.device, "enlarge", [layouts.shown], ["rgba16float"])
+
+    def encode(self, context: FrameContext) -> Steps:
+        """Draw the base into the target."""
+        if context.redrawn is None or context.base is context.target.radiance:
+            return
+        group = self._layouts.group(self._layouts.shown, context.base.create_view(), context.resources.sampler)
+        context.cover("enlarge", [context.target.radiance.create_view()], self._pipeline, [group])
+        yield

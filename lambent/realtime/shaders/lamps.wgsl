@@ -1,0 +1,73 @@
+// `lamps`: as rings.wgsl, with the probe's small lamps outside of the cube map, each under the lobe in closed form
+// (lamp_light.wgsl). The table is that of lamps.py.
+
+#include "surface.wgsl"
+#include "albedo_factor.wgsl"
+#include "lamp_light.wgsl"
+
+@group(2) @binding(1) var cleaned_cubes: texture_cube_array<f32>; // without 0, 1, ... groups of lamps
+@group(2) @binding(2) var<uniform> lamps: array<vec4f, 66>;
+
+override LAYERS: u32 = 2u; // 1 where no lobe is between two cube maps, which the loop need not allow for
+
+const LAMP_HEAD = 2u;
+const LAMP_ROWS = 4u;
+const FIRST_OUT = 0.54;
+const LAST_OUT = 0.62;
+
+// How many groups have left the cube map for a lobe; fractions are shares of the last (lamps.py).
+fn groups_out(lobe: LambentLobe) -> f32 {
+    let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), sqrt(lobe.mx * lobe.my) / lamps[0]);
+    return dot(share, vec4f(1.0));
+}
+
+fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
+    let count = select(0u, u32(lamps[1][u32(max(ceil(out), 1.0)) - 1u]), out > 0.0);
+    let sides = on_side(lobe, vec3f(1.0));
+    let to_local = transpose(mat3x3f(sides.x * s.t, sides.y * s.b, sides.z * s.n));
+    var sum = vec3f(0.0);
+    for (var k = 0u; k < count; k++) {
+        let row = LAMP_HEAD + k * LAMP_ROWS;
+        let place = lamps[row];
+        let flux = lamps[row + 1u];
+        let first = lamps[row + 2u];
+        let second = lamps[row + 3u];
+        let to = place.xyz - place.w * s.x;
+        let per_t = inverseSqrt(dot(to, to) + second.w); // a bit short, as the mean direction of what is near should be
+        let wi = (to_local * to) * per_t;
+        let facing = first.w * abs(dot(cross(first.xyz, second.xyz), to)) * per_t * per_t * per_t;
+        let a = rejection((to_local * first.xyz) * per_t, wi);
+        let b = rejection((to_local * second.xyz) * per_t, wi);
+        let light = lambent_lamp_response(lobe, wo, wi, a, b);
+        let share = clamp(out - flux.w, 0.0, 1.0) * select(1.0, facing, place.w > 0.0);
+        sum += share * select(reaching(s, to), s.occlusion, place.w > 0.0) * flux.rgb * light;
+    }
+    return sum;
+}
+
+fn cleaned_light(s: Surface, w: vec3f, half_log2_omega: f32, layer: u32) -> vec3f {
+    let found = incident_look_up(s.x, to_world(s, w));
+    let level = level_of_look_up(found, half_log2_omega);
+    return s.occlusion * textureSampleLevel(cleaned_cubes, linear_sampler, found.direction, layer, level).rgb;
+}
+
+fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
+    let here = lobe_here(index, s);
+    let lobe = here.lobe;
+    let first = index * (SAMPLES + FACTOR_ROWS);
+    let out = groups_out(lobe);
+    let layer = u32(out);
+    let mixed = fract(out);
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < LAYERS; i++) {
+        let share = select(select(1.0 - mixed, mixed, i == 1u), 1.0, LAYERS == 1u);
+        for (var k = 0u; k < SAMPLES; k++) {
+            let q = samples[first + k];
+            let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
+            if (!at.seen) { continue; }
+            let light = cleaned_light(s, on_side(lobe, at.wi), half_log2_omega(q, at, here), min(layer + i, textureNumLayers(cleaned_cubes) - 1u));
+            sum += share * q.w * gain(lobe, at.wi, wo, at.h) * light;
+        }
+    }
+    return sum * (albedo_factor(first + SAMPLES, wo.z) / f32(SAMPLES)) + lamps_light(lobe, wo, s, out);
+}

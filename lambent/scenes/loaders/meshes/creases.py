@@ -1,0 +1,82 @@
+"""Hard edges: normals that are smooth across them lean far from their faces, and shade a box like a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.directions import normalize
+from lambent.core.geometry import area_vectors, triangle_areas, triangle_normals
+from lambent.scenes.geometry import tangents_along
+from lambent.scenes.scene import Mesh, SceneObject
+
+LEANING_DEG = 40.0  # from its face, for a normal to be worth a warning; those of a round thing of 10 sides lean 18
+MUCH = 0.2  # of an object's area: fillets lean, and are meant to
+NAMED = 2
+
+
+def leaning_faces(mesh: Mesh) -> int:
+    """Triangles with a normal that leans more than LEANING_DEG from them; 0 if they are less than MUCH of the area."""
+    corners = mesh.corners.astype(float)
+    faces, areas = triangle_normals(corners), triangle_areas(corners)
+    cosine = np.abs((mesh.normals[mesh.faces].astype(float) * faces[:, None]).sum(axis=2)).min(axis=1)
+    leaning = (cosine < np.cos(np.radians(LEANING_DEG))) & (areas > 0)
+    return int(leaning.sum()) if areas[leaning].sum() > MUCH * areas.sum() else 0
+
+
+def leaning_warnings(objects: Sequence[SceneObject]) -> list[str]:
+    """One warning for all objects with `leaning_faces`, or none."""
+    counts = {o.name: count for o in objects if (count := leaning_faces(o.mesh))}
+    if not counts:
+        return []
+    names = ", ".join([*list(counts)[:NAMED], *(["..."] if len(counts) > NAMED else [])])
+    return [
+        f"{sum(counts.values())} triangles of {len(counts)} objects ({names}) have normals over {LEANING_DEG:.0f} "
+        f"degrees off, as boxes with smooth normals do: a crease angle of {LEANING_DEG:.0f} makes such edges hard "
+        "(--crease-angle, crease_angle in a scene.toml)"
+    ]
+
+
+def creased(mesh: Mesh, angle_deg: float) -> Mesh:
+    """The mesh with new normals: smooth where faces meet at less than an angle, and hard elsewhere.
+
+    The normal of a corner is the mean of the faces that meet there within the angle of its own, by area. Vertices are
+    split where corners get different normals.
+    """
+    corners = mesh.corners.astype(float)
+    vectors, faces = area_vectors(corners), triangle_normals(corners)
+    turned = (faces * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0  # against the winding, as the file has it
+    vectors[turned], faces[turned] = -vectors[turned], -faces[turned]
+    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
+    place = place.reshape(-1)[mesh.faces.reshape(-1)]  # by corner
+    order = np.argsort(place, kind="stable")
+    count = np.bincount(place)
+    first = np.cumsum(count) - count
+    own = np.repeat(order, count[place[order]])  # pairs of corners at one place
+    step = np.arange(len(own)) - np.repeat(np.cumsum(count[place[order]]) - count[place[order]], count[place[order]])
+    other = order[first[place[own]] + step]
+    near = (faces[own // 3] * faces[other // 3]).sum(axis=1) >= np.cos(np.radians(angle_deg)) - 1e-6
+    near |= own == other
+    sums = [np.bincount(own[near], vectors[other[near] // 3, axis], len(place)) for axis in range(3)]
+    total = np.stack(sums, axis=1).astype(float)
+    normals = normalize(total)
+    normals[(normals == 0).all(axis=1)] = faces[np.flatnonzero((normals == 0).all(axis=1)) // 3]
+    vertex = mesh.faces.reshape(-1).astype(float)
+    _, kept, index = np.unique(
+        np.column_stack([vertex, normals.round(5)]), axis=0, return_index=True, return_inverse=True
+    )
+    source = mesh.faces.reshape(-1)[kept]
+    new: Floats = normals[kept]
+    return Mesh(
+        mesh.positions[source], new.astype(np.float32),
+        tangents_along(new, mesh.tangents[source].astype(float)).astype(np.float32), mesh.uv[source],
+        index.reshape(-1, 3).astype(np.uint32),
+    )  # fmt: skip
+
+
+def with_creases(objects: Sequence[SceneObject], angle_deg: float) -> tuple[SceneObject, ...]:
+    """The objects whose normals lean, `creased`; the others as they are."""
+    return tuple(replace(o, mesh=creased(o.mesh, angle_deg)) if leaning_faces(o.mesh) else o for o in objects)

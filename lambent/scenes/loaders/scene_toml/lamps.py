@@ -1,0 +1,144 @@
+"""Lights of a scene.toml, in radiometric or photometric units: W/sr, cd, lm; W/m^2, lx; IES files.
+
+A photometric light is white, or of a `colour`, whose luminance does not matter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from lambent.core.colour import luminance
+from lambent.core.photometry import LM_PER_W
+from lambent.core.plain import Triple, triple
+from lambent.scenes.ies import Photometry
+from lambent.scenes.loaders.scene_toml.sections import Colour, Finite, NotNegative, Section, Vector, not_zero, unit
+from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
+
+WHITE: Triple = (1.0, 1.0, 1.0)
+
+
+def one_of(section: Section, *names: str, needed: bool = True) -> None:
+    """`ValueError` where a section has more than one of these keys, or none that is needed."""
+    given = [name for name in names if getattr(section, name) is not None]
+    if len(given) > 1:
+        raise ValueError(f"says its light twice, by {given[0]} and {given[1]}")
+    if needed and not given:
+        raise ValueError(f"does not say its light, by one of {', '.join(names)}")
+
+
+def coloured(value: float, colour: Colour | None) -> Triple:
+    """W/sr, W/m^2 or W/(sr m^2) of cd, lx or cd/m^2."""
+    tint = np.array(colour or WHITE, float)
+    return triple(tint * (value / LM_PER_W / max(float(luminance(tint)), 1e-9)))
+
+
+class _Coloured(Section):
+    colour: Colour | None = None
+
+    @field_validator("colour")
+    @classmethod
+    def _not_black(cls, colour: Colour | None) -> Colour | None:
+        if colour is not None and not any(colour):
+            raise ValueError("a colour cannot be black")
+        return colour
+
+
+class PointSection(_Coloured):
+    """W/sr, cd, or lm in all directions."""
+
+    kind: Literal["point"]
+    position: Vector
+    intensity: Colour | None = None
+    candela: NotNegative | None = None
+    lumens: NotNegative | None = None
+
+    @model_validator(mode="after")
+    def _light(self) -> PointSection:
+        one_of(self, "intensity", "candela", "lumens")
+        return self
+
+    def light(self) -> PointLight:
+        return PointLight(self.position, _intensity(self, 4 * math.pi))
+
+
+class SpotSection(_Coloured):
+    """W/sr or cd in its middle, or lm in its cone."""
+
+    kind: Literal["spot"]
+    position: Vector
+    intensity: Colour | None = None
+    candela: NotNegative | None = None
+    lumens: NotNegative | None = None
+    direction: Vector
+    inner_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
+    outer_deg: Annotated[float, Field(gt=0, le=90)] = 45.0
+
+    _direction = field_validator("direction")(not_zero)
+
+    @model_validator(mode="after")
+    def _cone(self) -> SpotSection:
+        if self.inner_deg > self.outer_deg:
+            raise ValueError("inner_deg is larger than outer_deg")
+        one_of(self, "intensity", "candela", "lumens")
+        return self
+
+    def light(self) -> PointLight:
+        inner, outer = math.radians(self.inner_deg), math.radians(self.outer_deg)
+        edge = (math.sin(outer) - math.sin(inner)) / (outer - inner) if outer > inner else math.cos(outer)
+        intensity = _intensity(self, 2 * math.pi * (1 - edge))  # falls linearly in the angle from inner to outer
+        return PointLight(self.position, intensity, unit(self.direction), self.inner_deg, self.outer_deg)
+
+
+def _intensity(section: PointSection | SpotSection, solid_angle_sr: float) -> Triple:
+    if section.intensity is not None:
+        return section.intensity
+    candela = section.candela if section.candela is not None else (section.lumens or 0.0) / max(solid_angle_sr, 1e-9)
+    return coloured(candela, section.colour)
+
+
+class DirectionalSection(_Coloured):
+    """W/m^2 or lx on a surface that faces it."""
+
+    kind: Literal["directional"]
+    direction: Vector
+    irradiance: Colour | None = None
+    lux: NotNegative | None = None
+
+    _direction = field_validator("direction")(not_zero)
+
+    @model_validator(mode="after")
+    def _light(self) -> DirectionalSection:
+        one_of(self, "irradiance", "lux")
+        return self
+
+    def light(self) -> DirectionalLight:
+        irradiance = self.irradiance if self.irradiance is not None else coloured(self.lux or 0.0, self.colour)
+        return DirectionalLight(unit(self.direction), irradiance)
+
+
+class IesSection(_Coloured):
+    """A luminaire of an IES file, straight down unless aimed; `lumens` scales it to that flux."""
+
+    kind: Literal["ies"]
+    file: str
+    position: Vector
+    direction: Vector = (0.0, -1.0, 0.0)
+    rotation_deg: Finite = 0.0
+    lumens: NotNegative | None = None
+
+    _direction = field_validator("direction")(not_zero)
+
+    def luminaire(self, photometry: Photometry) -> IesLight:
+        aim = unit(self.direction)
+        tilt_deg = math.degrees(math.acos(min(max(-aim[1], -1.0), 1.0)))
+        scale = photometry.tilted(tilt_deg)
+        if self.lumens is not None:
+            scale = self.lumens / max(photometry.lumens, 1e-9)
+        return IesLight(self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg)
+
+
+LightSection = PointSection | SpotSection | DirectionalSection | IesSection

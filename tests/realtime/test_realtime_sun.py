@@ -1,0 +1,210 @@
+"""Direct sunlight by the shadow map: a plate with an opening over a floor, whose penumbra is known by rays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+
+from lambent.core.camera import Camera, pixel_rays
+from lambent.core.cubemap import face_directions
+from lambent.core.directions import basis, normalize
+from lambent.core.sequences import hammersley
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.sun import BLOCK, block_ranges, squares_of
+from lambent.realtime.unbaked import unbaked_scene
+from lambent.scenes.geometry import box, merge, patch, placed
+from lambent.scenes.scene import Mesh
+from lambent.store.contract import SunRecord
+
+Floats = NDArray[np.floating]
+TOWARDS = normalize(np.array([0.3, 0.9, 0.2]))
+IRRADIANCE = (3.0, 2.0, 1.0)
+HEIGHT, HALF = 2.0, 0.5  # of the plate, and half the side of its opening, metres
+DOWN = Camera(name="down", position=(-0.7, 1.9, -0.4), target=(-0.7, 0.0, -0.401), fov_y_deg=60.0)
+SIZE = 96
+
+
+def plate() -> Mesh:
+    """A plate of 8 m in the plane y = HEIGHT with a square opening about x = z = 0."""
+    far = 4.0
+    sides = [
+        ((-far, far), (HALF, far)), ((-far, far), (-far, -HALF)), ((-far, -HALF), (-HALF, HALF)),
+        ((HALF, far), (-HALF, HALF)),
+    ]  # fmt: skip
+    parts = (patch((x[0], HEIGHT, z[1]), (x[1] - x[0], 0, 0), (0, 0, z[0] - z[1])) for x, z in sides)
+    return merge(parts)
+
+
+def floor(half: float = 4.0) -> Mesh:
+    return patch((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half))
+
+
+def scene(
+    meshes: dict[str, Mesh],
+    radius_deg: float,
+    material: Material | None = None,
+    environment: Floats | None = None,
+    **record: Any,
+) -> BakedScene:
+    """Under the sun alone: light maps are black, if the environment is."""
+    environment = np.zeros((6, 4, 4, 3), np.float32) if environment is None else environment
+    dark = unbaked_scene(meshes, material or Material(name="grey", kd=0.5), environment)
+    sun = SunRecord(direction=tuple(TOWARDS), irradiance=IRRADIANCE, radius_rad=np.radians(radius_deg))
+    return replace(dark, sun=sun, record=dark.record.model_copy(update={"cameras": (DOWN,), **record}))
+
+
+def drawn(device: Any, baked: BakedScene, camera: Camera = DOWN, frames: int = 16, **state: Any) -> Floats:
+    """(SIZE, SIZE) irradiance of the first channel, over that of a surface that faces the sun."""
+    renderer = Renderer(device, baked)
+    how = {"show": "light-map", "antialias": False, **state}
+    shown = [renderer.image(FrameState(camera, SIZE, SIZE, accumulate=k, **how)) for k in range(frames)]
+    return shown[-1][..., 0] / IRRADIANCE[0]
+
+
+def places(camera: Camera) -> Floats:
+    """(SIZE, SIZE, 3) of the floor that the pixels show."""
+    w = pixel_rays(camera, SIZE, SIZE)
+    return np.asarray(camera.position - w * (camera.position[1] / w[..., 1:2]))
+
+
+def traced(points: Floats, radius_deg: float) -> Floats:
+    """Share of the sun's disc that points of the floor see through the opening."""
+    t, b = basis(TOWARDS)
+    u = hammersley(4096)
+    disc = np.tan(np.radians(radius_deg)) * np.sqrt(u[:, :1]) * np.column_stack(
+        [np.cos(2 * np.pi * u[:, 1]), np.sin(2 * np.pi * u[:, 1])]
+    )  # fmt: skip
+    w = TOWARDS + disc[:, :1] * t + disc[:, 1:] * b
+    step = (w / w[:, 1:2])[:, [0, 2]] * HEIGHT
+    at = points.reshape(-1, 1, 3)[..., [0, 2]] + step
+    return np.asarray((np.abs(at).max(axis=-1) < HALF).mean(axis=1).reshape(points.shape[:2]))
+
+
+@pytest.mark.parametrize("radius_deg", [0.27, 3.0])
+def test_penumbra_is_that_of_rays_to_the_disc(device: Any, radius_deg: float) -> None:
+    found = drawn(device, scene({"floor": floor(), "plate": plate()}, radius_deg)) / TOWARDS[1]
+    expected = traced(places(DOWN), radius_deg)
+    penumbra = (expected > 0.02) & (expected < 0.98)
+    assert penumbra.sum() > 100 and (expected > 0.98).sum() > 100
+    assert np.abs(found - expected)[~penumbra].max() < 0.05
+    assert np.abs(found - expected)[penumbra].mean() < 0.04
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.01), "no light is lost or won"
+
+
+def test_penumbra_stays_sharp_over_a_plane_of_fifty_kilometres(device: Any) -> None:
+    found = drawn(device, scene({"floor": floor(25e3), "plate": plate()}, 0.27)) / TOWARDS[1]
+    expected = traced(places(DOWN), 0.27)
+    assert np.abs(found - expected).mean() < 0.02
+
+
+def test_lit_surfaces_do_not_shadow_themselves_and_blocks_do_not_leak(device: Any) -> None:
+    block = placed(box((0.8, 0.6, 0.8)), (0, 0.3, 0))
+    camera = Camera(name="aside", position=(2.0, 2.2, 1.2), target=(0.0, 0.2, 0.0), fov_y_deg=45.0)
+    found = drawn(device, scene({"floor": floor(), "block": block}, 0.27), camera, frames=1, antialias=False)
+    w = pixel_rays(camera, SIZE, SIZE)
+    expected, unsure = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE), bool)
+    for row, column in np.ndindex(SIZE, SIZE):
+        point, normal = first_hit(np.array(camera.position), w[row, column])
+        shares = [0.0 if in_block(point + 1e-4 * normal + 1e-6, aside) else 1.0 for aside in (-0.03, 0.0, 0.03)]
+        expected[row, column] = shares[1] * max(normal @ TOWARDS, 0)
+        unsure[row, column] = (normal[1] == 1 and point[1] < 0.1 and len(set(shares)) > 1) or abs(point).max() > 3.9
+    near_edge = unsure | (np.abs(np.gradient(expected)).max(axis=0) > 0)
+    assert near_edge.mean() < 0.4 and np.abs(found - expected)[~near_edge].max() < 0.02
+
+
+def first_hit(eye: Floats, w: Floats) -> tuple[Floats, Floats]:
+    """Where a ray meets the block or the floor, and the normal there."""
+    t = -eye[1] / w[1]
+    found = eye + t * w, np.array([0.0, 1.0, 0.0])
+    for axis, (low, high) in enumerate(((-0.4, 0.4), (0.0, 0.6), (-0.4, 0.4))):
+        face = high if w[axis] < 0 else low
+        at = (face - eye[axis]) / w[axis]
+        p = eye + at * w
+        inside = np.all((np.abs(p - [0, 0.3, 0]) <= [0.4, 0.3, 0.4]) | (np.arange(3) == axis))
+        if inside and 0 < at < t:
+            t, found = at, (p, -np.sign(w[axis]) * np.eye(3)[axis])
+    return found
+
+
+def in_block(p: Floats, aside: float) -> bool:
+    """Whether the block, grown by `aside` on all sides but below, hides the sun's centre."""
+    half = np.array([0.4, 0.3, 0.4]) + aside
+    near, far = np.sort([(s * half + [0, 0.3, 0] - p) / TOWARDS for s in (-1, 1)], axis=0)
+    return bool(near.max() < far.min() and far.min() > 1e-3)
+
+
+def test_sheet_that_transmits_shows_the_sun_from_behind(device: Any) -> None:
+    behind = Camera(name="behind", position=(0.0, -2.0, 0.0), target=(0.0, 0.0, 0.001), fov_y_deg=30.0)
+    for kt_d, expected in ((0.4, 0.4 * TOWARDS[1] / np.pi), (0.0, 0.0)):
+        sheet = Material(name="sheet", kd=(0.3,) * 3, kt_d=(kt_d,) * 3)
+        baked = scene({"sheet": floor(1.0)}, 0.27, sheet)
+        assert np.allclose(drawn(device, baked, behind, 1, show="diffuse"), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("integrator", ["lamps", "qmc"])
+def test_the_sun_is_mirrored_where_it_shines_alone(device: Any, integrator: str) -> None:
+    """A glossy floor under the opening: the sun of its probe as without the plate in light, and not in shadow."""
+    glossy = Material(name="glossy", lobes=(Lobe(k=1.0, mx=0.25, my=0.25, r0=0.9),))
+    cube = np.zeros((6, 64, 64, 3), np.float32)
+    directions = normalize(face_directions(64))
+    cube[directions @ TOWARDS > np.cos(np.radians(1.0))] = 1000.0
+    mirror = Camera(name="mirror", position=(-1.2, 1.9, -0.8), target=(-0.65, 0.0, -0.45), fov_y_deg=60.0)
+    images = []
+    for meshes in ({"floor": floor()}, {"floor": floor(), "plate": plate()}):
+        renderer = Renderer(device, scene(meshes, 0.27, glossy, cube))
+        frame = FrameState(mirror, SIZE, SIZE, show="specular", antialias=False, integrator=integrator, planar="off")
+        images.append(renderer.converged(frame, 64) if integrator == "qmc" else renderer.image(frame))
+    bare, covered = (image[..., 0] for image in images)
+    share = traced(places(mirror), 0.27)
+    lit, dark = (binary_erosion(share == of, iterations=3) for of in (1, 0))  # at rest, pixels have an extent
+    assert lit.sum() > 100 and dark.sum() > 1000 and bare[lit].mean() > 0.1
+    np.testing.assert_allclose(covered[lit], bare[lit], rtol=1e-3, atol=1e-3 * bare.max())
+    assert covered[dark].max() < 1e-3 * bare.max() < bare[dark].max()
+
+
+def test_frames_without_a_sun_are_dark_and_noise_knows_none(device: Any) -> None:
+    baked = scene({"floor": floor()}, 0.27)
+    assert not drawn(device, replace(baked, sun=None), frames=1).any()
+    assert not drawn(device, baked, frames=1, show="noise").any()
+
+
+def test_slices_of_a_frame_are_the_frame(device: Any) -> None:
+    from lambent.realtime.slices import Cut
+    from lambent.realtime.targets import DISPLAY_FORMAT, pixels, target_texture
+
+    renderer = Renderer(device, scene({"floor": floor(), "plate": plate()}, 3.0))
+    state = FrameState(DOWN, SIZE, SIZE)
+    whole, target = renderer.display_image(state), target_texture(device, (SIZE, SIZE), DISPLAY_FORMAT)
+    for _ in renderer.slices(state, target.create_view(), Cut()):
+        pass
+    assert np.array_equal(whole, pixels(device, target))
+
+
+def test_first_square_holds_what_cameras_see_and_the_last_all() -> None:
+    corners = np.concatenate([mesh.corners for mesh in (floor(25e3), plate())])
+    found = squares_of(TOWARDS, corners, np.array([DOWN.position]))
+    assert len(found.squares) == 4
+    assert found.squares[0][2] < 20 and found.squares[-1][2] > 5e4
+    places = corners.reshape(-1, 3) @ found.axes[:2].T
+    u, v, side = found.squares[-1]
+    assert np.all(places >= [u, v]) and np.all(places <= [u + side, v + side])
+    assert len(squares_of(TOWARDS, corners, np.zeros((0, 3))).squares) == 1
+
+
+def test_blocks_know_the_least_and_the_greatest_depth() -> None:
+    depths = np.random.default_rng(0).random((2, 4 * BLOCK, 4 * BLOCK)).astype(np.float32)
+    found = block_ranges(depths)
+    assert found.shape == (2, 4, 6, 2)
+    corner = depths[1, BLOCK : 2 * BLOCK, :BLOCK]
+    assert found[1, 1, 0].tolist() == [corner.min(), corner.max()]
+    half = depths[1, 2 * BLOCK :, : 2 * BLOCK]
+    assert found[1, 1, 4].tolist() == [half.min(), half.max()]
+    assert found[1, 2, 4].tolist() == [depths[1].min(), depths[1].max()]

@@ -1,0 +1,62 @@
+"""Normals that lean far from their faces: told in one line, and made anew with hard edges."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.directions import normalize
+from lambent.core.geometry import triangle_normals
+from lambent.scenes import load_scene
+from lambent.scenes.geometry import box, sphere
+from lambent.scenes.loaders.meshes.creases import creased, leaning_faces
+from lambent.scenes.scene import Mesh
+
+CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+SIDES = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 4, 8, 6)]  # the last turned
+
+
+def shared_box(folder: Path, name: str = "box.obj") -> Path:
+    """A box of eight vertices whose normals point out of its corners."""
+    lines = ["o box"]
+    lines += ["v " + " ".join(map(str, corner)) for corner in CORNERS]
+    lines += ["vn " + " ".join(map(str, normal)) for normal in normalize(CORNERS - 0.5)]
+    lines += ["f " + " ".join(f"{i}//{i}" for i in side) for side in SIDES]
+    path = folder / name
+    path.write_text("\n".join(lines))
+    return path
+
+
+def greatest_lean_deg(mesh: Mesh) -> float:
+    faces = triangle_normals(mesh.corners.astype(float))
+    cosine = np.abs((mesh.normals[mesh.faces] * faces[:, None]).sum(axis=2)).min()
+    return float(np.degrees(np.arccos(min(1.0, cosine))))
+
+
+def test_leaning_normals_are_told_once_and_a_crease_angle_mends_them(tmp_path: Path) -> None:
+    path = shared_box(tmp_path)
+    scene = load_scene(path)
+    told = [warning for warning in scene.warnings if "crease" in warning]
+    assert len(told) == 1 and told[0].startswith("12 triangles of 1 objects (box) have normals over 40 degrees off")
+    assert greatest_lean_deg(scene.objects[0].mesh) == pytest.approx(54.7, abs=0.1)
+    mended = load_scene(path, crease_deg=40.0)
+    mesh = mended.objects[0].mesh
+    assert mended.crease_deg == 40 and not any("crease" in warning for warning in mended.warnings)
+    assert greatest_lean_deg(mesh) < 0.1 and len(mesh.positions) == 24 and len(mesh.faces) == 12
+    assert ((mesh.normals * (mesh.positions - 0.5)).sum(axis=1) > 0).all(), "outwards, as the file has them"
+    np.testing.assert_array_equal(mesh.corners, scene.objects[0].mesh.corners)
+    assert np.abs((mesh.normals * mesh.tangents).sum(axis=1)).max() < 1e-5
+    toml = tmp_path / "scene.toml"
+    toml.write_text('format = "lambent-scene"\nversion = 1\ngeometry = "box.obj"\ncrease_angle = 40\n')
+    np.testing.assert_array_equal(load_scene(toml).objects[0].mesh.normals, mesh.normals)
+
+
+def test_edges_below_the_angle_stay_smooth() -> None:
+    ball = sphere(1.0, 24, 12)
+    assert leaning_faces(ball) == 0 and leaning_faces(box((1, 1, 1))) == 0
+    smooth = creased(ball, 40.0)
+    outwards = normalize(smooth.positions.astype(float))
+    assert (smooth.normals * outwards).sum(axis=1).min() > np.cos(np.radians(8))
+    assert greatest_lean_deg(creased(ball, 1.0)) < 0.1, "every edge of it is sharper than a degree"

@@ -1,0 +1,158 @@
+"""IES files: every form of the standard by hand, and hostile ones."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.scenes.ies import FEET_M, read_ies
+from lambent.scenes.scene import IesLight
+
+HEADS = {1986: "", 1991: "IESNA91\n", 1995: "IESNA:LM-63-1995\n", 2002: "IESNA:LM-63-2002\n"}
+
+
+def ies(
+    vertical: str = "0 45 90",
+    horizontal: str = "0",
+    candela: str = "1000 500 0",
+    *,
+    head: str = HEADS[2002],
+    tilt: str = "TILT=NONE",
+    numbers: str = "1 -1 1",
+    kind: int = 1,
+    units: int = 2,
+    factors: str = "1 1 50",
+) -> str:
+    counts = f"{len(vertical.split())} {len(horizontal.split())}"
+    return (
+        f"{head}[TEST] by hand\n[MANUFAC] none\n{tilt}\n{numbers} {counts} {kind} {units} .5 .25 0\n{factors}\n"
+        f"{vertical}\n{horizontal}\n{candela}\n"
+    )
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "lamp.ies"
+    path.write_bytes(text.encode("latin-1"))
+    return path
+
+
+def test_a_downlight(tmp_path: Path) -> None:
+    made = read_ies(written(tmp_path, ies()))
+    assert made.opening_m == (0.5, 0.25, 0.0)
+    assert made.at(np.array([0, 22.5, 45, 90, 91]), np.array([0, 10, 370, -20, 0])) == pytest.approx(
+        [1000, 750, 500, 0, 0]
+    )
+    x = np.radians(np.linspace(0, 90, 20_001))
+    middle = (x[1:] + x[:-1]) / 2
+    flux = 2 * np.pi * (made.at(np.degrees(middle), 0 * middle) * np.sin(middle) * np.diff(x)).sum()
+    assert made.lumens == pytest.approx(flux, rel=1e-6)
+
+
+def test_an_even_lamp_of_1000_cd_has_4000_pi_lm(tmp_path: Path) -> None:
+    even = read_ies(written(tmp_path, ies("0 90 180", candela="1000 1000 1000")))
+    assert even.lumens == pytest.approx(4000 * np.pi)
+
+
+@pytest.mark.parametrize("year", HEADS)
+def test_factors(tmp_path: Path, year: int) -> None:
+    """Ballast-lamp factors count up to 1991; their place is left free later."""
+    text = ies(head=HEADS[year], numbers="1 800 2", factors=".9 .5 50", units=1)
+    made = read_ies(written(tmp_path, text))
+    assert made.at(np.array(0.0), np.array(0.0)) == pytest.approx(1000 * 2 * 0.9 * (0.5 if year < 1995 else 1))
+    assert made.opening_m[0] == pytest.approx(0.5 * FEET_M)
+
+
+@pytest.mark.parametrize(
+    ("horizontal", "values", "asked", "expected"),
+    [
+        ("0 90", "1 2", (0, 45, 90, 135, 180, 225, 270, 315), (1, 1.5, 2, 1.5, 1, 1.5, 2, 1.5)),
+        ("0 90 180", "1 2 5", (0, 45, 135, 180, 225, 270, 315), (1, 1.5, 3.5, 5, 3.5, 2, 1.5)),
+        ("90 180 270", "1 2 5", (90, 135, 180, 0, 45, 270, 315), (1, 1.5, 2, 2, 1.5, 5, 3.5)),
+        ("90 270", "1 5", (90, 180, 0, 270), (1, 3, 3, 5)),
+        ("0 90 180 270 360", "1 2 5 4 1", (45, 225, 315), (1.5, 4.5, 2.5)),
+        ("0 90 180 270", "1 2 5 4", (45, 225, 315, 360), (1.5, 4.5, 2.5, 1)),
+    ],
+)
+def test_symmetries(tmp_path: Path, horizontal: str, values: str, asked: tuple, expected: tuple) -> None:
+    candela = "\n".join(f"{value} 0" for value in values.split())
+    made = read_ies(written(tmp_path, ies("0 90", horizontal, candela)))
+    assert (made.horizontal_deg[0], made.horizontal_deg[-1]) == (0, 360)
+    assert made.at(np.zeros(len(asked)), np.array(asked, float)) == pytest.approx(expected)
+
+
+def test_tilt(tmp_path: Path) -> None:
+    for geometry, factors in ((1, (1.0, 0.9, 0.8)), (2, (1.0, 1.0, 1.0))):
+        made = read_ies(written(tmp_path, ies(tilt=f"TILT=INCLUDE\n{geometry}\n3\n0 45 90\n1 .9 .8")))
+        assert [made.tilted(deg) for deg in (0.0, 45.0, 90.0)] == pytest.approx(factors)
+    assert made.at(np.array(0.0), np.array(0.0)) == 1000
+
+
+def test_numbers_stand_as_they_like(tmp_path: Path) -> None:
+    text = ies(candela="1000,500,0").replace("1 -1 1", "1,-1\n\n  1").replace("\n", "\r\n")
+    assert read_ies(written(tmp_path, text)).lumens == pytest.approx(read_ies(written(tmp_path, ies())).lumens)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "is not an IES file"),
+        ("TILT=NONE\n", "ends too soon"),
+        (ies(kind=2), "found type B"),
+        (ies(kind=3), "found type A"),
+        (ies(tilt="TILT=lamp.tlt"), "in another file"),
+        (ies(candela="1000 500"), "candela: the file ends too soon"),
+        (ies(candela="1000 nan 0"), "not finite"),
+        (ies(candela="1000 1e308 0"), "impossible"),
+        (ies("0 90 45"), "do not rise"),
+        (ies("-90 0 90"), "between 0 and 180"),
+        (ies("45", candela="1"), "no distribution"),
+        (ies("0 90", "0 70", "1 1 1 1"), "expected 0, 90, 180 or 360"),
+        (ies("0 90", "10 80", "1 1 1 1"), "begin elsewhere"),
+        (ies(numbers="1 -1 -1"), "impossible"),
+        (ies().replace("3 1 1 2", "3000000 1 1 2"), "at most 4096 angles"),
+        (ies().replace("3 1 1 2", "-3 1 1 2"), "none"),
+        (ies().replace("3 1 1 2", "3.5 1 1 2"), "whole number"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, text: str, word: str) -> None:
+    with pytest.raises(UserError, match=word) as caught:
+        read_ies(written(tmp_path, text))
+    assert "\n" not in str(caught.value) and "cannot be read as" not in str(caught.value)
+
+
+ROUND = "\n".join(
+    ("500 400 300 100 0", "500 300 200 50 0", "500 450 350 120 0", "500 200 100 20 0", "500 400 300 100 0")
+)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pyradiance") is None, reason="pyradiance is not installed")
+def test_radiance_sees_the_same_luminaire(tmp_path: Path) -> None:
+    """Illuminance by ies2rad and rtrace, whose up is z; all the way round, with multiplier and ballast factor."""
+    text = ies("0 20 40 60 90", "0 90 180 270 360", ROUND, head=HEADS[1995], numbers="1 -1 2", factors=".9 1 50")
+    path = written(tmp_path, text.replace(" .5 .25 0\n", " .01 .01 0\n"))
+    package = Path(str(importlib.util.find_spec("pyradiance").origin)).parent  # type: ignore[union-attr]
+    library = {"PATH": f"{package / 'bin'}:/usr/bin:/bin", "RAYPATH": f".:{package / 'lib'}"}
+
+    def run(*command: str, given: str = "") -> str:
+        told = {"input": given, "capture_output": True, "text": True, "check": True}
+        return str(subprocess.run(command, cwd=tmp_path, env=library, **told).stdout)  # type: ignore[call-overload]
+
+    run("ies2rad", "-t", "default", "-dm", "-o", "lamp", path.name)
+    (tmp_path / "scene.rad").write_text(run("xform", "-t", "0", "0", "2", "lamp.rad"))
+    with open(tmp_path / "scene.oct", "wb") as octree:
+        subprocess.run(["oconv", "scene.rad"], cwd=tmp_path, env=library, stdout=octree, check=True)
+    x, z = np.random.default_rng(0).uniform(-2, 2, (2, 40))
+    places = "".join(f"{a} {-b} 0 0 0 1\n" for a, b in zip(x, z, strict=True))
+    answer = run("rtrace", "-I", "-h", "-ab", "0", "-dc", "1", "-dt", "0", "-ds", ".01", "scene.oct", given=places)
+    lx = 179 * np.array([line.split() for line in answer.splitlines()], float)[:, 1]
+    lamp = IesLight((0.0, 2.0, 0.0), read_ies(path), (1.0, 1.0, 1.0))
+    to = np.stack([x, 0 * x - 2, z], axis=1)
+    metres = np.linalg.norm(to, axis=1)
+    a, b, down = ((to / metres[:, None]) @ axis for axis in lamp.axes)
+    cd = lamp.photometry.at(np.degrees(np.arccos(down)), np.degrees(np.arctan2(b, a)))
+    np.testing.assert_allclose(lx, 2 * cd / metres**3, rtol=2e-3, atol=0.01)

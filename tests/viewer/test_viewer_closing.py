@@ -1,0 +1,116 @@
+"""Closing with unsaved work asks; without any it does not."""
+
+from dataclasses import replace
+
+import pytest
+
+from lambent.materials.document import load_material
+from lambent.store.views import read_views
+from tests.viewer.panel_driver import PanelDriver
+from tests.viewer.test_viewer_panels import walk_mode
+
+
+@pytest.fixture
+def panels(monkeypatch, state, geometry):
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry))
+    yield driver
+    driver.close()
+
+
+def change(state, kd=0.3):
+    state.materials.edits.change("brass", state.scene.materials["brass"].model_copy(update={"kd": (kd,) * 3}))
+    state.materials.edits.end_stroke()
+
+
+def record(state):
+    state.recordings.record()
+    for k in range(10):
+        moved = replace(state.navigation.camera, position=(0.1 * k, 1.6, 3.0))
+        state.recordings.recorder.take(moved, 0.1 * k)
+
+
+def ask(panels):
+    panels.state.screen.asks_to_close = True
+    panels.frame(3)
+
+
+def test_what_is_unsaved_is_named(panels, state):
+    assert panels.mode.unsaved == ()
+    change(state)
+    assert panels.mode.unsaved == ("brass",)
+    record(state)
+    assert panels.mode.unsaved == ("brass", "the recorded walk")
+    state.recordings.record()
+    assert panels.mode.unsaved == ("brass", "the recorded walk")
+
+
+def test_a_recording_without_a_step_is_nothing(panels, state):
+    state.recordings.record()
+    assert panels.mode.unsaved == ()
+
+
+def test_saving_keeps_all_of_it_and_closes(panels, state, tmp_path):
+    change(state)
+    record(state)
+    ask(panels)
+    panels.click("save##closing")
+    assert state.screen.closes and not state.screen.asks_to_close and panels.mode.unsaved == ()
+    assert load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
+    assert [path.name for path in read_views(tmp_path).paths] == ["walk 1"]
+
+
+def test_a_file_that_is_there_is_replaced_when_save_is_pressed_again(panels, state, tmp_path):
+    (tmp_path / "brass.json").write_text("of somebody else")
+    change(state)
+    ask(panels)
+    panels.click("save##closing")
+    assert state.screen.asks_to_close and not state.screen.closes
+    assert "save again" in state.screen.messages[-1].text
+    assert (tmp_path / "brass.json").read_text() == "of somebody else"
+    panels.click("save##closing")
+    assert state.screen.closes and load_material(tmp_path / "brass.json").kd == (0.3, 0.3, 0.3)
+
+
+def test_discarding_writes_nothing(panels, state, tmp_path, capsys):
+    change(state)
+    record(state)
+    ask(panels)
+    panels.click("discard##closing")
+    assert state.screen.closes
+    panels.mode.close()
+    assert list(tmp_path.iterdir()) == [] and "brass changed and not saved" in capsys.readouterr().err
+
+
+def test_staying_goes_on(panels, state):
+    change(state)
+    for answer in (lambda: panels.click("stay##closing"), lambda: press(panels, "escape")):
+        ask(panels)
+        assert panels.popup_open, "the mouse is the question's"
+        answer()
+        panels.frame(2)
+        assert not (state.screen.asks_to_close or state.screen.closes or panels.popup_open)
+    assert panels.mode.unsaved == ("brass",)
+
+
+def press(panels, key):
+    from imgui_bundle import imgui
+
+    for down in (True, False):
+        panels.io.add_key_event(getattr(imgui.Key, key), down)
+        panels.frame()
+
+
+def test_enter_saves(panels, state, tmp_path):
+    change(state)
+    ask(panels)
+    press(panels, "enter")
+    assert state.screen.closes and (tmp_path / "brass.json").exists()
+
+
+def test_it_fits_a_small_window(monkeypatch, state, geometry):
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (320, 240))
+    change(state)
+    ask(driver)
+    assert all(0 <= driver.rects[f"{a}##closing"][0] < driver.rects[f"{a}##closing"][2] <= 320
+               for a in ("save", "discard", "stay"))  # fmt: skip
+    driver.close()

@@ -1,0 +1,148 @@
+"""A material that is dragged stays sharp where frames in motion have fewer pixels; what is selected is outlined."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.renderer import Renderer
+from lambent.store.store import Store
+from lambent.viewer.modes.walk.pictures import Pictures
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.screen import Rect
+from tests.viewer.small_store import SIDE, write_small_store
+
+PLACE = Rect(0, 0, 96, 64)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    return read_baked(Store.open(write_small_store(tmp_path_factory.mktemp("sharp") / "small")))
+
+
+@pytest.fixture(scope="module")
+def device(adapter):
+    return open_device()
+
+
+@pytest.fixture
+def renderer(device, scene):
+    return Renderer(device, scene)
+
+
+@pytest.fixture
+def state(renderer, screen):
+    return WalkState.of(renderer.scene.record, "walk", screen)
+
+
+@pytest.fixture
+def pictures(renderer, state):
+    """On an adapter that is slow: a quarter of the width and height in motion."""
+    found = Pictures(renderer, state)
+    slow_down(found)
+    found.update(PLACE, 1.0)
+    assert state.screen.statistics.resolution == (24, 16)
+    return found
+
+
+def slow_down(pictures):
+    for size in pictures._a.pacer._sizes.values():
+        size.scale = 0.25
+
+
+def pull(state, red):
+    brass = state.scene.materials["brass"].model_copy(update={"kd": (red, 0.0, 0.0)})
+    state.materials.edits.change("brass", brass)
+
+
+def shown(pictures):
+    """Light of the picture, of which 255 is white."""
+    return 255 * pictures._a.read()
+
+
+def test_the_dragged_material_is_drawn_at_full_size(pictures, state):
+    for red in (0.2, 0.5):
+        pull(state, red)
+        pictures.update(PLACE, 1.0)
+        assert state.screen.statistics.resolution == (96, 64)
+    assert not pictures.under_way
+    ball = shown(pictures)[25:40, 42:54]
+    assert (ball[..., 0] > ball[..., 2] + 20).all(), "what is shown is the last one"
+    slow_down(pictures)
+    state.navigation.jump(SIDE)
+    pictures.update(PLACE, 1.0)
+    assert state.screen.statistics.resolution == (24, 16), "a moving camera has fewer pixels, as before"
+
+
+def test_the_whole_frame_follows_at_rest(pictures, state):
+    pull(state, 0.5)
+    pictures.update(PLACE, 1.0)
+    over = shown(pictures)
+    state.screen.clock.now_s += 1.0
+    pictures.update(PLACE, 1.0)
+    while pictures.under_way:
+        pictures.work()
+    whole = shown(pictures)
+    assert np.array_equal(over[25:40, 42:54], whole[25:40, 42:54])
+    assert abs(over - whole).max() > 2, "around the ball it was the small frame"
+
+
+def test_a_slow_one_is_drawn_in_parts_and_not_begun_anew(pictures, state):
+    pictures._a._over_s = 10.0
+    pull(state, 0.2)
+    pictures.update(PLACE, 1.0)
+    assert pictures.under_way
+    pictures.work()
+    pull(state, 0.5)
+    pictures.update(PLACE, 1.0)
+    version = pictures._a.version
+    for _ in range(1000):
+        if pictures.work():
+            break
+    assert pictures._a.version == version + 1, "a drag that never rests would otherwise show nothing"
+    pictures._a._over_s = 0.0
+    pictures.update(PLACE, 1.0)
+    assert (shown(pictures)[30, 48] != shown_of(pictures, state, 0.2)[30, 48]).any()
+    pull(state, 0.3)
+    pictures._a._over_s = 10.0
+    pictures.update(PLACE, 1.0)
+    assert pictures.under_way
+    state.navigation.jump(SIDE)
+    pictures.update(PLACE, 1.0)
+    assert not pictures.under_way, "a moving camera drops it"
+
+
+def shown_of(pictures, state, red):
+    pull(state, red)
+    pictures.update(PLACE, 1.0)
+    return shown(pictures)
+
+
+def test_what_is_selected_is_outlined_until_it_is_not(pictures, state):
+    assert "outline" not in pictures.images
+    state.selection.choose("ball")
+    pictures.update(PLACE, 1.0)
+    line = pictures.images["outline"]
+    alpha = alpha_of(pictures, line)
+    assert alpha.shape == (64, 96) and alpha.max() > 200 and alpha[30, 48] == 0
+    state.screen.clock.now_s += 1.0
+    pictures.update(PLACE, 1.0)
+    while pictures.under_way:
+        pictures.work()
+    assert pictures.images["outline"] is line, "it rests while the picture refines"
+    state.navigation.jump(replace(SIDE, name="elsewhere"))
+    pictures.update(PLACE, 1.0)
+    assert pictures.images["outline"] is not line
+    state.selection.choose(None)
+    pictures.update(PLACE, 1.0)
+    assert "outline" not in pictures.images
+
+
+def alpha_of(pictures, view):
+    width, height, _ = view.texture.size
+    data = pictures.device.queue.read_texture(
+        {"texture": view.texture}, {"bytes_per_row": 4 * width}, (width, height, 1)
+    )
+    return np.frombuffer(data, np.uint8).reshape(height, width, 4)[..., 3]
