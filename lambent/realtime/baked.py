@@ -58,6 +58,7 @@ class BakedScene:
     missing: tuple[str, ...] = ()
     uv: Floats | None = None
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
+    shared_probes: Mapping[str, str] = field(default_factory=dict)  # by object, whose probe it shows
     noise: Floats | None = None  # (H, W), relative standard error of the light map
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
@@ -65,9 +66,10 @@ class BakedScene:
     sun: SunRecord | None = None  # whose direct light the light maps leave out
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
-        """The object's own probe, else the nearest one, else the environment, else None."""
-        if obj.name in self.probes:
-            return self.probes[obj.name]
+        """The object's own probe or the one it shares, else the nearest one, else the environment, else None."""
+        owner = self.shared_probes.get(obj.name, obj.name)
+        if owner in self.probes:
+            return self.probes[owner]
         if self.probes:
             centre = np.mean(obj.bounds, axis=0)
             return min(self.probes.values(), key=lambda probe: float(np.linalg.norm(probe.centre - centre)))
@@ -109,8 +111,8 @@ def read_baked(store: Store) -> BakedScene:
     two_sided = any(
         contract.is_two_sided(record.materials[o.material], masked=o.material in masked) for o in record.objects
     )
-    probes = {}
-    for obj in record.objects:
+    probes, shared = {}, contract.shared_probes(store)
+    for obj in (o for o in record.objects if o.name not in shared):
         name = contract.probe_name(obj.name, "radiance")
         wanted = obj.probe and contract.needs_probe(record.materials[obj.material])
         radiance = light(name, "the nearest probe or the environment stands in" if wanted else None)
@@ -126,6 +128,7 @@ def read_baked(store: Store) -> BakedScene:
         probes=probes,
         missing=tuple(missing),
         textures=read_textures(store, record),
+        shared_probes=shared,
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,

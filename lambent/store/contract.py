@@ -19,6 +19,7 @@
                                            may be absent: luminance of the irradiance it would give, coefficients of
                                            1, x, y, z, xy, yz, 3zz - 1, xz, xx - yy of the normal; scale its light by
                                            the light map's share of that, at most 1
+                                           An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
@@ -114,6 +115,7 @@ SCENE = "scene"
 CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for which viewers
 TIMINGS = "timings"  # of every step, in seconds
 LAST_RUN = "last_run"  # those of the last bake alone, and "other"
+SHARED_PROBES = "shared_probes"  # document: its key, and "owners", by object that shows the probe of another
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
@@ -133,7 +135,7 @@ class ObjectRecord(_Record):
     face_count: int
     emission: Triple = (0.0, 0.0, 0.0)
     bounds: tuple[Triple, Triple]
-    probe: bool = False  # wants probe/NAME/*
+    probe: bool = False  # wants probe/NAME/*, its own or a shared one
 
 
 class SunRecord(_Record):
@@ -285,6 +287,15 @@ def sun_beside(store: Store) -> SunRecord | None:
     if not np.isfinite(numbers).all() or abs(np.linalg.norm(sun.direction) - 1) > 1e-3:
         raise UserError("broken store", file=store.folder, field=f"{name}: sun", got=str(said))
     return sun
+
+
+def shared_probes(store: Store) -> dict[str, str]:
+    """By each object that wants a probe and has none, the one whose probe it shows; nothing in earlier stores."""
+    said = store.documents.get(SHARED_PROBES, {})
+    found = said.get("owners", {}) if isinstance(said, dict) else None
+    if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):
+        raise UserError("broken store", file=store.folder, field=SHARED_PROBES, got=str(said)[:80], hint="bake again")
+    return found
 
 
 def noise_name(side: str) -> str:

@@ -12,6 +12,7 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.engine import engine
 from lambent.bake.tracing.solids import is_closed
+from lambent.core.camera import Camera
 from lambent.core.cubemap import texel_solid_angles
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
@@ -24,8 +25,8 @@ def two_rooms() -> Scene:
     bar = sphere(1.0, 24, 24)
     bar = replace(bar, positions=(bar.positions * np.float32([2.5, 0.15, 0.15])).astype(np.float32))
     objects = (
-        SceneObject("left", patch((-3, -2, -2), (0, 0, 4), (0, 4, 0)), "grey", emission=(1, 0, 0)),
-        SceneObject("right", patch((3, -2, 2), (0, 0, -4), (0, 4, 0)), "grey", emission=(0, 0, 1)),
+        SceneObject("left", patch((-3, -2, 2), (0, 0, -4), (0, 4, 0)), "grey", emission=(1, 0, 0)),
+        SceneObject("right", patch((3, -2, -2), (0, 0, 4), (0, 4, 0)), "grey", emission=(0, 0, 1)),
         SceneObject("shell", turned_inwards(box((6.2, 4, 4))), "grey"),
         SceneObject("wall", placed(box((0.1, 4, 4)), (1.0, 0, 0)), "grey"),
         SceneObject("bar", bar, "mirror"),
@@ -50,6 +51,17 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     assert ball["hidden_share"] < 0.1
     again = bake(two_rooms(), tmp_path / "s", quality=TINY)
     assert {a.name: a.key for a in again.artefacts()} == {a.name: a.key for a in store.artefacts()}
+
+
+def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
+    """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
+    from lambent.bake.probes.division import cuts_of
+
+    assert set(cuts_of(two_rooms())) == {"bar"}
+    red = Camera("red", (-1.5, 0.5, 1.5), (-1.5, 0, 0))
+    blue = replace(red, name="blue", position=(2.0, 0.5, 1.5), target=(2.0, 0.0, 0.0))
+    assert not cuts_of(replace(two_rooms(), cameras=(red,)))
+    assert set(cuts_of(replace(two_rooms(), cameras=(red, blue)))) == {"bar"}
 
 
 def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

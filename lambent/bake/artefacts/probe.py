@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,12 @@ import numpy as np
 from lambent.bake.artefacts.light_map import finished_maps
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of
+from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.methods import ProbeMethod
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import seed_of
-from lambent.store.contract import needs_probe, probe_name
+from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, shared_probes
 
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
@@ -47,9 +48,12 @@ SETTINGS = {
 def keys(context: BakeContext) -> dict[str, str]:
     how: Settings = context.settings(KIND)
     scene, light = context.scene, context.keys("light_map")["light_map/irradiance"]
-    found: dict[str, str] = {}
+    owners, found = _owners(context), dict[str, str]()
     for name in _objects(context):
+        if name in owners:
+            continue
         inputs = [light, name, scene.probe_centres.get(name), how.texels, how.samples, how.noise, context.seed]
+        inputs += sharing(owners, name)
         if not _cached(context):
             inputs += [context.methods["probes"], context.settings("light_map").max_depth]
         key = key_of(KIND, REVISION, *inputs)
@@ -60,23 +64,57 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
+    stale, how, owners = context.stale(KIND), context.settings(KIND), _owners(context)
+    missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in PARTS}]
+    context.store.forget(probe_name(name, part) for name in owners for part in PARTS)
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.probe_set import ProbeSet
 
-    stale, how = context.stale(KIND), context.settings(KIND)
-    missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in PARTS}]
     front, back = finished_maps(context)
     front_or_none = front if _cached(context) else None
     probes = ProbeSet(context.traced, front_or_none, back, context.settings("light_map").max_depth)
     for i, name in enumerate(missing):
         context.progress(i, len(missing), f"probe of {name}")
         seed = seed_of(context.seed, "probe", name)
-        result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed)
+        result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed, sharing(owners, name))
         if meta["hidden_share"] > HIDDEN:
             log.warning(TOO_FEW, name, 100 * meta["hidden_share"], meta["parallax_deg"])
         for part in PARTS:
             context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
     context.progress(1, 1, "probes")
+
+
+def sharing(owners: Mapping[str, str], name: str) -> tuple[str, ...]:
+    """The objects that show the probe of this one."""
+    return tuple(sorted(other for other, owner in owners.items() if owner == name))
+
+
+def _owners(context: BakeContext) -> dict[str, str]:
+    """By each object without a probe, the one whose it shows; found again only where geometry or materials changed.
+
+    Nothing before the geometry is baked, which viewers are then looked for in.
+    """
+    scene, names, store = context.scene, _objects(context), context.store
+    if context.stale("geometry"):
+        return {}
+    given = [sorted(scene.probe_centres), sorted(scene.probe_planes)]
+    worn = [scene.materials[scene.object(name).material] for name in names]
+    look = [(m.transmits, [(lobe.mx, lobe.my) for lobe in m.lobes]) for m in worn]
+    lamps = [o.name for o in scene.objects if any(o.emission)]
+    key = key_of(SHARED_PROBES, 1, names, look, given, lamps, *geometry_inputs(scene))
+    said = store.documents.get(SHARED_PROBES)
+    if not isinstance(said, dict) or said.get("key") != key:
+        owners = _shared(context, names) if len(names) > 1 else {}
+        store.set_document(SHARED_PROBES, {"key": key, "owners": owners})
+    return shared_probes(store)
+
+
+def _shared(context: BakeContext, names: list[str]) -> dict[str, str]:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.probes.sharing import shared
+
+    traced, how = context.traced, {"diffuse": not _cached(context)}
+    return shared(traced.builder(**how), traced.whole(**how), traced.places, names)
 
 
 def _cached(context: BakeContext) -> bool:

@@ -50,6 +50,12 @@ def centre_of(mesh: Mesh, middle: Floats, solids: SolidTest, without: Any) -> Fl
     return _moved_out(centre, solids, without)
 
 
+def outside(mesh: Mesh, middle: Floats, whole: Any) -> Floats:
+    """About where the probe of a mesh will stand, in the whole scene."""
+    axis = flat_axis(mesh)
+    return _middle(mesh) if axis is None else _above(mesh, _middle(mesh), axis, middle, whole)
+
+
 def _middle(mesh: Mesh) -> Floats:
     low, high = (np.asarray(corner, float) for corner in mesh.bounds)
     return np.asarray((low + high) / 2)

@@ -2,7 +2,8 @@
 
 The surface of an object sees points that are hidden from its probe. Where their share is above HIDDEN, the object is
 halved across the axis that leaves the least hidden, and so are its parts, if that lowers the share to WORTH of it. A
-face belongs to the half that its middle lies in, and is drawn with the probe of that part.
+face belongs to the half that its middle lies in, and is drawn with the probe of that part. Where viewers see the
+object, a cut is made only if it pays (`worth`): most that one probe misses is not seen, or blurred.
 
 Flat objects are left whole: planar reflectors show them.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from lambent.bake.artefacts.geometry import REVISION
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
 from lambent.bake.timing import Timed, untimed
-from lambent.core.arrays import Indices
+from lambent.core.arrays import Floats, Indices
+from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 from lambent.store.contract import needs_probe
@@ -42,7 +44,7 @@ def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untim
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
     clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
     worn = [o.material for o in scene.objects]
-    key = key_of("geometry", REVISION, "parts", *geometry_inputs(scene), centres, shiny, clear, worn)
+    key = key_of("geometry", REVISION, "parts that pay", *geometry_inputs(scene), centres, shiny, clear, worn)
     found = store.documents.get(PARTS)
     if not isinstance(found, dict) or found.get("key") != key:
         with timed(PARTS):
@@ -61,16 +63,18 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, str]:
     from lambent.bake.probes.centre import flat_axis
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.solids import SolidTest
+    from lambent.bake.tracing.visibility import viewing_places
 
     curved = [o for o in shiny if flat_axis(o.mesh) is None]
     if not curved:
         return {}
     builder = SceneBuilder(scene)
     solids = SolidTest(builder, None)
-    cuts = {}
+    whole = builder.build()
+    places, cuts = viewing_places(scene, whole), {}
     for i, o in enumerate(curved):
         progress(i, len(curved), "what probes see")
-        pieces = _pieces_of(builder, o, solids)
+        pieces = _pieces_of(builder, o, solids, whole, places)
         if len(pieces) > 1:
             part = np.zeros(len(o.mesh.faces), int)
             for number, faces in enumerate(pieces):
@@ -79,19 +83,36 @@ def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, str]:
     return cuts
 
 
-def _pieces_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest) -> list[Indices]:
-    """Faces of the object's parts; one where it stays whole."""
+def _pieces_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: Any, places: Floats) -> list[Indices]:
+    """Faces of the object's parts; one where it stays whole. Viewers are at `places`, if there are any."""
     from lambent.bake.probes.centre import centre_of
-    from lambent.bake.probes.hidden import hidden_share, seen_from
+    from lambent.bake.probes.hidden import hidden_share, seen_from, spread
+    from lambent.bake.probes.worth import POINTS, pays, seen_in, small_probe
 
     without = builder.build(leave_out={o.name})
     solids, middle = anywhere.within(without), np.mean(builder.scene.bounds, axis=0)
 
+    def centre(part: Mesh) -> Floats:
+        return centre_of(part, middle, solids, without)
+
     def share(faces: Indices) -> float:
         part = sub_mesh(o.mesh, faces)
-        return hidden_share(seen_from(part, without), centre_of(part, middle, solids, without), without)
+        return hidden_share(seen_from(part, without), centre(part), without)
 
-    return _cut(o.mesh, np.arange(len(o.mesh.faces)), share, DEPTH)[0]
+    everything = np.arange(len(o.mesh.faces))
+    pieces = _cut(o.mesh, everything, share, DEPTH)[0]
+    if len(pieces) < 2 or not len(places):
+        return pieces
+    meshes = [sub_mesh(o.mesh, faces) for faces in pieces]
+    areas = np.array([triangle_areas(mesh.corners).sum() for mesh in meshes])
+    counts = np.ceil(POINTS * areas / areas.sum()).astype(int)
+    material = builder.scene.materials[o.material]
+    seen = [seen_in(*spread(m, n), places, material, whole) for m, n in zip(meshes, counts, strict=True)]
+    known = [(s, c) for s, c in ((s, centre(m)) for s, m in zip(seen, meshes, strict=True)) if s is not None]
+    if not known:
+        return [everything]
+    trials = [(small_probe(without, whole, c), c) for c in [centre(o.mesh), *(c for _, c in known)]]
+    return pieces if pays([s for s, _ in known], trials[1:], trials[0]) else [everything]
 
 
 def _cut(mesh: Mesh, faces: Indices, share: Callable[[Indices], float], depth: int) -> tuple[list[Indices], float]:

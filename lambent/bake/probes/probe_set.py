@@ -13,11 +13,23 @@ from lambent.bake.probes.division import HIDDEN, family
 from lambent.bake.probes.hidden import hidden_share, parallax_deg, seen_along, seen_from, spread
 from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import MIRROR_DEPTH, Surroundings, bake_probe
-from lambent.bake.probes.selection import OWN, RAYS, TRIAL_SAMPLES, TRIAL_TEXELS, WORTH, Mirrored, judged, mirrored
+from lambent.bake.probes.selection import (
+    OWN,
+    RAYS,
+    TRIAL_SAMPLES,
+    TRIAL_TEXELS,
+    WORTH,
+    Mirrored,
+    judged,
+    mirrored,
+    together,
+)
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.colour import in_halves
+
+LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored
 
 
 class ProbeSet:
@@ -48,16 +60,23 @@ class ProbeSet:
             self._left_out = names, self._builder.build(leave_out=names)
         return self._left_out[1]
 
-    def _mirrored(self, name: str, seed: int) -> Mirrored | None:
-        """Rays that viewers see mirrored in an object, or through it; None where there are too few."""
+    def _mirrored(self, names: tuple[str, ...], seed: int) -> Mirrored | None:
+        """Rays that viewers see mirrored in objects, or through them; None where there are too few."""
         if self._cache is None:
             return None
-        o = self._scene.object(name)
-        own = [self._builder.shape_number(part) for part in family(self._scene.parts, name)]
-        return mirrored(
-            *spread(o.mesh, RAYS), self._traced.places, self._scene.materials[o.material],
-            self._whole, self._cache, MIRROR_DEPTH, own, seed,
-        )  # fmt: skip
+        own = [self._builder.shape_number(part) for part in self._own(names)]
+        found = []
+        for name in names:
+            o = self._scene.object(name)
+            found.append(mirrored(
+                *spread(o.mesh, max(RAYS // len(names), LEAST_POINTS)), self._traced.places,
+                self._scene.materials[o.material], self._whole, self._cache, MIRROR_DEPTH, own, seed,
+            ))  # fmt: skip
+        return together([rays for rays in found if rays is not None])
+
+    def _own(self, names: tuple[str, ...]) -> frozenset[str]:
+        """The objects and all other parts of each one's whole: what a probe leaves out."""
+        return frozenset().union(*(family(self._scene.parts, name) for name in names))
 
     def _error(self, rays: Mirrored, first: Any, centre: Floats, seed: int) -> float:
         """Error of a small probe at `centre`; `first` is the scene that it sees itself."""
@@ -86,17 +105,18 @@ class ProbeSet:
         return self._scene.materials[self._scene.object(name).material].transmits
 
     def bake(
-        self, name: str, texels: int, samples: int, noise: float, seed: int
+        self, name: str, texels: int, samples: int, noise: float, seed: int, sharing: tuple[str, ...] = ()
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays radiance, distance and planes of one object's probe, and its notes.
+        """Arrays radiance, distance and planes of one object's probe, which others are `sharing`, and its notes.
 
         Noted are the centre, whether the object was left out, and how well one centre stands for the whole surface:
         `hidden_share` and `parallax_deg` (`hidden`), `mirror_error` and `seen_irradiance` (`selection`).
 
         Planes that the scene gives are taken as they are; others are found from the probe itself.
         """
-        without = self._without(frozenset(family(self._scene.parts, name)))
-        rays = self._mirrored(name, seed)
+        names = (name, *sharing)
+        without = self._without(self._own(names))
+        rays = self._mirrored(names, seed)
         centre = self._centre(name, without, rays, seed)
         left_out = not encloses(self._builder, name, centre, self._whole)
         if left_out and rays is not None and not self._transmits(name) and rays.own.mean() > OWN:
@@ -123,7 +143,10 @@ class ProbeSet:
             meta["mirror_error"] = round(found.best, 3)
             if found.scales:
                 meta["seen_irradiance"] = [float(value) for value in found.irradiance]
-        of_surface = seen_from(self._scene.object(name).mesh, seen)
+        if rays is None:
+            of_surface = seen_from(self._scene.object(name).mesh, seen)
+        else:
+            of_surface = seen_along(rays.origins, rays.directions, seen)
         meta["hidden_share"] = round(hidden_share(of_surface, centre, seen), 3)
         meta["parallax_deg"] = round(parallax_deg(of_surface, centre, about), 2)
         return arrays, meta

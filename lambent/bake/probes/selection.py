@@ -14,7 +14,7 @@ probe. The error decides three things, each where a choice lowers it to WORTH of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
@@ -72,15 +72,7 @@ def mirrored(
     Through a transmitting material rays go straight on. None where too few points are in view.
     `family` are the numbers of the Mitsuba shapes of the object and of its other parts.
     """
-    rng = np.random.default_rng(seed)
-    found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
-    for _ in range(TRIES if len(places) else 0):
-        left = np.flatnonzero(~found)
-        if not len(left):
-            break
-        tried = places[rng.integers(len(places), size=len(left))]
-        free = _free(scene, points[left], normals[left], tried)
-        eyes[left[free]], found[left[free]] = tried[free], True
+    found, eyes = viewers_of(points, normals, places, scene, np.random.default_rng(seed))
     if found.sum() < LEAST_RAYS:
         return None
     at, n = points[found], normals[found]
@@ -98,6 +90,28 @@ def mirrored(
     share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0))
     origins, radiance = array_of(ray.o).astype(float), array_of(value).astype(float)
     return Mirrored(origins, directions, n, radiance, luminance(irradiance), share, own)
+
+
+def together(found: list[Mirrored]) -> Mirrored | None:
+    """The rays of several objects in one; None where there are none."""
+    if len(found) < 2:
+        return found[0] if found else None
+    return Mirrored(*(np.concatenate([getattr(rays, f.name) for rays in found]) for f in fields(Mirrored)))
+
+
+def viewers_of(
+    points: Floats, normals: Floats, places: Floats, scene: Any, rng: np.random.Generator
+) -> tuple[Flags, Floats]:
+    """Which points (n, 3) of unit normals (n, 3) are seen from `places` (m, 3), as far as is tried, and from where."""
+    found, eyes = np.zeros(len(points), bool), np.zeros((len(points), 3))
+    for _ in range(TRIES if len(places) else 0):
+        left = np.flatnonzero(~found)
+        if not len(left):
+            break
+        tried = places[rng.integers(len(places), size=len(left))]
+        free = _free(scene, points[left], normals[left], tried)
+        eyes[left[free]], found[left[free]] = tried[free], True
+    return found, eyes
 
 
 def _free(scene: Any, points: Floats, normals: Floats, eyes: Floats) -> Flags:

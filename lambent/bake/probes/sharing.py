@@ -1,0 +1,197 @@
+"""Objects that show the probe of a neighbour, because viewers would hardly tell.
+
+A probe serves another object as far as its centre sees what viewers see mirrored there. Rays from viewers are mirrored
+in points all over each object, and two shares of them are wrong in a neighbour's probe: those whose hits other things
+hide from its centre, and those that meet an object that the probe leaves out, as it does all that share it. An object
+is served where both together stay below a limit: HIDDEN at MEDIUM size, as the median viewer sees it, and with the
+inverse root of the size above and below. No object larger than SMALL and its lobe's roughness, which blurs as much,
+shares another's probe, nor one whose centre is further off than NEAR of what is mirrored: look-ups from far away are
+turned wrongly. Groups are found greedily, the largest first.
+
+Objects that fill a few pixels from nearby, or that nobody sees, have no probe: they show the nearest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.probes.centre import outside
+from lambent.bake.probes.division import HIDDEN
+from lambent.bake.probes.hidden import SHORT, spread
+from lambent.bake.probes.selection import viewers_of
+from lambent.bake.tracing.rays import leaving, rays_from
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.core.arrays import Floats
+from lambent.core.directions import normalize, reflect
+from lambent.core.geometry import triangle_areas
+
+POINTS = 256  # on each object
+NEIGHBOURS = 12  # whose probes are tried for it
+MEDIUM, SMALL = 0.1, 0.06  # radians
+NEAR, REACH = 0.5, 0.75  # of the distance of what is mirrored, and the quantile of that
+FEW = 0.006  # radians: six pixels of a picture of 60 degrees and 1080 rows
+SEEN = 4  # of the points, from anywhere: with fewer, nobody sees the object
+CLOSEST = 0.05  # quantile of the distances of viewers
+SKY = 10.0  # diagonals of the scene, that far is what rays miss
+NOTHING = -1
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What viewers see mirrored in N objects, at POINTS points of each.
+
+    `hits` (N, POINTS, 3) with the object met there, `met` (N, POINTS), NOTHING where there is none; `valid` (N, POINTS)
+    where a viewer sees the point; `size` and `largest` (N,) of the objects in radians, for the median viewer and for
+    close ones; `reach` (N,) metres to far hits.
+    """
+
+    hits: Floats
+    met: NDArray[np.int64]
+    valid: NDArray[np.bool_]
+    size: Floats
+    largest: Floats
+    reach: Floats
+
+
+def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[str]) -> dict[str, str]:
+    """By each object of `names` that goes without a probe, the one whose probe it shows.
+
+    `whole` is the Mitsuba scene of the builder, `places` (m, 3) are those of viewers; without any, none is shared.
+    Objects whose probe the scene places keep theirs.
+    """
+    scene, names = builder.scene, list(names)
+    if len(names) < 2 or not len(places):
+        return {}
+    meshes = [scene.object(name).mesh for name in names]
+    centres = np.stack([outside(mesh, np.mean(scene.bounds, axis=0), whole) for mesh in meshes])
+    looked = _looked(builder, whole, places, names)
+    given = np.array([name in scene.probe_centres or name in scene.probe_planes for name in names])
+    shown = given | ((looked.valid.sum(axis=1) >= SEEN) & (looked.largest >= FEW))
+    if not shown.any():
+        shown[np.argmax(looked.largest)] = True
+    worth = np.flatnonzero(shown)
+    near = np.argsort(np.linalg.norm(centres[worth, None] - centres[worth], axis=2), axis=1)[:, : NEIGHBOURS + 1]
+    pairs = np.stack([np.repeat(worth, near.shape[1]), worth[near].ravel()], axis=1)
+    clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
+    alone = np.array([any(scene.object(name).emission) for name in names])  # left out, a lamp would be missed
+    pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
+    lobes = [scene.materials[scene.object(name).material].lobes for name in names]
+    blur = np.array([max(((lobe.mx * lobe.my) ** 0.5 for lobe in mine), default=0.0) for mine in lobes])
+    one, other = pairs.T
+    close = np.linalg.norm(centres[one] - centres[other], axis=1) < NEAR * looked.reach[one]
+    pairs = pairs[(one != other) & close & (looked.size[one] < SMALL + blur[one])]
+    limits = np.minimum(HIDDEN * np.sqrt(MEDIUM / np.maximum(looked.size, 1e-9)), 1)
+    lost = _lost(looked, len(names))
+    owner = _grouped(worth, pairs, _wrong(builder, whole, names, centres, looked, pairs), lost, limits)
+    own = np.unique(owner[worth])
+    for i in np.flatnonzero(~shown):
+        owner[i] = own[np.argmin(np.linalg.norm(centres[own] - centres[i], axis=1))]
+    return {name: names[owner[i]] for i, name in enumerate(names) if owner[i] != i}
+
+
+def _looked(builder: SceneBuilder, whole: Any, places: Floats, names: list[str]) -> Looked:
+    scene, count = builder.scene, len(names)
+    meshes = [scene.object(name).mesh for name in names]
+    points, normals = (np.concatenate(a) for a in zip(*(spread(mesh, POINTS) for mesh in meshes), strict=True))
+    width = np.sqrt(
+        [triangle_areas(mesh.corners).sum() / 4 for mesh in meshes]
+    )  # mean shadow of a convex body (Cauchy)
+    found, eyes = viewers_of(points, normals, places, whole, np.random.default_rng(0))
+    view = normalize(np.where(found[:, None], eyes - points, normals))
+    clear = np.repeat([scene.materials[scene.object(name).material].transmits for name in names], POINTS)
+    directions = np.where(clear[:, None], -view, reflect(view, normals))
+    t, met = _first(whole, leaving(whole, points, normals, directions), _numbers(builder, names))
+    far = SKY * float(np.linalg.norm(np.ptp(np.array(scene.bounds), axis=0)))
+    t = np.where(np.isfinite(t), t, far)
+    valid, distance = (a.reshape(count, POINTS) for a in (found, np.linalg.norm(eyes - points, axis=1)))
+    seen = [
+        np.quantile(d[v], (CLOSEST, 0.5)) if v.any() else (np.inf,) * 2 for d, v in zip(distance, valid, strict=True)
+    ]
+    largest, size = width / np.array(seen).T
+    hits = (points + directions * t[:, None]).reshape(count, POINTS, 3)
+    reach = np.quantile(t.reshape(count, POINTS), REACH, axis=1)
+    return Looked(hits, met.reshape(count, POINTS), valid, size, largest, reach)
+
+
+def _numbers(builder: SceneBuilder, names: list[str]) -> NDArray[np.int64]:
+    """By Mitsuba's number of a shape, its place in `names`, NOTHING for others."""
+    shapes = [builder.shape_number(name) for name in names]
+    table = np.full(max(shapes) + 1, NOTHING)
+    table[shapes] = np.arange(len(names))
+    return table
+
+
+def _first(whole: Any, ray: Any, numbers: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    """Distances (n,) of the first hits, and the places in `names` of what is met."""
+    found = whole.ray_intersect_preliminary(ray)
+    shape = np.array(dr.reinterpret_array(mi.UInt32, found.shape)).astype(np.int64)
+    known = shape < len(numbers)
+    return np.array(found.t).astype(float), np.where(known, numbers[np.where(known, shape, 0)], NOTHING)
+
+
+def _lost(looked: Looked, count: int) -> Floats:
+    """(N, N): share of an object's rays that meet another."""
+    own = np.arange(count)[:, None]
+    seen = looked.valid & (looked.met != NOTHING) & (looked.met != own)
+    flat = np.bincount((own * count + looked.met)[seen], minlength=count * count).reshape(count, count)
+    return np.asarray(flat / np.maximum(looked.valid.sum(axis=1, keepdims=True), 1))
+
+
+def _wrong(
+    builder: SceneBuilder, whole: Any, names: list[str], centres: Floats, looked: Looked, pairs: NDArray[np.int64]
+) -> Floats:
+    """(P,): share of what is mirrored in the first object of each pair that something hides from the other's centre.
+
+    Neither of the two hides anything, nor does what is met count that is one of them.
+    """
+    if not len(pairs):
+        return np.zeros(0)
+    one, other = np.repeat(pairs, POINTS, axis=0).T
+    hits, met = looked.hits[pairs[:, 0]].reshape(-1, 3), looked.met[pairs[:, 0]].ravel()
+    offset = centres[other] - hits
+    distance = np.linalg.norm(offset, axis=1)
+    w = offset / np.maximum(distance, 1e-9)[:, None]
+    start = SHORT * (1 + distance)
+    t, between = _first(whole, rays_from(hits + w * start[:, None], w), _numbers(builder, names))
+    blocked = (t < distance - 2 * start) & (between != one) & (between != other)
+    blocked &= (met != one) & (met != other)
+    valid = looked.valid[pairs[:, 0]]
+    return np.asarray((blocked.reshape(-1, POINTS) & valid).sum(axis=1) / np.maximum(valid.sum(axis=1), 1))
+
+
+def _grouped(
+    worth: NDArray[np.int64], pairs: NDArray[np.int64], wrong: Floats, lost: Floats, limits: Floats
+) -> NDArray[np.int64]:
+    """(N,): whose probe each object shows. `lost` (N, N) and `limits` (N,) are of objects, `wrong` of pairs."""
+    owner = np.arange(len(limits))
+    served: dict[int, list[tuple[float, int]]] = {int(i): [] for i in worth}
+    for (one, other), share in zip(pairs, wrong, strict=True):
+        if share <= limits[one]:
+            served[int(other)].append((float(share), int(one)))
+    left, groups = set(served), dict[int, list[int]]()
+
+    def group(i: int) -> list[int]:
+        members, shares = [i], [0.0]
+        for share, j in sorted(served[i]):
+            if j not in left:
+                continue
+            tried = np.array([*members, j])
+            totals = np.array([*shares, share]) + lost[np.ix_(tried, tried)].sum(axis=1)
+            if (totals <= limits[tried]).all():
+                members, shares = [*members, j], [*shares, share]
+        return members
+
+    while left:
+        groups = {i: groups.get(i) or group(i) for i in sorted(left)}
+        best = max(groups.values(), key=len)
+        owner[best] = best[0]
+        left -= set(best)
+        groups = {i: members for i, members in groups.items() if not set(members) & set(best)}
+    return owner

@@ -1,0 +1,89 @@
+"""Whether an object's pieces, with a probe each, show viewers so much less error than one probe that a cut pays.
+
+A cut is seen as a seam, and each piece costs a probe. So both are tried, before there is a light map: small probes are
+path traced whole, and the light that viewers see mirrored is compared with what they find. Directions are spread as its
+widest lobe spreads them, and light is compared as means over them: a rough surface blurs what probes confuse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from lambent.bake.probes.planes import bounding_planes
+from lambent.bake.probes.probe import Probe, Surroundings, bake_probe
+from lambent.bake.probes.selection import TRIAL_TEXELS, WORTH, viewers_of
+from lambent.bake.tracing import path_tracer
+from lambent.bake.tracing.rays import array_of, independent, leaving
+from lambent.core.arrays import Floats
+from lambent.core.colour import luminance
+from lambent.core.cubemap import sample
+from lambent.core.directions import basis, normalize, reflect
+from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
+from lambent.materials.document import Material
+
+POINTS = 512  # all over the object
+SPREAD = 16  # directions from each
+LEAST = 16  # points in view: with fewer, nothing is known
+DEPTH = 4  # surfaces on a path
+SAMPLES = 8  # paths per texel of a probe
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Light seen mirrored in n points: origins and directions (n, SPREAD, 3), luminance (n,) of the mean over them."""
+
+    origins: Floats
+    directions: Floats
+    light: Floats
+
+
+def seen_in(points: Floats, normals: Floats, places: Floats, material: Material, whole: Any) -> Seen | None:
+    """What viewers at `places` (m, 3) see in points (n, 3) of unit normals (n, 3); None where too few are in view."""
+    rng = np.random.default_rng(0)
+    found, eyes = viewers_of(points, normals, places, whole, rng)
+    if found.sum() < LEAST:
+        return None
+    at, n, view = (np.repeat(a[found], SPREAD, axis=0) for a in (points, normals, normalize(eyes - points)))
+    widest = max(((lobe.mx * lobe.my) ** 0.5 for lobe in material.lobes), default=0.0)
+    t, b = basis(n)
+    slope = widest / np.sqrt(2) * rng.standard_normal((2, len(n), 1))
+    facet = normalize(n + slope[0] * t + slope[1] * b)
+    w = -view if material.transmits else reflect(view, facet)
+    below = (w * n).sum(axis=1, keepdims=True)
+    if not material.transmits:
+        w = w - 2 * np.minimum(below, 0) * n
+    ray = leaving(whole, at, n, w)
+    light = path_tracer.radiance(whole, independent(1, len(at)), path_tracer.camera_start(ray), DEPTH)
+    value = luminance(array_of(dr.select(dr.all(dr.isfinite(light)), light, 0.0)).astype(float))
+    origins = array_of(ray.o).astype(float)
+    shape = (-1, SPREAD, 3)
+    return Seen(origins.reshape(shape), w.reshape(shape), value.reshape(-1, SPREAD).mean(axis=1))
+
+
+def small_probe(first: Any, whole: Any, centre: Floats) -> Probe:
+    """A probe for a trial; `first` is the scene that it sees itself."""
+    return bake_probe(Surroundings(first, whole, None, DEPTH), centre, TRIAL_TEXELS, SAMPLES, 0, noise=1.0)
+
+
+def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:
+    """(n,) in log(1 + L/median), by bounding planes or the distance map, whichever is better in the mean."""
+    origins, w = (seen.origins - centre).reshape(-1, 3), seen.directions.reshape(-1, 3)
+    planes = bounding_planes(probe.distance, probe.normals).astype(float)
+    ways = planes_lookup(origins, w, planes), distance_lookup(origins, w, inverse_depth(probe.distance.astype(float)))
+    scale = max(float(np.median(seen.light)), 1e-6)
+    errors = []
+    for directions in ways:
+        found = luminance(sample(probe.radiance.astype(float), normalize(directions)))
+        shown = found.reshape(-1, SPREAD).mean(axis=1)
+        errors.append(np.abs(np.log1p(shown / scale) - np.log1p(seen.light / scale)))
+    return np.asarray(min(errors, key=lambda error: float(error.mean())))
+
+
+def pays(seen: list[Seen], pieces: list[tuple[Probe, Floats]], one: tuple[Probe, Floats]) -> bool:
+    """Whether probes of pieces, each with its centre, lower the error of one to WORTH in what is seen in each piece."""
+    cut = np.concatenate([differences(s, *own) for s, own in zip(seen, pieces, strict=True)])
+    return bool(cut.mean() < WORTH * np.concatenate([differences(s, *one) for s in seen]).mean())

@@ -1,0 +1,140 @@
+"""`flicker`: how much a picture changes from frame to frame where nothing has changed.
+
+Rows are scene x case. `still` has two frames of one resting camera in motion's own integrator, `at rest` the pictures
+that follow while that camera converges, `walk` frames of a slow walk, STEP_M apart at REFRESH_HZ. FLIP compares each
+frame with the one before, which is first reprojected onto the surfaces that the later frame sees; pixels that the
+earlier one did not see count as unchanged. Reprojection blurs, and reflections do move: `walk, smooth` has the same of
+frames without aliases (16 places in each pixel), below which no frame comes. What is above is flicker.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bench.reprojection import reprojected
+from lambent.core import metrics
+from lambent.core.arrays import Floats
+from lambent.core.camera import Camera, camera_axes
+from lambent.core.errors import UserError
+from lambent.core.plain import triple
+from lambent.core.progress import Progress, silent
+from lambent.realtime.device import open_device
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.scenes.camera_paths import path_length, sample_path
+from lambent.store.contract import SceneRecord
+from lambent.store.store import Store
+from lambent.viewer.pacing import prior_share
+
+if TYPE_CHECKING:
+    from lambent.bake.reference.surfaces import Surfaces
+
+NAME = "flicker"
+STEP_M = 0.02  # half a metre a second at 25 frames
+REST_FRAMES = 128  # of a series at rest, of one sample each, as in the window in software
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Pixels, places along the walk, frames compared at rest, and the scene that is baked where no store is given."""
+
+    width: int = 960
+    height: int = 540
+    places: int = 5
+    rest: int = 16
+    scene: str = "builtin:room"
+
+
+FULL, QUICK = Effort(), Effort(240, 135, 2, 4, "builtin:box")
+
+
+def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
+    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    from lambent.bake.bake import bake
+    from lambent.scenes import load_scene
+
+    with tempfile.TemporaryDirectory() as folder:
+        stores = [Store.open(path) for path in inputs]
+        stores = stores or [bake(load_scene(effort.scene), Path(folder) / "store", progress=progress)]
+        rows = [row for store in stores for row in rows_of(store, effort, progress)]
+    return {"rows": rows, "summary": {f"{row['scene']} {row['case']}": row["flip"] for row in rows}}
+
+
+def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
+    """One row per case; FLIP's mean is over all pairs of frames, the worst tile of all of them."""
+    from lambent.bake.engine import engine
+
+    engine()
+    from lambent.bake.reference import surfaces as traced  # imports Mitsuba, whose variant `engine` has set
+
+    renderer = Renderer(open_device(), store)
+    record, scene = renderer.scene.record, renderer.scene
+    if not record.cameras:
+        raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
+    surfaces = traced.Surfaces(scene.positions, scene.faces)
+    state = FrameState(record.cameras[0], effort.width, effort.height)
+    exposure_ev = record.exposure_ev
+    if exposure_ev is None:
+        exposure_ev = metrics.display_exposure(renderer.image(state))
+    state = replace(state, exposure_ev=exposure_ev)
+    steps = list(_steps(record, effort.places))
+    rows = []
+
+    def row(case: str, errors: Sequence[Floats]) -> None:
+        worst = max(float(metrics.tile_means(error).max()) for error in errors)
+        mean = float(np.mean([error.mean() for error in errors]))
+        told = {"scene": store.folder.name, "case": case, "pairs": len(errors)}
+        rows.append({**told, "flip": round(mean, 5), "flip_worst_tile": round(worst, 4)})
+        progress(len(rows), 4, case)
+
+    def frame(camera: Camera) -> Floats:
+        return _encoded(renderer.display_image(replace(state, camera=camera)))
+
+    def smooth(camera: Camera) -> Floats:
+        return _encoded(renderer.still(replace(state, camera=camera)))
+
+    row("still", [metrics.flip_error(frame(state.camera), frame(state.camera))])
+    series = list(_at_rest(renderer, state, effort.rest))
+    row("at rest", [metrics.flip_error(a, b) for a, b in pairwise(series)])
+    for case, draw in (("walk", frame), ("walk, smooth", smooth)):
+        row(case, [_changed(draw(before), draw(after), before, after, surfaces) for before, after in steps])
+    return rows
+
+
+def _changed(earlier: Floats, later: Floats, before: Camera, after: Camera, surfaces: Surfaces) -> Floats:
+    moved, seen = reprojected(earlier, before, after, surfaces)
+    return metrics.flip_error(later, np.where(seen[..., None], moved, later))
+
+
+def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
+    """Pairs of cameras STEP_M apart: along the first path that has a length, else sideways from each camera."""
+    path = next((path for path in record.paths if len(path.keys) > 1 and path_length(path) > STEP_M), None)
+    if path is not None:
+        share = STEP_M / path_length(path)
+        for t in (np.arange(places) + 0.5) / places:
+            yield sample_path(path, float(t)), sample_path(path, float(t + share))
+        return
+    for camera in record.cameras[:places]:
+        aside = STEP_M * np.asarray(camera_axes(camera)[0])
+        position, target = (triple(np.asarray(at) + aside) for at in (camera.position, camera.target))
+        yield camera, replace(camera, position=position, target=target)
+
+
+def _at_rest(renderer: Renderer, state: FrameState, count: int) -> Iterator[Floats]:
+    """The frame in motion, and the pictures of a series at rest that replace it."""
+    yield _encoded(renderer.display_image(state))
+    for index in range(count):
+        prior = prior_share(index + 1, REST_FRAMES, 1)
+        frame = replace(state, integrator="qmc", n=1, accumulate=index, prior=prior)
+        yield _encoded(renderer.display_image(frame))
+
+
+def _encoded(image: Any) -> Floats:
+    return np.asarray(image, np.float32) / np.float32(255)

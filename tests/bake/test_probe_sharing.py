@@ -1,0 +1,93 @@
+"""Neighbours that share a probe, and objects that have none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.probes.sharing import _grouped
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.realtime.baked import read_baked
+from lambent.scenes.geometry import placed, sphere
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.store.contract import probe_name, scene_record, shared_probes
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, room_with_step
+
+CAMERA = Camera("door", (-1.8, 1.5, 1.8), (0.0, 0.5, 0.0))
+
+
+def laid_table(camera: Camera | None = CAMERA) -> Scene:
+    """A room with a block; six beads beside each other on one side of it, two far away, one as large as a pin."""
+    room = room_with_step()
+    row = [(-1.5 + 0.12 * i, 0.6, -1.5) for i in range(6)]
+    beads = [SceneObject(f"bead{i}", placed(sphere(0.04, 12, 8), at), "mirror") for i, at in enumerate(row)]
+    beads += [SceneObject("behind", placed(sphere(0.04, 12, 8), (1.9, 0.3, 1.9)), "mirror")]  # the block hides the row
+    beads += [SceneObject("pin", placed(sphere(0.0005, 8, 6), (-1.0, 0.6, 0.5)), "mirror")]
+    return replace(room, objects=(*room.objects, *beads), cameras=(camera,) if camera else ())
+
+
+def probes_of(store: Store) -> set[str]:
+    return {o.name for o in scene_record(store).objects if probe_name(o.name, "radiance") in store}
+
+
+def test_neighbours_share_and_a_pin_has_none(tmp_path: Path) -> None:
+    store = bake(laid_table(), tmp_path / "s", quality=TINY)
+    owners, own = shared_probes(store), probes_of(store)
+    row = {f"bead{i}" for i in range(6)}
+    assert "pin" in owners and "ball" in own
+    assert len(row & own) <= 3 and {owners[name] for name in row - own} <= own, "whose probe is shown has one"
+    assert own.isdisjoint(owners) and own | set(owners) == row | {"ball", "behind", "pin"}
+    shown = read_baked(store)
+    assert not [told for told in shown.missing if told.startswith("probe/")], "a shared probe is not missing"
+    records = {o.name: o for o in scene_record(store).objects}
+    for name, owner in owners.items():
+        assert shown.probe_of(records[name]) is shown.probes[owner]
+    before = {a.name: a.key for a in store.artefacts()}
+    assert {a.name: a.key for a in bake(laid_table(), tmp_path / "s", quality=TINY).artefacts()} == before
+
+
+def test_without_viewers_nothing_is_shared(tmp_path: Path) -> None:
+    store = bake(laid_table(None), tmp_path / "s", quality=TINY)
+    assert not shared_probes(store) and "pin" in probes_of(store)
+
+
+def test_an_object_that_gets_its_own_probe_again_is_baked(tmp_path: Path) -> None:
+    store = bake(laid_table(), tmp_path / "s", quality=TINY)
+    shared = min(shared_probes(store))
+    centre = {shared: (0.0, 1.0, 0.0)}
+    again = bake(replace(laid_table(), probe_centres=centre), tmp_path / "s", quality=TINY)
+    assert shared in probes_of(again) and shared not in shared_probes(again)
+    assert again.artefact(probe_name(shared, "radiance")).meta["centre"] == [0.0, 1.0, 0.0]
+    back = bake(laid_table(), tmp_path / "s", quality=TINY)
+    assert shared not in probes_of(back), "what is no longer shown is dropped"
+
+
+def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) -> None:
+    scene = laid_table()
+    lit = tuple(replace(o, emission=(3.0, 3.0, 3.0)) if o.name == "bead2" else o for o in scene.objects)
+    owners = shared_probes(bake(replace(scene, objects=lit), tmp_path / "s", quality=TINY))
+    assert "bead2" not in owners.values() and "bead2" not in owners
+
+
+def test_groups_by_hand() -> None:
+    """Of four in a row, the second serves its neighbours; the last sees the others too well to lose them."""
+    pairs = np.array([(i, j) for i in range(4) for j in range(4) if i != j])
+    wrong = np.where(np.abs(pairs[:, 0] - pairs[:, 1]) == 1, 0.1, 0.9)
+    none, limits = np.zeros((4, 4)), np.full(4, 0.2)
+    assert _grouped(np.arange(4), pairs, wrong, none, limits).tolist() == [1, 1, 1, 3]
+    lost = none.copy()
+    lost[0, 2] = 0.15  # with .1 hidden, above its limit where the third is left out
+    assert _grouped(np.arange(4), pairs, wrong, lost, limits).tolist() == [0, 2, 2, 2]
+
+
+def test_a_damaged_list_of_owners_is_refused(tmp_path: Path) -> None:
+    with Store.create(tmp_path / "s", {}) as store:
+        store.set_document("shared_probes", {"owners": {"cup": 3}})
+        with pytest.raises(UserError, match="shared_probes"):
+            shared_probes(store)
