@@ -13,7 +13,6 @@ other: two independent errors, each 1.4 times that of the truth, and a part of e
 from __future__ import annotations
 
 import statistics
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,11 +22,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from lambent.bench.views import first_camera, given_or_baked
 from lambent.core import metrics
 from lambent.core.arrays import Floats
-from lambent.core.camera import Camera
 from lambent.core.colour import srgb_encode
-from lambent.core.errors import UserError
 from lambent.core.progress import Progress, part_of, silent
 from lambent.realtime.device import adapter_info, open_device
 from lambent.realtime.frame_state import FrameState
@@ -39,19 +37,17 @@ from lambent.store.store import Store
 NAME = "equal-time"
 T = TypeVar("T")
 
-SCENE = "builtin:room"  # baked here where no store is given
-
 
 @dataclass(frozen=True)
 class Effort:
-    """Pixels of the picture, samples of the truth, how often a frame is timed, and how many paths are tried."""
+    """Pixels, samples of the truth, timings of a frame, paths that are tried; the scene where no store is given."""
 
     width: int = 960
     height: int = 540
     truth_spp: int = 1024
     runs: int = 5
     spps: tuple[int, ...] = (1, 2, 4, 8, 16)
-    scene: str = SCENE
+    scene: str = "builtin:room"
 
 
 FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
@@ -59,8 +55,7 @@ FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
-    with tempfile.TemporaryDirectory() as folder:
-        stores = [Store.open(path) for path in inputs] or [_baked(effort.scene, Path(folder) / "store", progress)]
+    with given_or_baked(inputs, effort.scene, progress) as stores:
         parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]
         rows = [row for store, part in zip(stores, parts, strict=True) for row in rows_of(store, effort, part)]
     return {"rows": rows, "summary": summary(rows)}
@@ -73,9 +68,7 @@ def rows_of(store: Store, effort: Effort, progress: Progress) -> list[dict[str, 
     engine()
     from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant `engine` has set
 
-    if not scene_record(store).cameras:
-        raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
-    camera: Camera = scene_record(store).cameras[0]
+    camera = first_camera(store, scene_record(store))
     tracer = DenoisedView(scene_of(store), camera, effort.width, effort.height)
     halves = []
     for seed in (1, 2):
@@ -135,10 +128,3 @@ def _timed(make: Callable[[], T], runs: int, clock: Callable[[], float]) -> tupl
         made = make()
         seconds.append(clock() - begun)
     return made, seconds
-
-
-def _baked(scene: str, folder: Path, progress: Progress) -> Store:
-    from lambent.bake.bake import bake
-    from lambent.scenes import load_scene
-
-    return bake(load_scene(scene), folder, quality="preview", progress=progress)

@@ -9,7 +9,6 @@ frames without aliases (16 places in each pixel), below which no frame comes. Wh
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -19,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bench.reprojection import reprojected
+from lambent.bench.views import first_camera, given_or_baked
 from lambent.core import metrics
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, camera_axes
-from lambent.core.errors import UserError
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
 from lambent.realtime.device import open_device
@@ -57,12 +56,7 @@ FULL, QUICK = Effort(), Effort(240, 135, 2, 4, "builtin:box")
 
 def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
     """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
-    from lambent.bake.bake import bake
-    from lambent.scenes import load_scene
-
-    with tempfile.TemporaryDirectory() as folder:
-        stores = [Store.open(path) for path in inputs]
-        stores = stores or [bake(load_scene(effort.scene), Path(folder) / "store", progress=progress)]
+    with given_or_baked(inputs, effort.scene, progress) as stores:
         rows = [row for store in stores for row in rows_of(store, effort, progress)]
     return {"rows": rows, "summary": {f"{row['scene']} {row['case']}": row["flip"] for row in rows}}
 
@@ -76,10 +70,8 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
 
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene
-    if not record.cameras:
-        raise UserError("store has no camera", file=store.folder, expected="one whose view is compared")
     surfaces = traced.Surfaces(scene.positions, scene.faces)
-    state = FrameState(record.cameras[0], effort.width, effort.height)
+    state = FrameState(first_camera(store, record), effort.width, effort.height)
     exposure_ev = record.exposure_ev
     if exposure_ev is None:
         exposure_ev = metrics.display_exposure(renderer.image(state))

@@ -32,7 +32,7 @@ def command(
     from lambent.core.glare import glare
     from lambent.core.images import read_image, write_shown
     from lambent.core.outputs import check_output
-    from lambent.core.projections import Projection, View
+    from lambent.core.projections import Projection
     from lambent.core.radiance_views import read_view
 
     if output is not None:
@@ -46,7 +46,7 @@ def command(
             radiance, seen = drawn_view(
                 what, camera, settings, note=lambda text: say(f"note: {text}"), progress=progress
             )
-        view = View.of(seen, Projection.fisheye, SIDE_PX, SIDE_PX)
+        view = settings.view_of(seen)
     elif camera is not None:
         raise UserError("is of stores", field="--camera", got=camera, hint="a picture says its own view")
     else:

@@ -22,6 +22,7 @@ from lambent.core.projections import Projection, View
 
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
+ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 
 
@@ -76,6 +77,10 @@ class Settings:
         """Whether displayed images are in false colours."""
         return self.view == FALSE_COLOUR or self.show == NOISE
 
+    def view_of(self, camera: Camera) -> View:
+        """What images show around a camera's eye."""
+        return View.of(camera, self.projection, self.width, self.height, self.field_deg)
+
     def check(self) -> None:
         """Raise `UserError` for a view transform or an exposure that cannot be; renderers check the rest."""
         known("view transform", self.view, VIEWS, field="--view")
@@ -85,7 +90,7 @@ class Settings:
             got, expected = self.exposure_ev, "-64 to 64 EV"
             raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
         if self.projection is not Projection.perspective:
-            View.of(Camera("", (0, 0, 0), (0, 0, -1)), self.projection, self.width, self.height, self.field_deg).check()
+            self.view_of(ANYWHERE).check()
         elif self.field_deg is not None:
             raise UserError("is of fisheyes and cylinders", field="--field", hint="a camera has its own field of view")
 

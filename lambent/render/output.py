@@ -19,7 +19,7 @@ from lambent.core.images import WRITABLE, check_writable, write_image, write_sho
 from lambent.core.progress import Progress, silent, tracked
 from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
-from lambent.render.projected import Projected, faces_settings, view_of
+from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.store import Store
@@ -110,7 +110,7 @@ def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = si
     if file.suffix.lower() == ".png":
         write_shown(file, drawn.displayed(view, progress))
     else:
-        write_image(file, drawn.radiance(view, progress), view_of(drawn.settings, view).radiance_options())
+        write_image(file, drawn.radiance(view, progress), drawn.settings.view_of(view).radiance_options())
 
 
 def drawn_view(

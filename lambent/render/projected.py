@@ -8,20 +8,15 @@ from lambent.core.around import Around, face_px
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.progress import Progress, part_of, silent
-from lambent.core.projections import Projection, View
-from lambent.render.images import Images, Settings
-
-
-def view_of(settings: Settings, camera: Camera) -> View:
-    """The view of images with these settings."""
-    return View.of(camera, settings.projection, settings.width, settings.height, settings.field_deg)
+from lambent.core.projections import Projection
+from lambent.render.images import ANYWHERE, Images, Settings
 
 
 def faces_settings(settings: Settings) -> Settings:
     """Settings of the renderer that draws the faces."""
     if settings.projection is Projection.perspective:
         return settings
-    side = face_px(view_of(settings, Camera("", (0, 0, 0), (0, 0, -1))), settings.width)
+    side = face_px(settings.view_of(ANYWHERE), settings.width)
     return replace(settings, width=side, height=side, projection=Projection.perspective, field_deg=None)
 
 
@@ -33,7 +28,7 @@ class Projected(Images):
         self.quantity, self._faces = faces.quantity, faces
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
-        around = Around(view_of(self.settings, camera), self.settings.width, self.settings.height)
+        around = Around(self.settings.view_of(camera), self.settings.width, self.settings.height)
         count = len(around.cameras)
         for index, face in enumerate(around.cameras):
             part = part_of(progress, index / count, (index + 1) / count, "faces around the eye")

@@ -16,6 +16,7 @@ from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.contract import TRANSPORT_BASIS, view_artefact_name, view_meta
 from lambent.store.store import Store
+from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.subject import Subject
 
@@ -129,3 +130,16 @@ def settled(state):
     state.tick()
     until(state, lambda: not state.painter.busy and not state.loading.busy)
     return state.painter.frame
+
+
+def lit_state(monkeypatch, screen, tmp_path):
+    """A state whose bakes have all arrived, drawn without waiting."""
+    monkeypatch.setattr(painter, "FADE_S", 0.01)
+    monkeypatch.setattr(painter, "FRAME_S", 0.001)
+    state, bakes = new_state(screen, tmp_path)
+    until(state, lambda: bakes.begun)
+    for lights in LIGHTS:
+        bakes.begun[0].arrive(lights)
+        until(state, lambda lights=lights: state.loading.lights == lights)
+    settled(state)
+    return state

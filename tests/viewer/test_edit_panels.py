@@ -8,24 +8,16 @@ import pytest
 
 from lambent.bake.interreflection.proposal import Proposal, Row
 from lambent.viewer.mode import Drawing
-from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.screen import Rect
-from tests.viewer.edited_view import LIGHTS, new_state, settled, until
+from tests.viewer.edited_view import LIGHTS, lit_state, new_state, until
 from tests.viewer.panel_driver import PanelDriver
 
 
 @pytest.fixture
 def driver(monkeypatch, screen, tmp_path):
-    monkeypatch.setattr(painter, "FADE_S", 0.01)
-    monkeypatch.setattr(painter, "FRAME_S", 0.001)
-    state, bakes = new_state(screen, tmp_path)
-    until(state, lambda: bakes.begun)
-    for lights in LIGHTS:
-        bakes.begun[0].arrive(lights)
-        until(state, lambda lights=lights: state.loading.lights == lights)
-    settled(state)
+    state = lit_state(monkeypatch, screen, tmp_path)
     driver = PanelDriver(monkeypatch, EditMode(state, Drawing(None)))
     yield driver
     driver.close()

@@ -10,7 +10,6 @@ from lambent.core.camera import Camera
 from lambent.materials.document import KINDS
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 from lambent.viewer.mode import Drawing
-from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.modes.material.mode import MaterialMode, MaterialState
@@ -19,7 +18,7 @@ from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.mode import WalkMode
 from lambent.viewer.modes.walk.state import WalkState
 from tests.viewer import panel_driver
-from tests.viewer.edited_view import LIGHTS, new_state, settled, until
+from tests.viewer.edited_view import lit_state, until
 from tests.viewer.measured_specimens import BRASS, write_measurement
 from tests.viewer.panel_driver import PanelDriver
 
@@ -149,14 +148,7 @@ class FitUnderWay:
 
 
 def test_editing_in_place(monkeypatch, screen, tmp_path):
-    monkeypatch.setattr(painter, "FADE_S", 0.01)
-    monkeypatch.setattr(painter, "FRAME_S", 0.001)
-    state, bakes = new_state(screen, tmp_path)
-    until(state, lambda: bakes.begun)
-    for lights in LIGHTS:
-        bakes.begun[0].arrive(lights)
-        until(state, lambda lights=lights: state.loading.lights == lights)
-    settled(state)
+    state = lit_state(monkeypatch, screen, tmp_path)
     driver, seen = Walked(monkeypatch, EditMode(state, Drawing(None))), {}
     check(driver, seen)
     bounced = state.bounced
