@@ -5,6 +5,7 @@ python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
 .venv/bin/python docs/pictures.py scenes [NAME...]
 .venv/bin/python docs/pictures.py edit
 .venv/bin/python docs/pictures.py interreflections
+.venv/bin/python docs/pictures.py light-fields
 """
 
 from __future__ import annotations
@@ -12,13 +13,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
+from lambent.core import metrics
 from lambent.core.colour import filmic, srgb_encode
 from lambent.core.exposure import exposure_of
 from lambent.core.images import read_encoded, read_image, to_bytes
+
+if TYPE_CHECKING:
+    from lambent.bench.light_field_view import LightFieldView
+    from lambent.core.light_field import LightField
 
 PICTURES = Path(__file__).parent / "pictures"
 LIMIT_BYTES = 300_000
@@ -30,6 +37,7 @@ SCENES = {
     "vase": (512, 512),
     "loft": (640, 480),
     "ring": (400, 400),
+    "pavilion": (640, 480),
 }
 
 
@@ -124,6 +132,38 @@ def interreflections(samples: int = 512) -> None:
     save("interreflections.jpg", np.concatenate(row, axis=1), width=1200)
 
 
+def light_fields() -> None:
+    """What the teapot of `builtin:pavilion` mirrors: one of its maps; by one map, by B_n, marched, and traced."""
+    from tempfile import TemporaryDirectory
+
+    from lambent.bench.light_field_view import LightFieldView
+    from lambent.bench.oslf import FULL
+    from lambent.scenes import load_scene
+
+    with TemporaryDirectory() as folder:
+        store = Path(folder) / "store"
+        view = LightFieldView(load_scene(FULL.scene), FULL.object, 0, FULL.size, FULL.paths, store, FULL.quality)
+        field, single = view.field(1156, 224, FULL.strata), view.single(224, FULL.strata)
+        save("light-fields.jpg", light_field_row(view, field, single), width=1600)
+
+
+def light_field_row(view: LightFieldView, field: LightField, single: LightField) -> np.ndarray:
+    """The pictures of `light_fields` in a row, in a common exposure."""
+    from lambent.bench.light_field_view import Compared
+    from lambent.bench.oslf import methods
+
+    compared = Compared.of(view.shown.pixel, view.size, view.truth)
+    place = view.place(field)
+    by_name = {m.name: m.radiance for m in methods(field, single, place, view)}
+    lights = [by_name[name]() for name in ("single map", "B_n 4", "march 4, sky")] + [view.truth]
+    row = [metrics.displayed(compared.image(light), compared.reference.exposure_ev) for light in lights]
+    nearest = int(np.bincount(place.points[place.known]).argmax())  # the point that most pixels are near to
+    one = metrics.displayed(field.radiance[nearest].astype(float), compared.reference.exposure_ev)
+    side = row[0].shape[0]
+    one = np.asarray(Image.fromarray(to_bytes(one)).resize((side, side), Image.Resampling.NEAREST))
+    return np.concatenate([one, *map(to_bytes, row)], axis=1)
+
+
 def shown(path: Path) -> np.ndarray:
     return to_bytes(read_encoded(path)[..., :3])
 
@@ -148,5 +188,7 @@ if __name__ == "__main__":
         edit()
     elif sys.argv[1:] == ["interreflections"]:
         interreflections()
+    elif sys.argv[1:] == ["light-fields"]:
+        light_fields()
     else:
         main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))

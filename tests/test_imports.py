@@ -36,7 +36,7 @@ ONLY_IN = {
     "rich": {"cli"},
     "zarr": {"store"},
     "numcodecs": {"store"},
-    "numba": {"bake", "editing"},
+    "numba": {"core", "bake", "editing"},
     "distributed": {"bake"},
 }
 HEAVY = {

@@ -20,6 +20,8 @@ from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
 from lambent.bake.cuts import cut_for_viewers
+from lambent.bake.light_fields import request
+from lambent.bake.memory import check_memory
 from lambent.bake.methods import METHODS, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
@@ -49,6 +51,8 @@ def bake(
     seed: int = 0,
     light_map: str | None = None,
     probes: str | None = None,
+    light_fields: str | None = None,
+    light_field_mb: float | None = None,
     views: Sequence[View] = (),
     editables: Mapping[str, Editable] | None = None,
     bounces: Bounces | None = None,
@@ -71,6 +75,9 @@ def bake(
         The light map's integrator: path tracing and final gathering, or photons. By default as in the store.
     probes : {'cached', 'traced'}, optional
         Whether surfaces seen by probes show the light map, or all paths are traced. By default as in the store.
+    light_fields : str, optional
+        Objects that get a light field: "scene", those that the scene names; "none"; "auto", also those that the bake
+        chooses, within `light_field_mb` of memory; or names and patterns, with commas. By default as in the store.
     views : sequence of View, optional
         Views whose materials are to be edited: what they show, its visibility and its transport are baked. For these
         alone, without light map and probes, `only` is {"transport"}.
@@ -91,7 +98,7 @@ def bake(
     Raises
     ------
     UserError
-        Where an option is unknown, the scene has no objects, or no path tracing engine works.
+        Where an option is unknown, the scene has no objects or is too large, or no path tracing engine works.
     """
     start = time.perf_counter()
     kinds, quality = found(), quality_named(quality)
@@ -104,6 +111,7 @@ def bake(
         raise UserError("is baked for views alone", field=of_views[0], hint="name them with --view CAMERA")
     if not scene.objects:
         raise UserError("scene has no objects", field=scene.name)
+    check_memory(scene)
     scene = replace(scene, textures=prepared(scene.textures))
     existing = Store.open(store_path) if (Path(store_path) / "manifest.json").exists() else None
     changes = changed_inputs(existing, scene) if existing else []
@@ -111,6 +119,8 @@ def bake(
         log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
     before = existing.documents.get(METHODS, {}) if existing else {}
     methods = chosen(before, light_map=light_map, probes=probes)
+    methods |= request.noted(before, light_fields, light_field_mb)
+    scene = request.as_asked(scene, methods[request.FIELDS])
     with Store.create(store_path, inputs_of(scene)) as store:
         store.set_document(METHODS, methods)
         timed = Stopwatch(store)

@@ -14,7 +14,7 @@ import numpy as np
 from lambent.core.environment_layouts import layout_of
 from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
-from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.computed import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.textures import digest, parts
 

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from lambent.bake.interreflection.proposal import Proposal
     from lambent.bake.workers import Workers
     from lambent.core.progress import Progress
+    from lambent.editing.document import SessionDocument
+    from lambent.editing.interreflection.noise import PassNoise
+    from lambent.editing.session import Session
     from lambent.scenes.scene import Scene
 
     Kind = str
@@ -45,6 +48,17 @@ def command(
     probes: Annotated[
         ProbeMethod | None,
         typer.Option(help="Probes from the light map, or path traced. [default: as in the store, else cached]"),
+    ] = None,
+    light_fields: Annotated[
+        str | None,
+        typer.Option(
+            help="Objects that get a light field: NAME,... with * and ?; scene, those it names; auto, chosen; or none. "
+            "[default: as in the store, else scene]"
+        ),
+    ] = None,
+    light_field_mb: Annotated[
+        float | None,
+        typer.Option(min=1, help="Memory of light fields chosen by auto. [default: as in the store, else 256]"),
     ] = None,
     view: Annotated[
         list[str] | None,
@@ -95,6 +109,8 @@ def command(
     Example: lambent bake builtin:cornell --view front:450x450 --samples 4096 --propose
     """
     from lambent.bake.bake import bake
+    from lambent.bake.light_fields.request import light_fields_of
+    from lambent.editing.session import Session
     from lambent.scenes import load_scene
     from lambent.scenes.clear_sky import daylight_in_words
     from lambent.scenes.scene import SunSky
@@ -103,10 +119,16 @@ def command(
     if output is None and not propose:
         raise UserError("no folder for the store", field="-o", hint="name one, or ask with --propose what it takes")
     start = time.perf_counter()
+    session = Session.open(edit) if edit is not None else None
+    if session is not None and crease_angle is None:
+        crease_angle = session.document.crease_deg
     what = load_scene(scene, crease_angle)
     loading = time.perf_counter() - start
     _check_lit(what)
-    edited, changed = _edited(what, output, view or [], edit)
+    edited, changed = _edited(what, output, view or [], session)
+    if session is not None:
+        _check_session(session.document, what, edit)
+        what = what.merged(session.document.merged)
     if edited["views"] and only is not None and not set(only) & set(modules_in(artefacts, having="OF_VIEWS")):
         raise UserError("views are baked for editing", field="--only", got=", ".join(only), expected="transport")
     bounced = propose or INTERREFLECTION in (only or ())
@@ -121,10 +143,15 @@ def command(
             facts: dict[str, Any] = {"proposals": [one.said() for one in said]}
             show(facts, "\n\n".join("\n".join(one.lines()) for one in said), json)
             return
+        watch = _watch(what, output, bounces, edited, progress) if bounced else None
         store = bake(
-            what, output, quality=quality, only=only, resume=resume, seed=seed, progress=progress,
-            light_map=light_map, probes=probes, bounces=bounces, workers=shared, **edited,
+            what, output, quality=quality, only=only, resume=resume, seed=seed,
+            progress=watch.progress if watch is not None else progress,
+            light_map=light_map, probes=probes, light_fields=light_fields, light_field_mb=light_field_mb,
+            bounces=bounces, workers=shared, **edited,
         )  # fmt: skip
+        if watch is not None:
+            watch.note(store)
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     daylight = [("daylight", daylight_in_words(what.environment))] if isinstance(what.environment, SunSky) else []
     seconds, run = store.documents.get(TIMINGS, {}), {"loading": loading, **store.documents.get(LAST_RUN, {})}
@@ -133,7 +160,22 @@ def command(
     rows = [*daylight, *((name, f"{value:.1f} s") for name, value in {**seconds, **run}.items())]
     rows.append(("this run", f"{sum(run.values()):.1f} s"))
     facts |= dict(daylight)
-    show(facts, table([("store", str(output)), ("arrays", str(len(arrays))), *rows]), json)
+    text = table([("store", str(output)), ("arrays", str(len(arrays))), *rows])
+    if fields := light_fields_of(store):
+        facts["light_fields"] = fields
+        text += f"\n\n{_light_fields_in_words(fields)}"
+    show(facts, text, json)
+
+
+def _light_fields_in_words(fields: list[dict[str, Any]]) -> str:
+    rows = [
+        (
+            one["object"], str(one["points"]), f"{one['megabytes']:.1f}", f"{one['seconds']:.1f}",
+            *(f"{one[name]:.3f}" if name in one else "" for name in ("probe_error", "error")),
+        )
+        for one in fields
+    ]  # fmt: skip
+    return table([("light field of", "points", "MB", "seconds", "error of its probe", "and its own"), *rows])
 
 
 def _check_lit(scene: Scene) -> None:
@@ -142,6 +184,13 @@ def _check_lit(scene: Scene) -> None:
     if not shines or not scene.cameras:
         lacks, section = ("nothing gives light", "[environment]") if not shines else ("no camera", "[[cameras]]")
         raise UserError(lacks, field=scene.name, hint=f"add {section} to its scene.toml")
+
+
+def _check_session(document: SessionDocument, scene: Scene, file: Path | None) -> None:
+    merged = [*document.merged, *document.merged.values()]
+    for field, names in (("materials", document.materials), ("merged", merged)):
+        for name in names:
+            known("material", name, scene.materials, file=file, field=field)
 
 
 def _check_choice(scene: Scene, fixed: list[str], editable: list[str], merge: bool, bounced: bool) -> None:
@@ -191,6 +240,18 @@ def _proposed(
     return found[0].merged(scene), found[0].bounces, found
 
 
+def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], progress: Progress) -> PassNoise:
+    """What notes in the store how noisy its interreflections are."""
+    from lambent.bake.interreflection.series import worn
+    from lambent.editing.interreflection.noise import PassNoise
+    from lambent.materials.factored.of_lobes import of_material
+
+    given = edited.get("editables", {})
+    materials = {name: given.get(name) or of_material(scene.materials[name]) for name in worn(scene)}
+    shots = [(view.camera, (view.width, view.height)) for view in edited["views"]]
+    return PassNoise(store, shots, materials, bounces.samples, progress)
+
+
 def _workers(count: int | None, address: str | None, unused: bool) -> AbstractContextManager[Workers | None]:
     """Who does the work of interreflections; None: this process."""
     if count is not None and address is not None:
@@ -203,24 +264,20 @@ def _workers(count: int | None, address: str | None, unused: bool) -> AbstractCo
 
 
 def _edited(
-    scene: Scene, store: Path | None, names: list[str], session: Path | None
+    scene: Scene, store: Path | None, names: list[str], session: Session | None
 ) -> tuple[dict[str, Any], frozenset[str]]:
     """What `bake` gets for views of these names, cameras or saved views, or of a session, and what it edits."""
     from lambent.bake.view import View, view_named
-    from lambent.editing.session import Session
     from lambent.store.views import read_views
 
     saved = read_views(store).cameras if store is not None else ()
     views = [view_named(name, (*saved, *scene.cameras)) for name in names]
     if session is None:
         return {"views": views}, frozenset()
-    opened = Session.open(session)
-    document = opened.document
-    for name in document.materials:
-        known("material", name, scene.materials, file=session, field="materials")
+    document = session.document
     changed = frozenset(name for name, one in document.materials.items() if one.curves or one.tints)
     return {
         "views": [*views, View(document.camera, *document.size)],
-        "editables": {name: opened.original(name) for name in document.materials},
-        "environment": opened.environment,
+        "editables": {name: session.original(name) for name in document.materials},
+        "environment": session.environment,
     }, changed

@@ -130,11 +130,11 @@ class _StepLines:
         self.step = ""
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) in pixels of "1280x720"."""
+def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
+    """(width, height) in pixels of "1280x720", the value of an option."""
     width, _, height = text.lower().partition("x")
     if not (width.isdecimal() and height.isdecimal() and 0 < int(width) <= 16384 and 0 < int(height) <= 16384):
-        raise UserError("not a picture size", field="--size", got=text, expected="WIDTHxHEIGHT, each 1 to 16384")
+        raise UserError("not a picture size", field=option, got=text, expected="WIDTHxHEIGHT, each 1 to 16384")
     return int(width), int(height)
 
 

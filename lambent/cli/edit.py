@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import parse_size
+from lambent.cli.console import CreaseAngle, parse_size
 from lambent.cli.walk import SIZE, Size
 
 
@@ -37,13 +37,17 @@ def command(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Of a scene: folder of the store that keeps its transport.")
     ] = None,
+    crease_angle: CreaseAngle = None,
     size: Size = SIZE,
 ) -> None:
     """Edit a material beside its measurement; or pull the curves of a scene's materials, and the picture follows.
 
     Example: lambent edit brushed.bsdf brushed.json --environment studio.hdr
     """
-    pixels, resolution = parse_size(size), parse_size(picture) if picture else None
+    pixels, resolution = parse_size(size), parse_size(picture, "--picture") if picture else None
     from lambent.viewer import edit
 
-    edit.run(what, material, environment or (), camera=camera, picture=resolution, store=output, size=pixels)
+    edit.run(
+        what, material, environment or (), camera=camera, picture=resolution, store=output, crease_deg=crease_angle,
+        size=pixels,
+    )  # fmt: skip

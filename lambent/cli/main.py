@@ -82,7 +82,8 @@ def run(arguments: list[str]) -> int:
     except UserError as error:
         return _fail(str(error))
     except TyperException as error:  # unknown commands and options, missing arguments
-        return _fail(error.format_message())
+        message = error.format_message().replace("Value error, ", "").replace("Input should be", "it has to be")
+        return _fail(message)
     except (Cancelled, KeyboardInterrupt):
         code = INTERRUPTED
     except BrokenPipeError:

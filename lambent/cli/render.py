@@ -45,7 +45,8 @@ def command(
     integrator: Annotated[
         str,
         typer.Option(
-            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, diffuse, or path: the path tracer."
+            help="lamps, rings, lobe-4.24, lobe-4.25, fis, split-sum, qmc, oslf, oslf-points, diffuse, or path: the "
+            "path tracer."
         ),
     ] = "lamps",
     samples: Annotated[int | None, typer.Option(min=1, help="Per pixel (path, qmc) or per lobe.")] = None,
@@ -78,6 +79,16 @@ def command(
             "interleaved, marched or fixed (lamps, rings), thesis (lobe-4.24, lobe-4.25), fis."
         ),
     ] = "auto",
+    lookup: Annotated[
+        str,
+        typer.Option(
+            help="Where reflected rays find their light: auto, planes, distance or plain (of probes), or light_field, "
+            "light_field-1, -bn, -br, -average, -angle, -nearest; -choice shows which point answers."
+        ),
+    ] = "auto",
+    light_field_mb: Annotated[
+        float | None, typer.Option(min=0, help="GPU memory for the maps of light fields. [default: all of them]")
+    ] = None,
     projection: Annotated[
         Literal["perspective", "fisheye", "hemispherical", "cylinder"],
         typer.Option(help="How directions lie in the picture; fisheyes are square."),
@@ -106,16 +117,13 @@ def command(
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
-    from lambent.core.exposure import exposure_of
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
 
     if ev100 is not None:
-        if exposure is not None:
-            raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
-        exposure = exposure_of(ev100)
+        exposure = _exposure_of(ev100, exposure)
     if part in MEASURED:
         if view not in ("filmic", "false-colour"):
             raise UserError("is shown in false colours", field="--show", got=part, hint="leave out --view")
@@ -123,7 +131,7 @@ def command(
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
-        projection=Projection(projection), field_deg=field,
+        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb,
     )  # fmt: skip
     settings.check()
     if edit is not None:
@@ -155,6 +163,20 @@ def command(
     exposed = "" if done.ev100 is None else f"EV100 {done.ev100:.1f}, "
     text = f"{output}: {size}, {done.frames} frame(s), {done.integrator}, {exposed}{done.seconds:.1f} s"
     show(asdict(done), text, json)
+
+
+def _exposure_of(ev100: float, exposure: float | None) -> float:
+    """Stops on radiance of an EV100."""
+    from lambent.core.exposure import ev100_of, exposure_of
+    from lambent.render.images import MOST_EV
+
+    if exposure is not None:
+        raise UserError("says the exposure twice", field="--ev100", hint="leave out --exposure")
+    found = exposure_of(ev100)
+    if not -MOST_EV <= found <= MOST_EV:
+        expected = f"{ev100_of(MOST_EV):.0f} to {ev100_of(-MOST_EV):.0f}"
+        raise UserError("exposure is out of range", field="--ev100", got=ev100, expected=expected)
+    return found
 
 
 def parse_range(text: str, *, log: bool) -> Range:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from lambent.cli.walk import SIZE, Size, Store, show
+from lambent.cli.walk import SIZE, Memory, Size, Store, show
 
 
-def command(store: Store, size: Size = SIZE) -> None:
+def command(store: Store, size: Size = SIZE, light_field_mb: Memory = None) -> None:
     """Turn about an object of a baked scene: drag to orbit, wheel to come nearer; the same window as `walk`.
 
     Example: lambent view room.store
     """
-    show(store, "view", size)
+    show(store, "view", size, light_field_mb)

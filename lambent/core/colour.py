@@ -29,9 +29,18 @@ def in_halves(light: Floats) -> tuple[NDArray[np.float16], float]:
 
     The sun shows 7e6 W/(sr m^2), a hundred times the largest half float.
     """
-    brightest = min(float(light.max(initial=0.0)), HALF_MAX * MOST_UNIT)
-    unit = 2.0 ** np.ceil(np.log2(max(brightest / HALF_MAX, 1.0)))
-    return np.minimum(light / unit, HALF_MAX).astype(np.float16), float(unit)
+    unit = unit_of_halves(float(light.max(initial=0.0)))
+    return halves(light, unit), unit
+
+
+def unit_of_halves(brightest: float) -> float:
+    """The least power of two, from 1 to MOST_UNIT, in which half floats have room for light."""
+    return float(2.0 ** np.ceil(np.log2(min(max(brightest / HALF_MAX, 1.0), MOST_UNIT))))
+
+
+def halves(light: Floats, unit: float) -> NDArray[np.float16]:
+    """Light (...) >= 0 in multiples of a unit; what is brighter than half floats can be is clipped."""
+    return np.asarray(np.minimum(light / unit, HALF_MAX), np.float16)
 
 
 def rgb_to_xyz(rgb: Floats) -> Floats:

@@ -49,6 +49,12 @@ def triple(values: Iterable[Any]) -> Triple:
     return x, y, z
 
 
+def quad(values: Iterable[Any]) -> tuple[float, float, float, float]:
+    """Four numbers of an array as plain floats."""
+    a, b, c, d = (float(v) for v in values)
+    return a, b, c, d
+
+
 def plain_name(name: str, otherwise: str = "material") -> str:
     """A file name for any name from a user or a file; `otherwise` if nothing of it is left."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise

@@ -132,6 +132,10 @@ class SessionDocument(_Strict):
         Width and height of the picture in pixels.
     lights
         Number of triangles that the environment is cut into.
+    merged
+        Materials whose objects are made of another one here, by that one's name.
+    crease_deg
+        Above which angle edges of the scene's meshes are sharp; None where normals are as its files have them.
     """
 
     format: Literal["lambent-edit-session"] = "lambent-edit-session"
@@ -142,6 +146,8 @@ class SessionDocument(_Strict):
     environment: Surroundings | None = None
     lights: Annotated[int, Field(ge=FEWEST, le=MOST)] = 400
     materials: dict[Name, EditedMaterial] = Field(default_factory=dict, max_length=MOST_MATERIALS)
+    merged: dict[Name, Name] = Field(default_factory=dict, max_length=MOST_MATERIALS)
+    crease_deg: Annotated[float, Field(ge=0, le=180)] | None = None
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> SessionDocument:
@@ -149,6 +155,9 @@ class SessionDocument(_Strict):
             raise ValueError("the camera is not within 1e9 m, or sees no angle")
         if self.size[0] * self.size[1] > MOST_PIXELS:
             raise ValueError(f"a picture has at most {MOST_PIXELS} pixels, not {self.size[0]} x {self.size[1]}")
+        for name in self.merged:
+            if name in self.materials or name in self.merged.values():
+                raise ValueError(f"{name!r} is merged with another material, and has no edits or parts of its own")
         return self
 
 

@@ -244,6 +244,15 @@ class Session:
             self._curve(material, curve)
             self._change_curve(material, curve, drawn=None, layers=())
 
+    def merge(self, material: str, other: str) -> None:
+        """Make all objects of a material of another one; its own edits go. The view asks for new transport."""
+        self._material(material)
+        materials = {name: one for name, one in self.document.materials.items() if name != material}
+        known("material", other, materials, field="merged")
+        merged = {name: other if into == material else into for name, into in self.document.merged.items()}
+        changes = {"materials": materials, "merged": {**merged, material: other}}
+        self.history.change(self.document.model_copy(update=changes))
+
     def undo(self) -> None:
         self.history.undo()
 

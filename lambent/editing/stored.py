@@ -80,6 +80,9 @@ def edited_picture(
     _check_environment(store, session, lights)
     scene = {name: of_material(material) for name, material in scene_record(store).materials.items()}
     parts = parts_of(store, session, {**scene, **{name: session.original(name) for name in view.materials}}, lights)
+    if apart := sorted(parts.keys() & view.merged.keys()):
+        what = f"transport has a material of its own that the session merges with {view.merged[apart[0]]}"
+        raise NotBaked(what, file=store.folder, field=apart[0], hint="bake the view for editing again")
     backdrop = store.read(view_artefact_name(view.camera, *view.size, "view_points", "backdrop"))
     picture = EditedPicture(backdrop.astype(np.float32), parts, canvas)
     for name in view.materials:

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.light_field import LightField
 from lambent.core.plain import triple
 from lambent.realtime.cube_mips import finite
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, ObjectRecord, SceneRecord, SunRecord, noise_name
+from lambent.store.light_fields import has_light_field, light_name, read_light_field
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -27,7 +29,8 @@ class Probe:
     """Light around an object, seen from `centre`: radiance (6, N, N, 3), distance (6, M, M) or None, planes (P, 4).
 
     `irradiance`, nine numbers, is what the probe alone would give (`store.contract`), where the object is to be shown
-    only the share of it that its light map has.
+    only the share of it that its light map has. An object with a `light_field` has a probe of its own, and in `sky` the
+    environment (6, N, N, 3).
     """
 
     centre: tuple[float, float, float]
@@ -35,6 +38,12 @@ class Probe:
     distance: Floats | None = None
     planes: Floats = field(default_factory=lambda: np.zeros((0, 4), np.float32))
     irradiance: tuple[float, ...] = ()
+    light_field: LightField | None = None
+    sky: Floats | None = None
+    most_bytes: float | None = None  # that the maps of the light field may take on the GPU
+
+
+DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +64,7 @@ class BakedScene:
     irradiance_back: Floats | None = None
     environment: Floats | None = None
     probes: Mapping[str, Probe] = field(default_factory=dict)
+    light_fields: Mapping[str, LightField] = field(default_factory=dict)  # by object
     missing: tuple[str, ...] = ()
     uv: Floats | None = None
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
@@ -63,10 +73,24 @@ class BakedScene:
     noise_back: Floats | None = None
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
     unit: float = 1.0
+    light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
     sun: SunRecord | None = None  # whose direct light the light maps leave out
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
-        """The object's own probe or the one it shares, else the nearest one, else the environment, else None."""
+        """The object's own probe or the one it shares, else the nearest one, else the environment, else None.
+
+        With its light field, where it has one.
+        """
+        probe, light_field = self._cube_of(obj), self.light_fields.get(obj.name)
+        if light_field is None:
+            return probe
+        most = None
+        if self.light_field_mb is not None:
+            whole = sum(one.inverse_distance.size for one in self.light_fields.values())
+            most = 1e6 * self.light_field_mb * light_field.inverse_distance.size / whole
+        return replace(probe or DARK, light_field=light_field, sky=self.environment, most_bytes=most)
+
+    def _cube_of(self, obj: ObjectRecord) -> Probe | None:
         owner = self.shared_probes.get(obj.name, obj.name)
         if owner in self.probes:
             return self.probes[owner]
@@ -81,16 +105,25 @@ class BakedScene:
         return None if self.environment is None else Probe((0.0, 0.0, 0.0), self.environment)
 
 
+def _light_field(store: Store, name: str, unit: float) -> LightField:
+    """The light field of an object, its light in `unit`."""
+    found = read_light_field(store, name)
+    own = contract.radiance_unit(store, light_name(store, name))
+    return found if own == unit else replace(found, radiance=found.radiance * np.float32(own / unit), blocks=None)
+
+
 def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
     return sun and sun.model_copy(update={"irradiance": triple(np.divide(sun.irradiance, unit))})
 
 
-def read_baked(store: Store) -> BakedScene:
+def read_baked(store: Store, light_field_mb: float | None = None) -> BakedScene:
     """Everything the renderer shows of a store. Only the geometry and the scene record must be there."""
     record = contract.scene_record(store)
     missing: list[str] = []
     cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in record.objects)) if n in store]
-    unit = max((contract.radiance_unit(store, name) for name in cubes), default=1.0)
+    fields = [o.name for o in record.objects if has_light_field(store, o.name)]
+    lit = [*cubes, *(light_name(store, name) for name in fields)]
+    unit = max((contract.radiance_unit(store, name) for name in lit), default=1.0)
 
     def light(name: str, why: str | None) -> Floats | None:
         if name not in store:
@@ -129,10 +162,12 @@ def read_baked(store: Store) -> BakedScene:
         missing=tuple(missing),
         textures=read_textures(store, record),
         shared_probes=shared,
+        light_fields={name: _light_field(store, name, unit) for name in fields},
         noise=noise(SIDES[0]),
         noise_back=noise(SIDES[1]),
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
         unit=unit,
+        light_field_mb=light_field_mb,
         sun=_in_units(contract.sun_beside(store), unit),
     )
 

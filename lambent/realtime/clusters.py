@@ -17,6 +17,10 @@ from lambent.store.contract import ObjectRecord
 
 CLUSTER_FACES = 64
 SLACK = 1e-5  # of the largest term of a plane's equation: the GPU counts in single precision
+SLIVER_PX = 1.5  # width up to which a sliver may lie between the middles of pixels
+LONG = 3.0  # length over width of a sliver
+FEW_PX = 4.0  # side of a box whose triangles may be so small whatever their shape
+Ranges = list[tuple[int, int]]
 MERGED_GAP = 256  # faces between two runs that are drawn with them: another call costs as much
 
 
@@ -27,10 +31,11 @@ class Seen:
     begin: Indices
     end: Indices
 
-    def of(self, first_face: int, face_count: int) -> list[tuple[int, int]]:
-        """(first, count) of the runs in a range of faces that begins and ends with objects."""
-        low, high = np.searchsorted(self.begin, [first_face, first_face + face_count])
-        begin, end = self.begin[low:high].tolist(), self.end[low:high].tolist()
+    def of(self, first_face: int, face_count: int) -> Ranges:
+        """(first, count) of what the runs have of a range of faces."""
+        last = first_face + face_count
+        mine = slice(np.searchsorted(self.end, first_face, "right"), np.searchsorted(self.begin, last))
+        begin, end = self.begin[mine].clip(first_face).tolist(), self.end[mine].clip(max=last).tolist()
         return merged(zip(begin, end, strict=True), MERGED_GAP)
 
 
@@ -49,6 +54,7 @@ class Clusters:
         # A record may leave faces out between two objects.
         owned = np.concatenate([none, *(np.arange(first, end) for first, end in limits)])
         corners, at = np.asarray(positions, np.float64)[faces[owned]], np.searchsorted(owned, self._begin)
+        self._sliver_m = np.minimum.reduceat(_slivers(corners), at) if len(at) else np.zeros(0)
         self._low, self._high = (
             reduce.reduceat(extreme, at, axis=0) if len(at) else np.zeros((0, 3))
             for reduce, extreme in ((np.minimum, corners.min(axis=1)), (np.maximum, corners.max(axis=1)))
@@ -64,6 +70,9 @@ class Clusters:
         rows : (top, bottom)
             The band of the image that is drawn, as shares of its height.
         """
+        return self._runs(self._visible(clip_from_world, rows))
+
+    def _visible(self, clip_from_world: Floats, rows: tuple[float, float]) -> Flags:
         x, y, z, w = np.asarray(clip_from_world, np.float64)
         top, bottom = (1 - 2 * share for share in rows)
         visible = np.ones(len(self._begin), bool)
@@ -72,7 +81,20 @@ class Clusters:
             reach = np.abs(terms).sum(axis=1) + abs(plane[3])
             # NaN and infinity: such a cluster is drawn.
             visible &= ~(terms.sum(axis=1) + plane[3] < -SLACK * reach)
-        return self._runs(visible)
+        return visible
+
+    def thin(self, clip_from_world: Floats, rows: tuple[float, float], height_px: int) -> Seen:
+        """What of it may be too thin for the middles of pixels: slivers, and clusters of few pixels.
+
+        `height_px` is that of the whole image; the rest as for `seen`.
+        """
+        _, y, _, w = np.asarray(clip_from_world, np.float64)
+        centre, half = (self._high + self._low) / 2, (self._high - self._low) / 2
+        away_m = centre @ w[:3] + w[3] + half @ np.abs(w[:3])
+        with np.errstate(invalid="ignore"):
+            narrow_m = np.maximum(away_m, 0) * 2 / (np.linalg.norm(y[:3]) * height_px)  # one pixel
+            thin = ~(self._sliver_m > SLIVER_PX * narrow_m) | ~(2 * half.max(axis=1) > FEW_PX * narrow_m)
+        return self._runs(self._visible(clip_from_world, rows) & thin)
 
     def _runs(self, visible: Flags) -> Seen:
         at = np.flatnonzero(visible)
@@ -83,9 +105,17 @@ class Clusters:
         return Seen(self._begin[first], self._end[last])
 
 
-def merged(runs: Iterable[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+def _slivers(corners: Floats) -> Floats:
+    """(F,) least height (m) of triangles (F, 3, 3) that are long and thin, infinity for others."""
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    height = np.divide(area, edges, out=np.zeros_like(edges), where=edges > 0)
+    return np.where((edges >= LONG * height) & (area > 0), height, np.inf)
+
+
+def merged(runs: Iterable[tuple[int, int]], gap: int) -> Ranges:
     """(first, count) of runs [begin, end) in order, those together that are less than `gap` apart."""
-    found: list[tuple[int, int]] = []
+    found: Ranges = []
     for begin, end in runs:
         if found and 0 <= begin - sum(found[-1]) < gap:
             found[-1] = (found[-1][0], end - found[-1][0])

@@ -55,6 +55,11 @@ class FrameContext:
         return self.is_passing and self.state.is_smoothed and bool(self.resources.masked)
 
     @property
+    def is_covered(self) -> bool:
+        """Whether pixels show the mean over several places. Frames over others keep what those have."""
+        return self.is_passing and self.state.covers and self.state.is_smoothed and self.redrawn is None
+
+    @property
     def unsmoothed(self) -> Any:
         """Texture of the display image before its edges are blended, None where they are not."""
         of_one = self.state.accumulate is None or (self.prior is not None and self.state.prior > SMOOTH_PRIOR)
@@ -64,6 +69,10 @@ class FrameContext:
     def seen(self, rows: tuple[float, float] = (0.0, 1.0)) -> Seen:
         """What the frame's camera may see of the scene in a band of rows."""
         return self.clusters.seen(self.data["clip_from_world"].T, rows)
+
+    def thin(self, rows: tuple[float, float]) -> Seen:
+        """What of it may be too thin for the middles of pixels."""
+        return self.clusters.thin(self.data["clip_from_world"].T, rows, self.state.height)
 
     def begin(
         self, name: str, views: Iterable[Any], load_op: str, depth: str = "load", band: Band | None = None

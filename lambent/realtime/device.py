@@ -47,7 +47,8 @@ WEBGPU_LIMITS: Mapping[str, int] = {
     "max-compute-workgroup-size-z": 64,
     "max-compute-workgroups-per-dimension": 65535,
 }
-OPTIONAL_FEATURES = ("timestamp-query",)
+BLOCKS = "texture-compression-bc"
+OPTIONAL_FEATURES = ("timestamp-query", BLOCKS)
 
 
 @dataclass(frozen=True)

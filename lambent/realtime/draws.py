@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from lambent.materials.document import Material
+from lambent.realtime.clusters import Ranges
 from lambent.realtime.frame_state import SHOW, FrameState
-from lambent.realtime.incident import LookUp
+from lambent.realtime.incident import LookUp, brings_light
 from lambent.realtime.integrators import INTEGRATORS, Cube, Integrator
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import ObjectResources, SceneResources
@@ -29,13 +30,19 @@ class Draw:
     material_group: Any
     textures: int = 0  # bits of the textures to read, see realtime.textures
     table: LampUse = ""  # what it does with the lamps of its probe
-    planar: bool = False  # has pixels on planar reflectors
+    planar_n: int = 0  # samples per lobe where it has pixels on planar reflectors; 0 where it has none
+    is_beyond: bool = False  # the light of a part, added to its neighbours
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
         """The same object by another integrator that does not aim, for a pass that does not read reflections."""
         group = resources.materials[self.item.record.material].group(self.material, how, n)
         table = lamp_use(how, self.item.light, self.look_up, self.material, self.textures)
-        return replace(self, integrator=how, n=n, material_group=group, table=table, planar=False)
+        return replace(self, integrator=how, n=n, material_group=group, table=table, planar_n=0)
+
+    @property
+    def planar(self) -> bool:
+        """Whether it has pixels on planar reflectors."""
+        return self.planar_n > 0
 
     @property
     def lobes(self) -> int:
@@ -59,6 +66,16 @@ class Draw:
         return {"LAYERS": 1 + self.item.light.lamps.mixes(self.material, bool(self.textures & WIDENING))}
 
     @property
+    def _part(self) -> dict[str, float]:
+        return {"PART": 1 + self.is_beyond} if self.item.record.borders else {}
+
+    @property
+    def faces(self) -> Ranges:
+        """(first, count) of what is drawn."""
+        record = self.item.record
+        return self.item.beyond if self.is_beyond else [(record.first_face, record.face_count)]
+
+    @property
     def object_group(self) -> Any:
         return self.item.group(self.cube, self.look_up, self.table)
 
@@ -72,11 +89,14 @@ class Draw:
             **self.look_up.constants(self.item.light.probe),
             **self.integrator.constants,
             **self._layers,
+            **self._part,
         }
 
 
 def lamp_use(how: Integrator, light: ProbeLight, look_up: LookUp, material: Material, textures: int) -> LampUse:
     """What an integrator does with the lamps of a probe for a material; `textures` are the bits of those that show."""
+    if brings_light(look_up):
+        return ""
     widened = bool(textures & WIDENING)
     if how.aimed and look_up.AIMS and light.aims.is_aimed_at(material, widened):
         return "aim"
@@ -100,10 +120,10 @@ def draws_of(state: FrameState, resources: SceneResources, reflecting: Collectio
         buffers, light = resources.materials[item.record.material], item.light
         look_up = light.look_up(state.lookups.get(item.record.name, state.lookup)) if how.specular else light.cheapest
         table = lamp_use(how, light, look_up, material, bits)
-        planar = how.specular and item.record.name in reflecting
-        # the buffer of a planar reflector has its lamps
-        alone = table == "lamps" and not planar and light.lamps.all_out(material, bool(bits & WIDENING))
-        n = how.rows or (state.samples(material, buffers.textures.rough, alone) if how.specular else 1)
+        alone = table == "lamps" and light.lamps.all_out(material, bool(bits & WIDENING))
+        rough = buffers.textures.rough
+        n = how.rows or (state.samples(material, rough, alone) if how.specular else 1)
+        on_planes = state.planar_samples(material, rough) if how.specular and item.record.name in reflecting else 0
         group = buffers.group(material, how, n)
-        draws.append(Draw(item, material, how, n, look_up, group, bits, table, planar))
+        draws.append(Draw(item, material, how, n, look_up, group, bits, table, on_planes))
     return draws

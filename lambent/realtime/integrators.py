@@ -33,10 +33,12 @@ class Integrator:
     cube: Cube = "smooth"  # which cube map of a probe it reads; all are the same on level 0 but for prefiltered
     specular: bool = True
     progressive: bool = False  # unbiased: frames may be averaged, all of the same few samples
+    spp: int = 256  # of a still of a progressive one
     aimed: str | None = None  # shader for a probe whose lamps stand out: part of the samples aims at them
     lamps: str | None = None  # shader for a probe with lamps that are smaller than a lobe: they leave the cube map
 
 
+SUN_SAMPLED = {"SUN_SAMPLED": 1}  # not in closed form: exact for lobes narrower than the sun's disc, too
 INTEGRATORS: dict[str, Integrator] = {
     "lamps": Integrator("rings.wgsl", normalised_rings_table, lamps="lamps.wgsl"),
     "rings": Integrator("rings.wgsl", normalised_rings_table),
@@ -44,8 +46,12 @@ INTEGRATORS: dict[str, Integrator] = {
     "lobe-4.25": Integrator("thesis.wgsl", patterns.lobe_table, {"FORMULA": 25}, cube="box"),
     "fis": Integrator("quadrature.wgsl", patterns.fis_table, cube="box"),
     "split-sum": Integrator("split_sum.wgsl", lambda lobe, n: albedo_table(lobe), rows=TABLE_ROWS, cube="prefiltered"),
-    "qmc": Integrator("qmc.wgsl", progressive=True, aimed="qmc_aimed.wgsl"),
-    "qmc-lobe": Integrator("qmc.wgsl", progressive=True),  # no sample aims at lamps
+    "qmc": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True, aimed="qmc_aimed.wgsl"),
+    "qmc-lobe": Integrator("qmc.wgsl", constants=SUN_SAMPLED, progressive=True),  # no sample aims at lamps
+    "oslf": Integrator(
+        "oslf.wgsl", constants=SUN_SAMPLED, progressive=True, spp=100
+    ),  # as qmc-lobe, by thesis R's numbers
+    "oslf-points": Integrator("oslf.wgsl", constants={"BY_POINTS": 1, **SUN_SAMPLED}, progressive=True, spp=100),
     "diffuse": Integrator("diffuse.wgsl", specular=False),
 }
 

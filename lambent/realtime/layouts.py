@@ -22,13 +22,16 @@ KINDS: dict[str, dict[str, Any]] = {
     "cube": {"texture": {"sample_type": "float", "view_dimension": "cube"}},
     "cubes": {"texture": {"sample_type": "float", "view_dimension": "cube-array"}},
     "exact": {"texture": {**_UNFILTERED, "view_dimension": "2d"}},  # loaded, never filtered
+    "numbers": {"texture": {"sample_type": "uint", "view_dimension": "2d"}},
     "depth layers": {"texture": {"sample_type": "depth", "view_dimension": "2d-array"}},
     "exact layers": {"texture": {**_UNFILTERED, "view_dimension": "2d-array"}},
 }
 
 
 LIGHT = "layers", "uniform", "exact"  # light maps; the sun, and the share of it that each pixel sees
-SHADOW_MAP = "uniform", "depth layers", "exact layers"  # the sun, depths towards it, and their blocks
+# The sun, depths towards it, and their blocks; depths of panes before it, and what each lets through.
+SHADOW_MAP = "uniform", "depth layers", "exact layers", "depth layers", "exact layers"
+PANE = "uniform", "depth layers", "depth layers"  # terms of clear glass, depths of what is solid, of the layer before
 
 
 class Layouts:

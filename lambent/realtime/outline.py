@@ -1,12 +1,10 @@
-"""The outline of one object as a picture of its own: at full size whatever the frames' size is, and without jitter.
+"""The outline of one object as a picture of its own.
 
 It is the border of what is seen of the object: where something stands before it, the line runs along that.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -14,54 +12,38 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lambent.realtime.clusters import Clusters
-from lambent.realtime.context import FrameContext
-from lambent.realtime.draws import draws_of
-from lambent.realtime.frame_state import FrameState, frame_data
+from lambent.realtime.frame_state import FrameState
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
+from lambent.realtime.overlay import Overlay
+from lambent.realtime.passes.depth import draw_seen, set_geometry
 from lambent.realtime.pipelines import pipeline, screen_pipeline
-from lambent.realtime.planar_integrators import OFF
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.shader_source import assemble
-from lambent.realtime.slices import Whole
-from lambent.realtime.structs import FRAME_DTYPE, Record
-from lambent.realtime.targets import DISPLAY_FORMAT, PassTimer, Targets, stored, target_texture
+from lambent.realtime.structs import Record
+from lambent.realtime.targets import DISPLAY_FORMAT, stored, target_texture
+from lambent.store.contract import ObjectRecord
 
 SEEN_FORMAT = "r8unorm"
 REACH_PX = 2  # of the line, on either side of the border; as shaders/outline.wgsl
 
 
-class Outline:
-    """Draws outlines of a scene's objects beside its renderer, also while that one has a frame under way."""
+class Outline(Overlay):
+    """Draws outlines of a scene's objects."""
 
     def __init__(self, layouts: Layouts, resources: SceneResources, clusters: Clusters) -> None:
-        self._layouts, self._resources, self._clusters = layouts, resources, clusters
-        self._depth = DepthPass(layouts)
-        device = self._device = layouts.device
-        self._targets, self._timer = Targets(device), PassTimer(device)
-        self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
-        self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
+        super().__init__(layouts, resources, clusters)
+        device = self._device
         module = device.create_shader_module(code=assemble("silhouette.wgsl"))
         self._silhouette = pipeline(
             device, module, "silhouette_main", [layouts.frame], [SEEN_FORMAT], compare="equal"
         )  # fmt: skip
         self._read = layouts.of("exact")
         self._line = screen_pipeline(device, "outline", [self._read], [DISPLAY_FORMAT])
-        self.records = {item.record.name: item.record for item in resources.objects}
 
-    def draw(self, state: FrameState, name: str) -> Any:
-        """View of an RGBA texture of the state's size: the line around the object `name`, clear elsewhere."""
-        state = replace(state, accumulate=None, jitter_px=(0.0, 0.0), planar=OFF)
-        record = self.records[name]
-        data = frame_data(state, self._resources.scene.record.bounds)
-        self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
-        draws = draws_of(state, self._resources) if self._resources.masked else []  # for their holes alone
-        encoder = self._device.create_command_encoder()
-        target = self._targets.fit(state.size, SEEN_FORMAT)
-        context = FrameContext(
-            Whole(encoder), state, data, self._frame_group, self._resources, self._clusters, self._targets,
-            self._timer, target, draws, [], Counter(),
-        )  # fmt: skip
+    def draw(self, state: FrameState, record: ObjectRecord) -> Any:
+        """View of an RGBA texture of the state's size: the line around an object, or its parts; clear elsewhere."""
+        context = self._begun(state, SEEN_FORMAT)
+        encoder, target, data = context.slicing.encoder, context.target, context.data
         seen = target.radiance.create_view()
         place = covered(record.bounds, data, state.size)
         render = context.begin("depth", [], "clear", depth="clear")

@@ -28,9 +28,10 @@ def pipeline(
     """Pipeline of a shader module into targets of `formats`.
 
     `entry` of the fragment stage may be empty where depth alone is drawn. `compare` is that of the depth test; without
-    it there is no depth.
+    it there is no depth. With a `blend`, the first target is blended and the others stay as they are.
     """
-    targets = [{"format": format, **({"blend": blend} if blend else {})} for format in formats]
+    first, others = ({"blend": blend}, {"write_mask": 0}) if blend else ({}, {})
+    targets = [{"format": format, **(others if i else first)} for i, format in enumerate(formats)]
     fragment = {"module": module, "entry_point": entry, "targets": targets, "constants": constants or {}}
     depth = {"format": DEPTH_FORMAT, "depth_write_enabled": writes_depth, "depth_compare": compare}
     buffers = [_VERTICES] if vertex == "vertex_main" else []

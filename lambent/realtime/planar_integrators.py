@@ -16,6 +16,7 @@ from lambent.realtime import patterns
 from lambent.realtime.integrators import Integrator
 
 TILE = 64  # pixels that sample a lobe in turns
+MOST_SHARED = 7  # samples per lobe that are chosen where the pixels of a tile share it
 TURN = 0.088  # of a pixel's samples against those of the one before it in turn
 # Factors on the filter, 1 where it covers the lobe, by experiment: the narrower the better where each sample finds its
 # own hit, and where 64 pixels share the lobe.
@@ -76,6 +77,7 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "qmc": {"qmc": Integrator("planar_qmc.wgsl")},
     "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
 }
+PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc-lobe"]
 PLANAR["lamps"] = PLANAR["rings"]  # the buffer has its lamps; what it does not hold comes from the whole probe
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))

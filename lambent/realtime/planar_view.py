@@ -1,8 +1,8 @@
 """The mirrored view of a planar reflector: the scene seen by the camera mirrored at its plane (thesis M, 4.5.1).
 
 Instead of moving the camera the world is mirrored, so that a point of the reflector and what it mirrors lie at the same
-place of the frame and of the planar reflection buffer. The buffer is larger than the frame by a margin, for what lobes
-see beyond its edges.
+place of the frame and of the planar reflection buffer. The buffer is a window of the frame's plane: the part of it that
+shows the reflector, and a margin around it for what lobes see beyond.
 
 Depth is reversed. In front of the reflector there is nothing to see: its plane is the near plane (Lengyel 2005, here
 for reversed, infinite depth). With w the depth of a point and h its height over the plane,
@@ -22,8 +22,8 @@ from lambent.realtime.structs import MIRRORED_VIEW_DTYPE, PLAN_DTYPE, Record
 from lambent.store.contract import ObjectRecord, PlanRecord, ReflectorRecord
 
 MARGIN_PX = 16  # least margin at each edge
-MOST_MARGIN = 0.1  # of the frame's longer side: what a wide lobe sees beyond is left to the probe
-STEP_PX = 64  # sizes are multiples of this: six MIP levels without remainder
+MOST_MARGIN = 0.1  # of the frame's longer side: what a wide lobe sees beyond the frame is left to the probe
+STEP_PX = 64  # windows are multiples of this in place and size: six MIP levels without remainder
 CLEARANCE = 1e-5  # over the reflector's highest vertex, of the largest coordinate: what lies below is not mirrored
 LEAST_SHARE = 2e-4  # of the frame: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
@@ -47,12 +47,12 @@ class PlanarView:
 
 def planar_views(
     frame: Record, reflectors: Sequence[ReflectorRecord], width: int, height: int, most: int,
-    widest: Mapping[str, float] | None = None,
+    widest: Mapping[str, float] | None = None, whole: bool = False,
 ) -> list[PlanarView]:  # fmt: skip
     """Views of the reflectors that a frame (of FRAME_DTYPE) sees, the largest first, at most `most`.
 
-    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. All buffers of a
-    frame have one size.
+    `widest` is the largest m of an object's lobes, by its name: wide lobes need a larger buffer. `whole`: buffers hold
+    the whole frame, for lobes that are sampled to their very ends.
     """
     seen = []
     for reflector in reflectors:
@@ -61,13 +61,16 @@ def planar_views(
         if above < 0 and reflector.two_sided:
             plane, above = -plane, -above
         in_front = above > 2 * clearance_m(reflector, frame["eye"][:3])
-        share = covered_share(frame, np.asarray(reflector.outline, float)) if in_front else 0.0
+        shown = on_screen(frame, np.asarray(reflector.outline, float)) if in_front else np.zeros((0, 2))
+        share = covered_share(shown)
         if share >= LEAST_SHARE:
-            seen.append((share, reflector, plane))
+            seen.append((share, reflector, plane, shown))
     seen.sort(key=lambda one: -one[0])
-    m = max((widest or {}).get(part.object, 0.0) for _, r, _ in seen[:most] for part in r.parts) if seen else 0.0
-    place = _padded(frame, (width, height), m)
-    views = (_view(frame, plane, r, (width, height), place, i) for i, (_, r, plane) in enumerate(seen[:most]))
+    views = []
+    for number, (_, reflector, plane, shown) in enumerate(seen[:most]):
+        m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
+        place = _window(frame, (width, height), m, None if whole else shown)
+        views.append(_view(frame, plane, reflector, (width, height), place, number))
     return [view for view in views if view is not None]
 
 
@@ -79,15 +82,20 @@ def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
     return CLEARANCE * max(float(np.abs(reflector.outline).max()), float(np.abs(eye).max()))
 
 
-def covered_share(frame: Record, outline: Floats) -> float:
-    """Share of the frame that a convex polygon (P, 3) covers, 0 where it is out of view."""
+def on_screen(frame: Record, outline: Floats) -> Floats:
+    """The part (Q, 2) of a convex polygon (P, 3) that a frame shows, in its clip coordinates; (0, 2) out of view."""
     clip_from_world = frame["clip_from_world"].T.astype(float)
     points = np.column_stack([outline, np.ones(len(outline))]) @ clip_from_world[[0, 1, 3]].T
     for sides in ((0, 0, 1), (1, 0, 1), (-1, 0, 1), (0, 1, 1), (0, -1, 1)):
         points = _clipped(points, points @ np.array(sides, float) - (1e-6 if sides == (0, 0, 1) else 0.0))
         if len(points) < 3:
-            return 0.0
-    x, y = (points[:, :2] / points[:, 2:]).T
+            return np.zeros((0, 2))
+    return np.asarray(points[:, :2] / points[:, 2:])
+
+
+def covered_share(shown: Floats) -> float:
+    """Share of the frame that a polygon (Q, 2) of `on_screen` covers."""
+    x, y = shown.T
     return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 8)  # of the 2 x 2 square
 
 
@@ -163,15 +171,23 @@ def _plan(record: PlanRecord | None, plane: Floats, eye: Floats) -> Record | Non
     return uniform
 
 
-def _padded(frame: Record, size: tuple[int, int], m: float) -> tuple[Floats, Floats]:
+def _window(frame: Record, size: tuple[int, int], m: float, shown: Floats | None) -> tuple[Floats, Floats]:
     """Size of the buffer of a frame of `size`, and where the frame's first pixel lies in it.
 
-    The margin holds the half-width 2 m of the widest lobe about the rays at the edges.
+    It holds the polygon `shown` (Q, 2), in clip coordinates, or the whole frame, and around either the half-width 2 m
+    of the widest lobe. A camera that moves moves it in steps, so that MIP levels do not swim.
     """
     focal_px = size[1] / 2 / float(np.linalg.norm(frame["up"][:3]))
-    margin = max(MARGIN_PX, int(min(MOST_MARGIN * max(size), 2 * m * focal_px)))
+    reach = max(MARGIN_PX, int(2 * m * focal_px))
+    margin = min(reach, max(MARGIN_PX, int(MOST_MARGIN * max(size))))
     wide = np.array([-(-(length + 2 * margin) // STEP_PX) * STEP_PX for length in size])
-    return wide, (wide - np.array(size)) // 2
+    offset = (wide - np.array(size)) // 2
+    if shown is None:
+        return wide, offset
+    places = (shown * [1, -1] + 1) / 2 * size + offset
+    low = np.clip((places.min(axis=0) - reach) // STEP_PX * STEP_PX, 0, wide).astype(int)
+    high = np.clip(-(-(places.max(axis=0) + reach) // STEP_PX) * STEP_PX, 0, wide).astype(int)
+    return high - low, offset - low
 
 
 def levels_of(size: tuple[int, int]) -> int:

@@ -10,16 +10,15 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
 from lambent.realtime.aim import aim_table, aimed_share, widest_lobe
-from lambent.realtime.baked import Probe
+from lambent.realtime.baked import DARK, Probe
 from lambent.realtime.cube_mips import SMOOTH_AREA, finite, mip_chain, smooth_chain
 from lambent.realtime.incident import LookUp, look_up_of
 from lambent.realtime.integrators import Cube
 from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.prefilter import prefiltered_cube
+from lambent.realtime.resident_maps import ResidentMaps
 from lambent.realtime.uploads import cube_texture
-
-DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
 
 
 def kind_of(cube: Cube) -> str:
@@ -50,7 +49,14 @@ class ProbeLight:
         self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
         self._texture = cache(self._new_texture)
         self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
-        self.resources = cache(lambda look_up: look_up.resources(layouts.device, self.probe))  # of a LookUp
+        self.streams: list[ResidentMaps] = []  # of the light field, where not all of its maps are on the GPU
+        self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
+
+    def resources(self, look_up: LookUp) -> tuple[Any, ...]:
+        """What the look-ups of one file read."""
+        if look_up.__file__ not in self._resources:
+            self._resources[look_up.__file__] = look_up.resources(self._layouts.device, self.probe, self.streams)
+        return self._resources[look_up.__file__]
 
     def view(self, cube: Cube) -> Any:
         """View of a cube map of the probe's radiance."""

@@ -25,6 +25,7 @@ from lambent.core.sequences import hammersley
 from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.clusters import Clusters
 from lambent.realtime.context import FrameContext, Pass
+from lambent.realtime.discs import Discs
 from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.integrators import integrator
@@ -32,6 +33,7 @@ from lambent.realtime.layouts import Layouts
 from lambent.realtime.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.base import BasePass
+from lambent.realtime.passes.cover import CoverPass
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.display import SmoothPass, TonemapPass
 from lambent.realtime.passes.light import LightPass
@@ -41,6 +43,7 @@ from lambent.realtime.planar_integrators import planar_integrator
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, planar_views
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.slices import Cut, Steps, Whole
+from lambent.realtime.streaming import Streaming
 from lambent.realtime.structs import FRAME_DTYPE, Record
 from lambent.realtime.targets import PassTimer, Targets, pixels
 from lambent.store.store import Store
@@ -54,6 +57,9 @@ class Renderer:
     Attributes
     ----------
     scene : BakedScene
+    waits : bool
+        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out. Else the
+        nearest ones stand in, and `streaming.version` grows when more are ready.
     missing : tuple of str
         What the store lacks, in plain words.
     """
@@ -69,12 +75,15 @@ class Renderer:
         self._clusters: Clusters = (
             beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
         )
+        self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
+        self.waits = True
         depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
         display = TonemapPass(layouts), SmoothPass(layouts)
         self._passes: tuple[Pass, ...] = (
-            depth, SunPass(layouts), planar, base, light, AccumulatePass(layouts), *display
+            depth, SunPass(layouts), planar, base, light, CoverPass(layouts, depth, light), AccumulatePass(layouts),
+            *display,
         )  # fmt: skip
         self._targets, self._timer = Targets(device), PassTimer(device)
         self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
@@ -133,6 +142,10 @@ class Renderer:
     def outline(self) -> Outline:
         """What draws outlines of the scene's objects."""
         return Outline(self._layouts, self.resources, self._clusters)
+
+    def discs(self) -> Discs:
+        """What draws discs at places in the scene."""
+        return Discs(self._layouts, self.resources, self._clusters)
 
     def redrawn(self, state: FrameState) -> frozenset[str] | None:
         """Materials whose objects alone a frame would draw with `FrameState.over`; None where it is drawn whole."""
@@ -218,6 +231,7 @@ class Renderer:
             "draw_calls": context.counts["draw_calls"],
             "mirrors": len(context.views),
             "triangles": len(self.scene.faces),
+            "light_fields": self.streaming.statistics,
             "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
         }
 
@@ -231,8 +245,10 @@ class Renderer:
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         views = self._planar_views(state, data)
         draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})
+        self.streaming.follow(draws, data, self._clusters, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
-        target = self._targets.fit(state.size, "rgba16float" if passing else "rgba32float")
+        halves = passing or self.resources.mixes_parts  # single precision cannot be blended everywhere
+        target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float")
         context = FrameContext(
             slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             draws, views, Counter(), shown=target_view,
@@ -252,7 +268,8 @@ class Renderer:
             o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
             for o in record.objects
         }
-        return planar_views(data, record.reflectors, state.width, state.height, MOST_REFLECTORS, widest)
+        whole = integrator(state.integrator).progressive
+        return planar_views(data, record.reflectors, state.width, state.height, MOST_REFLECTORS, widest, whole)
 
 
 def _subframes(state: FrameState, count: int) -> Iterator[FrameState]:

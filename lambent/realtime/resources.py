@@ -8,21 +8,23 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.realtime.baked import BakedScene, Probe
-from lambent.realtime.clusters import merged
+from lambent.realtime.baked import DARK, BakedScene, Probe
+from lambent.realtime.clusters import Ranges, merged
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.device import WEBGPU_LIMITS
 from lambent.realtime.incident import LookUp, look_ups
 from lambent.realtime.integrators import Cube
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.material_buffers import MaterialBuffers
+from lambent.realtime.parts import WITHIN, neighbouring_faces
 from lambent.realtime.pipelines import VERTEX_FLOATS
 from lambent.realtime.probe_light import ProbeLight, kind_of
 from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
+from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
 from lambent.realtime.uploads import cube_texture, upload, with_alpha
-from lambent.store.contract import ObjectRecord
+from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 
 def device_needs(scene: BakedScene) -> dict[str, int]:
@@ -34,10 +36,13 @@ def device_needs(scene: BakedScene) -> dict[str, int]:
 
 
 class ObjectResources:
-    """One object: its range of the index buffer, its light and its bind groups."""
+    """One object: its range of the index buffer, its light and its bind groups.
 
-    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float) -> None:
-        self.record, self.light, self._layouts, self._unit = record, light, layouts, unit
+    `beyond` has the ranges [begin, end) of faces of other parts that its light is added to.
+    """
+
+    def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges) -> None:
+        self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
         self.group = cache(self._new_group)
 
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
@@ -47,6 +52,7 @@ class ObjectResources:
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
         data["emission"][0, :3] = np.array(self.record.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
+        data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
         lamps = self.light.table(table, look_up) if table else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
@@ -67,16 +73,22 @@ class SceneResources:
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
         self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
-        environment = np.zeros((6, 1, 1, 3)) if scene.environment is None else finite(scene.environment)[0]
-        self._environment = cube_texture(device, [environment])
-        self.sky_group = layouts.group(layouts.cube, self._environment.create_view(dimension="cube"))
+        sky = scene.far_light or DARK
+        self.sky_group = self._sky_group(sky)
+        cleaned = without_sun(sky, scene.sun)
+        self.mirrored_sky_group = self.sky_group if cleaned is sky else self._sky_group(cleaned)
         lights: dict[Probe | None, ProbeLight] = {}
+        beyond = neighbouring_faces(scene)
         self.objects, known = [], look_ups()
         for record in scene.record.objects:
             probe = scene.probe_of(record)
             if probe not in lights:
-                lights[probe] = ProbeLight(layouts, probe, self.sampler, known)
-            self.objects.append(ObjectResources(layouts, record, lights[probe], scene.unit))
+                lights[probe] = ProbeLight(
+                    layouts, probe and without_sun(probe, scene.sun, scene.unit), self.sampler, known
+                )
+            self.objects.append(
+                ObjectResources(layouts, record, lights[probe], scene.unit, beyond.get(record.name, []))
+            )
         textures = TextureCache(device)
         self.materials = {
             name: MaterialBuffers(layouts, textures.sampler, textures.of_material(scene.textures.get(name)))
@@ -86,7 +98,12 @@ class SceneResources:
         self.masked = {record.name for record in records if self.materials[record.material].textures.masked}
         whole = (r for r in records if r.name not in self.masked)
         self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
+        self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
+
+    def _sky_group(self, sky: Probe) -> Any:
+        cube = cube_texture(self._layouts.device, [finite(sky.radiance)[0]])
+        return self._layouts.group(self._layouts.cube, cube.create_view(dimension="cube"))
 
     @cached_property
     def noise_group(self) -> Any:

@@ -23,6 +23,7 @@ from lambent.core.projections import Projection, View
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
 ANYWHERE = Camera("anywhere", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+MOST_EV = 64  # of an exposure, either way: 2^64 times is still a number
 VIEWS = ("filmic", "neutral", "linear", FALSE_COLOUR)
 
 
@@ -37,8 +38,8 @@ class Settings:
     integrator : str
         One of `realtime.integrators.INTEGRATORS`, or "path" for the path tracer.
     samples : int, optional
-        Per pixel where the integrator converges ("path": 64 by default, "qmc": 256), otherwise per lobe (by default
-        chosen from each material's roughness).
+        Per pixel where the integrator converges ("path": 64 by default, "qmc": 256, "oslf": 100), otherwise per lobe
+        (by default chosen from each material's roughness).
     exposure_ev : float, optional
         Stops, -64 to 64, for displayed images; by default the scene's, or, where it has none, what the first image asks
         for (`core.exposure.metered`), kept for the rest.
@@ -53,8 +54,12 @@ class Settings:
         standard error in percent, always in false colours.
     planar : str
         How planar reflectors are drawn: auto, off (from their probes), or a method that the integrator knows.
+    lookup : str
+        Where reflected rays find their light: auto, or a look-up of `realtime.incident`.
     projection : Projection
         Perspective, or what is drawn from the faces of a cube around the eye.
+    light_field_mb : float, optional
+        Memory on the GPU for the maps of light fields; by default all of them.
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     """
@@ -69,8 +74,10 @@ class Settings:
     log: bool = True
     show: str = "full"
     planar: str = "auto"
+    lookup: str = "auto"
     projection: Projection = Projection.perspective
     field_deg: float | None = None
+    light_field_mb: float | None = None
 
     @property
     def is_false_coloured(self) -> bool:
@@ -86,8 +93,8 @@ class Settings:
         known("view transform", self.view, VIEWS, field="--view")
         if self.scale is not None:
             self.scale.check()
-        if self.exposure_ev is not None and not -64 <= self.exposure_ev <= 64:  # also refuses nan
-            got, expected = self.exposure_ev, "-64 to 64 EV"
+        if self.exposure_ev is not None and not -MOST_EV <= self.exposure_ev <= MOST_EV:  # also refuses nan
+            got, expected = self.exposure_ev, f"-{MOST_EV} to {MOST_EV} EV"
             raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
         if self.projection is not Projection.perspective:
             self.view_of(ANYWHERE).check()
@@ -103,6 +110,11 @@ class Images(ABC):
     def __init__(self, settings: Settings) -> None:
         self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed
         self.exposure_ev = settings.exposure_ev  # None until an image was displayed
+
+    @property
+    def light_fields(self) -> dict[str, float]:
+        """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
+        return {}
 
     @abstractmethod
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

@@ -35,7 +35,7 @@ class Rendered:
     """The written file, its size in pixels, its frames, the time that it took, and the exposure it is displayed with.
 
     `exposure_ev` in stops on radiance and `ev100` are None of files of radiance, and of false colours; of these `scale`
-    says what they mean: low, high, log, unit.
+    says what they mean: low, high, log, unit. `light_fields` is of those that do not fit `Settings.light_field_mb`.
     """
 
     file: Path
@@ -47,6 +47,7 @@ class Rendered:
     exposure_ev: float | None = None
     ev100: float | None = None
     scale: dict[str, float | bool | str] | None = None
+    light_fields: dict[str, float] | None = None
 
 
 def ignore(text: str) -> None:
@@ -96,13 +97,16 @@ def still(
 
 
 def displayed_as(file: Path, drawn: Images) -> dict[str, Any]:
-    """How what is in a file is displayed: the last fields of `Rendered`."""
+    """How what is in a file is displayed, and how it was drawn: the last fields of `Rendered`."""
+    streamed = {"light_fields": drawn.light_fields} if drawn.light_fields else {}
     if file.suffix.lower() not in (".png", FILM):
-        return {}
+        return streamed
     if drawn.settings.is_false_coloured:
-        return {"scale": None if drawn.scale is None else {**asdict(drawn.scale), "unit": drawn.quantity.unit}}
+        return streamed | {
+            "scale": None if drawn.scale is None else {**asdict(drawn.scale), "unit": drawn.quantity.unit}
+        }
     exposure_ev = drawn.exposure_ev
-    return {} if exposure_ev is None else {"exposure_ev": exposure_ev, "ev100": ev100_of(exposure_ev)}
+    return streamed if exposure_ev is None else streamed | {"exposure_ev": exposure_ev, "ev100": ev100_of(exposure_ev)}
 
 
 def write_still(drawn: Images, file: Path, view: Camera, progress: Progress = silent) -> None:

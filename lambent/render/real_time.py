@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
+from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
+from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
+from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
@@ -22,7 +25,6 @@ from lambent.render.images import NOISE, Images, Settings
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
-QMC_SPP = 256
 METERED_PX = 256  # the longer side of what sets an exposure
 FILM_SUPERSAMPLES = 4  # of the radiance in an image sequence
 
@@ -30,8 +32,8 @@ FILM_SUPERSAMPLES = 4  # of the radiance in an image sequence
 class RealTime(Images):
     """Images by an integrator of `realtime.integrators`.
 
-    Displayed images of a film (`moving`) are single frames, as the window shows them in motion; a still is the mean of
-    many frames that look at other places of each pixel.
+    Displayed images of a film (`moving`) are single frames, as the window shows them in motion, thin things whole;
+    a still is the mean of many frames that look at other places of each pixel.
     """
 
     def __init__(self, store: Store, settings: Settings, moving: bool, note: Callable[[str], None]) -> None:
@@ -46,15 +48,22 @@ class RealTime(Images):
             FrameState, width=settings.width, height=settings.height, integrator=settings.integrator,
             n=None if self._progressive else settings.samples,
             view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
-            planar=settings.planar,
+            planar=settings.planar, covers=moving,
+            lookup=known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup"),
         )  # fmt: skip
-        self._renderer = Renderer(open_device(), store)
+        self._renderer = Renderer(open_device(), read_baked(store, settings.light_field_mb))
         for text in self._renderer.missing:
             note(text)
 
+    @property
+    def light_fields(self) -> dict[str, float]:
+        return self._renderer.streaming.statistics
+
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         if self._progressive:
-            return self._renderer.converged(self._frame(camera), self.settings.samples or QMC_SPP, progress)
+            return self._renderer.converged(
+                self._frame(camera), self.settings.samples or integrator(self.settings.integrator).spp, progress
+            )
         return self._renderer.still_radiance(self._frame(camera), FILM_SUPERSAMPLES if self._moving else SUPERSAMPLES)
 
     def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from lambent.core.errors import UserError
 from lambent.core.images import read_image
 from lambent.core.latlong import lat_long_uv
 from lambent.core.surroundings import Axis, Layout
-from lambent.scenes.interiors import lat_long_image
+from lambent.scenes.computed import lat_long_image
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, Environment, ImageEnvironment
 
 _UPRIGHT = np.eye(3)

@@ -93,7 +93,11 @@ def read_ies(path: Path) -> Photometry:
     UserError
         Where the file is none, is damaged, is of type A or B, or has its tilt in another file.
     """
-    content = read_bytes(path, IES_BYTES)
+    return parse_ies(read_bytes(path, IES_BYTES), path)
+
+
+def parse_ies(content: bytes, path: Path) -> Photometry:
+    """As `read_ies`, of what a file at `path` holds."""
     with foreign_bytes(NAME, path):
         return _Reading(content.decode("latin-1"), path).photometry()
 

@@ -1,4 +1,4 @@
-"""Interiors made by code, as lat-long images of linear radiance: windows, lamps and walls of rooms seen from one point.
+"""Interiors made by code: radiance from windows, lamps and walls of rooms seen from one point.
 
 They light scenes that work without any file. A ray from the point meets one wall of a box; windows are parts of walls.
 Window panes and lamps are small and bright, as in captured environments: they show as highlights and cast shadows.
@@ -7,26 +7,14 @@ Window panes and lamps are small and bright, as in captured environments: they s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
-from lambent.core.latlong import lat_long_directions
 
-HEIGHT, SAMPLES = 384, 2  # rows of an image; samples per texel and axis
 Mask = NDArray[np.bool_]
-
-
-@cache
-def lat_long_image(name: str) -> NDArray[np.float32]:
-    """(HEIGHT, 2 HEIGHT, 3) radiance in W/(sr m^2) of an interior in `INTERIORS`, oriented as `core.latlong`."""
-    height, width = HEIGHT * SAMPLES, 2 * HEIGHT * SAMPLES
-    fine = INTERIORS[name](lat_long_directions(height, width))
-    return np.asarray(fine.reshape(HEIGHT, SAMPLES, 2 * HEIGHT, SAMPLES, 3).mean(axis=(1, 3)), np.float32)
-
 
 _WINDOWS = (-5.2, -1.6, 2.0)  # z of those in the gallery
 

@@ -8,7 +8,7 @@ All dataclasses are frozen; arrays are not to be written to.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +22,7 @@ from lambent.materials.document import Material
 from lambent.scenes.ies import Photometry
 
 Array = NDArray[np.floating]
+Border = tuple[float, float, float, float]
 UvTransform = tuple[Triple, Triple]
 IDENTITY: UvTransform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 EYE_HEIGHT_M = 1.6  # of a standing person
@@ -50,7 +51,11 @@ class Mesh:
     @property
     def corners(self) -> Array:
         """(T, 3, 3) float64 positions of the triangles' corners."""
-        return np.asarray(self.positions[self.faces], float)
+        return self.corners_of(slice(None))
+
+    def corners_of(self, faces: NDArray[np.integer] | slice) -> Array:
+        """(K, 3, 3) float64 positions of the corners of some triangles."""
+        return np.asarray(self.positions[self.faces[faces]], float)
 
 
 @dataclass(frozen=True)
@@ -140,7 +145,7 @@ class ConstantEnvironment:
 
 @dataclass(frozen=True)
 class ComputedEnvironment:
-    """An interior made by code, by its name in `scenes.interiors`."""
+    """Surroundings made by code, by their name in `scenes.computed`."""
 
     name: str
 
@@ -212,6 +217,20 @@ class ReflectorRule:
 
 
 @dataclass(frozen=True)
+class LightFieldWish:
+    """What is asked of an object's offset surface light field (`core.light_field`); None leaves it to the bake.
+
+    `points` at most, each with a map of `texels` a side, at `offset_m` off the surface. With an `error`, the mean
+    difference in log(1 + L/median) to what viewers see mirrored, only as many points as it takes to come down to it.
+    """
+
+    points: int | None = None
+    texels: int | None = None
+    offset_m: float | None = None
+    error: float | None = None
+
+
+@dataclass(frozen=True)
 class Scene:
     """Everything a bake needs. `sources` are the files it was read from: a bake hashes them to notice a change."""
 
@@ -228,8 +247,10 @@ class Scene:
     textures: Mapping[str, MaterialTextures] = field(default_factory=dict)  # by the material's name
     probe_planes: Mapping[str, Array] = field(default_factory=dict)  # object -> (P, 4) planes, set by the user
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # object -> centre of its probe, set by the user
+    light_fields: Mapping[str, LightFieldWish] = field(default_factory=dict)  # by the object that is to have one
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
+    borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as store.contract has them
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes
     crease_deg: float | None = None  # of the hard edges that its normals were made anew for
     origin: str | None = None  # "builtin:NAME" or the absolute path that it was loaded from; None if made in memory
@@ -242,6 +263,10 @@ class Scene:
     def corners(self) -> Array:
         """(F, 3, 3) float64 world positions of the corners of all triangles, object after object."""
         return np.concatenate([o.mesh.corners for o in self.objects])
+
+    def merged(self, same: Mapping[str, str]) -> Scene:
+        """With objects of each material named in `same` made of the other one."""
+        return replace(self, objects=tuple(replace(o, material=same.get(o.material, o.material)) for o in self.objects))
 
     def object(self, name: str) -> SceneObject:
         return next(o for o in self.objects if o.name == name)

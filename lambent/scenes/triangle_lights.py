@@ -7,15 +7,15 @@ piece of the light is; point samples of the same number show as dots (Ben-Artzi 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from lambent.core.arrays import Floats, Indices
 from lambent.core.directions import normalize
-from lambent.core.errors import UserError
-from lambent.scenes.scene import IesLight, Light, PointLight
+from lambent.core.plain import Triple
+from lambent.scenes.scene import DirectionalLight, IesLight, Light, PointLight
 
 SMALLEST_SR, POWER = 0.01, 0.25  # of the importance L omega^POWER (Agarwal et al. 2003, eq. 5 with a = 1)
 FEWEST_SAMPLES = 12  # of the environment within a triangle; less are not split
@@ -40,6 +40,8 @@ class TriangleLights:
     cones : (M, 5)
         Of near points: unit axis and half-angles, radians, within which they shine fully, and beyond which not at all.
         Empty where all shine everywhere.
+    luminaires : mapping of int to IesLight
+        Near points, by number, that shine as their photometry says; `light` is what its candela are multiplied by.
     """
 
     corners: Floats
@@ -47,6 +49,7 @@ class TriangleLights:
     light: Floats
     near: np.ndarray
     cones: Floats = field(default_factory=lambda: np.zeros((0, 5)))
+    luminaires: Mapping[int, IesLight] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.light)
@@ -64,27 +67,35 @@ def joined(parts: Sequence[TriangleLights]) -> TriangleLights:
         np.concatenate([getattr(p, name) for p in parts]) for name in ("corners", "centres", "light", "near")
     )
     with_cones = any(len(p.cones) for p in parts)
-    return TriangleLights(corners, centres, light, near, np.concatenate(cones) if with_cones else np.zeros((0, 5)))
+    first = np.cumsum([0, *map(len, parts)]).tolist()
+    luminaires = {m + k: one for k, p in zip(first, parts, strict=False) for m, one in p.luminaires.items()}
+    return TriangleLights(
+        corners, centres, light, near, np.concatenate(cones) if with_cones else np.zeros((0, 5)), luminaires
+    )
 
 
 def small_lights(lights: Sequence[Light]) -> TriangleLights:
-    """Point and directional lights as triangles whose corners coincide; `UserError` of luminaires."""
+    """Point and directional lights, and luminaires, as triangles whose corners coincide."""
     places, values, near, cones = [], [], [], []
     for light in lights:
-        if isinstance(light, IesLight):
-            raise UserError("views lit by an IES luminaire cannot be edited", field="lights", hint="leave it out")
-        here = isinstance(light, PointLight)
+        near.append(not isinstance(light, DirectionalLight))
         places.append(
-            light.position if isinstance(light, PointLight) else -normalize(np.asarray(light.direction, float))
+            -normalize(np.asarray(light.direction, float)) if isinstance(light, DirectionalLight) else light.position
         )
-        values.append(light.intensity if isinstance(light, PointLight) else light.irradiance)
-        near.append(here)
+        values.append(_value(light))
         cones.append(_cone(light) if isinstance(light, PointLight) else EVERYWHERE)
+    luminaires = {m: light for m, light in enumerate(lights) if isinstance(light, IesLight)}
     centres = np.array(places, float).reshape(-1, 3)
     corners = np.repeat(centres[:, None], 3, axis=1)
     return TriangleLights(
-        corners, centres, np.array(values, float).reshape(-1, 3), np.array(near, bool), np.array(cones)
+        corners, centres, np.array(values, float).reshape(-1, 3), np.array(near, bool), np.array(cones), luminaires
     )
+
+
+def _value(light: Light) -> Triple:
+    if isinstance(light, DirectionalLight):
+        return light.irradiance
+    return light.intensity if isinstance(light, PointLight) else light.scale
 
 
 def _cone(light: PointLight) -> tuple[float, ...]:

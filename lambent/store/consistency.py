@@ -28,6 +28,9 @@ _ARRAYS: tuple[tuple[str, tuple[int | None, ...], str], ...] = (  # name, shape,
     ("light_map/noise", (ANY, ANY), "f"), ("light_map/noise_back", (ANY, ANY), "f"),
     ("light_map/lean", (ANY, ANY, 3), "f"), ("environment/radiance", (*CUBE, 3), "f"),
     ("probe/*/radiance", (*CUBE, 3), "f"), ("probe/*/distance", CUBE, "f"), ("probe/*/planes", (ANY, 4), "f"),
+    ("light_field/*/points", (ANY, 3), "f"), ("light_field/*/normals", (ANY, 3), "f"),
+    ("light_field/*/radiance", (ANY, ANY, ANY, 3), "f"), ("light_field/*/inverse_distance", (ANY, ANY, ANY), "f"),
+    ("light_field/*/blocks", (ANY, ANY, ANY, 4), "u"), ("light_field/*/sample_map", (ANY, ANY, 4), "u"),
     ("texture/*", (ANY, ANY, ANY), "f"),
 )  # fmt: skip
 _PER_VERTEX = ("positions", "normals", "tangents", "uv", "uv2")
@@ -49,7 +52,7 @@ def check_record(store: Store, record: SceneRecord) -> None:
         if not is_usable(camera):
             raise _broken(store, field, "a camera is not within 1e9 m, or sees no angle")
     numbers = [record.exposure_ev or 0.0, *_flat(record.bounds)]
-    numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds))]
+    numbers += [x for o in record.objects for x in (*o.emission, *_flat(o.bounds), *_flat(o.borders))]
     numbers += [path.seconds for path in record.paths] + [s for path in record.paths for s in path.times_s or ()]
     numbers += [x for r in record.reflectors for x in (*r.plane, *_flat(r.outline), *(p.area_m2 for p in r.parts))]
     numbers += [x for t in record.textures.values() for x in (t.cutoff, *_flat(_flat(t.parts.values())))]

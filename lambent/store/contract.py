@@ -22,6 +22,13 @@
                                            An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
+    light_field/OBJECT/points, normals     (P, 3) float32, see core.light_field
+    light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
+                                           without the disc of meta["sun"] of light_map/irradiance
+    light_field/OBJECT/blocks              in its place, (P, B, B, 4) uint32, blocks of BC6H: core.light_field_blocks
+    light_field/OBJECT/inverse_distance    (P, E, E) float16, 1/m, 0 where nothing is hit
+    light_field/OBJECT/sample_map          (h, w, 4) uint16; written last. meta["corner"] and meta["grid"] place it on
+                                           the light map's uv2, meta["offset_m"] is how far off the surface points are
     texture/MATERIAL/PART                  (H, W, C) float16, PART a field of scenes.scene.MaterialTextures;
                                            row 0 is the top; the record has its transform of uv
     view/KEY/KIND/PART                     what depends on one camera, for instance transport vectors per pixel. KEY is
@@ -97,6 +104,7 @@ objects. Times are the documents "timings" and "last_run". Every array is absent
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -105,8 +113,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.colour import MOST_UNIT
 from lambent.core.errors import UserError, invalid
-from lambent.core.plain import Triple
+from lambent.core.plain import Triple, triple
 from lambent.materials.document import Material
+from lambent.scenes.scene import Border
 from lambent.store.consistency import check_record, numbers_of
 from lambent.store.store import MANIFEST, Store
 
@@ -116,6 +125,9 @@ CUTS = "cuts"  # document: the objects whose triangles the bake has cut, and for
 TIMINGS = "timings"  # of every step, in seconds
 LAST_RUN = "last_run"  # those of the last bake alone, and "other"
 SHARED_PROBES = "shared_probes"  # document: its key, and "owners", by object that shows the probe of another
+LIGHT_FIELD_CHOICE = (
+    "light_field_choice"  # document: light fields that the bake chose, and the key of what they follow from
+)
 TRANSPORT_BASIS = "hats"  # what transport is by: earlier stores, which do not say, have steps
 SIDES = ("irradiance", "irradiance_back")  # of the light map
 DOMINANT_DIRECTION = "light_map/lean"  # the name that stores have had from the first
@@ -126,8 +138,15 @@ class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+MOST_BORDERS = 2  # of a part with others of its object
+
+
 class ObjectRecord(_Record):
-    """One object: its faces are geometry/faces[first_face : first_face + face_count]."""
+    """One object: its faces are geometry/faces[first_face : first_face + face_count].
+
+    A part has at x the share of its whole's light that is the product of smoothstep(0, 1, 1/2 + n.x + d) over its
+    borders (n, d), n in 1/m. The shares of all parts add up to 1.
+    """
 
     name: str
     material: str
@@ -136,14 +155,43 @@ class ObjectRecord(_Record):
     emission: Triple = (0.0, 0.0, 0.0)
     bounds: tuple[Triple, Triple]
     probe: bool = False  # wants probe/NAME/*, its own or a shared one
+    part_of: str = ""  # the object that the bake has cut it from, for probes
+    borders: tuple[Border, ...] = Field(default=(), max_length=MOST_BORDERS)  # of such a part, with the others
+
+    def with_part(self, other: ObjectRecord) -> ObjectRecord:
+        """The object that this part and the next one are of."""
+        low, high = np.minimum(self.bounds[0], other.bounds[0]), np.maximum(self.bounds[1], other.bounds[1])
+        changes = {
+            "face_count": self.face_count + other.face_count,
+            "bounds": (triple(low), triple(high)),
+            "borders": (),
+        }
+        return self.model_copy(update={**changes, "name": self.part_of})
+
+
+def whole_objects(objects: Iterable[ObjectRecord]) -> tuple[ObjectRecord, ...]:
+    """Objects as the scene has them: parts that follow one another in geometry are one."""
+    found: list[ObjectRecord] = []
+    for one in objects:
+        before = found[-1] if found else None
+        follows = before is not None and before.first_face + before.face_count == one.first_face
+        if before is not None and follows and one.part_of and one.part_of == before.part_of:
+            found[-1] = before.with_part(one)
+        else:
+            found.append(one)
+    return tuple(found)
 
 
 class SunRecord(_Record):
-    """A disc in the sky: unit direction towards it, W/m^2 on a surface that faces it, angular radius."""
+    """A disc in the sky: unit direction towards it, W/m^2 on a surface that faces it, angular radius.
+
+    Its direct light passes the clear glass of the materials `panes` (materials.clear); all others block it.
+    """
 
     direction: Triple
     irradiance: Triple
     radius_rad: float = Field(ge=0, le=0.2)
+    panes: tuple[str, ...] = Field(default=(), exclude_if=lambda panes: not panes)
 
 
 class TexturesRecord(_Record):
@@ -256,6 +304,11 @@ def forget_lights(store: Store, camera: Camera, width: int, height: int, lights:
 def probe_name(object_name: str, part: str) -> str:
     """Name of a probe's array; `part` is radiance, distance or planes."""
     return f"probe/{object_name}/{part}"
+
+
+def light_field_name(object_name: str, part: str) -> str:
+    """Name of an array of an object's light field; `part` is a field of `core.light_field.LightField`, or blocks."""
+    return f"light_field/{object_name}/{part}"
 
 
 def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:

@@ -18,6 +18,7 @@ def run(
     camera: str | None = None,
     picture: tuple[int, int] | None = None,
     store: Path | None = None,
+    crease_deg: float | None = None,
     **window: Any,
 ) -> None:
     """Show the editor of a material, or of the materials of a scene; returns when its window is closed.
@@ -32,14 +33,15 @@ def run(
     environments : sequence of Path
         Lat-long pictures to light the preview with; the .hdr files beside `path` are offered too. In place, at most
         one, which lights the scene instead of its own environment.
-    camera, picture, store : str, (width, height), Path, optional
-        In place: the name of the camera, the size of the picture in pixels, and the folder that keeps the transport.
+    camera, picture, store, crease_deg : str, (width, height), Path, float, optional
+        In place: the name of the camera, the size of the picture in pixels, the folder that keeps the transport, and
+        above how many degrees edges are hard where normals lean.
     **window
         `size`, `frames`, `folder` as in `app.run`, which raises what this raises.
     """
     mode = editing_mode(path)
     if mode == "material":
-        _refuse(path, camera=camera, picture=picture, output=store)
+        _refuse(path, camera=camera, picture=picture, output=store, crease_angle=crease_deg)
         app.run(path, mode, material=material, environments=environments, **window)
         return
     if material is not None:
@@ -49,13 +51,16 @@ def run(
     if len(environments) > 1:
         raise UserError("a scene has one environment", field="--environment", got=f"{len(environments)} files")
     light = environments[0] if environments else None
-    app.run(path, mode, camera=camera, picture=picture, store=store, environment=light, **window)
+    app.run(
+        path, mode, camera=camera, picture=picture, store=store, environment=light, crease_deg=crease_deg, **window
+    )  # fmt: skip
 
 
 def _refuse(path: Path, **options: object) -> None:
     for name, value in options.items():
         if value is not None:
-            raise UserError("is for scenes and stores", file=path, field=f"--{name}", hint="leave it out")
+            option = f"--{name.replace('_', '-')}"
+            raise UserError("is for scenes and stores", file=path, field=option, hint="leave it out")
 
 
 def editing_mode(path: Path) -> str:

@@ -118,15 +118,27 @@ def _column(mode: Mode) -> None:
         imgui.push_item_width(-LABEL_PX)
     for panel in mode.panels:
         opened = imgui.collapsing_header(panel.title, imgui.TreeNodeFlags_.default_open if panel.opened else 0)
+        was_opened, top_y = imgui.is_item_toggled_open(), imgui.get_item_rect_min().y
         explain(panel.meaning)
         if opened:
             imgui.push_id(panel.title)
             panel.draw()
             imgui.pop_id()
+        if was_opened:
+            _scroll_to(top_y, imgui.get_cursor_screen_pos().y)
     if mode.head is not None:
         imgui.pop_item_width()
         imgui.end_child()
     imgui.pop_item_width()
+
+
+def _scroll_to(top_y: float, bottom_y: float) -> None:
+    """Bring a panel that was opened into sight: its end, or, if it is too long, its beginning."""
+    window_y, height = imgui.get_window_pos().y, imgui.get_window_height()
+    if bottom_y - top_y > height:
+        imgui.set_scroll_from_pos_y(top_y - window_y, 0.0)
+    elif bottom_y > window_y + height:
+        imgui.set_scroll_from_pos_y(bottom_y - window_y, 1.0)
 
 
 def _pictures(drawing: Drawing, place: Rect, textures: Textures) -> bool:

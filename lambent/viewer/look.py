@@ -34,6 +34,7 @@ class Look:
     show: str = SHOWS[0]
     shows: tuple[str, ...] = SHOWS  # to choose from
     lookup: str = LOOKUPS[0]
+    lookups: dict[str, str] = field(default_factory=dict)  # by object, in place of `lookup`
     planar: str = "auto"
     n: int | None = None  # samples per lobe; None: chosen per material from its roughness
     near_m: float | None = None  # nearer things are cut away; None: by the scene's size
@@ -76,4 +77,11 @@ class Look:
         settings = {name: getattr(self, name) for name in OF_FRAMES}
         scale = self.shown_scale if self.is_false_coloured else Range()
         # Another name of the camera is no other picture.
-        return FrameState(replace(camera, name=""), *size, materials=dict(materials), scale=scale, **settings)
+        return FrameState(
+            replace(camera, name=""),
+            *size,
+            materials=dict(materials),
+            scale=scale,
+            lookups=dict(self.lookups),
+            **settings,
+        )

@@ -53,6 +53,8 @@ class Picture:
         self._renderer, self._screen, self._device = renderer, screen, renderer.device
         adapter = adapter_info(renderer.device)
         self._adapter = adapter.name
+        if screen.pace.covers is None:
+            screen.pace.covers = not adapter.is_software
         self._rest_n = SOFTWARE_N if adapter.is_software else QMC_N
         self.pacer = Pacer(accumulate_to=REST_FRAMES, slow_adapter=adapter.is_software)
         self._refine = True
@@ -185,7 +187,8 @@ class Picture:
         if not plan.mirrors:
             frame = replace(frame, planar=OFF)
         width, height = (max(1, round(plan.scale * size)) for size in (frame.width, frame.height))
-        return replace(frame, width=width, height=height, over=plan.over)
+        covers = bool(self._screen.pace.covers)
+        return replace(frame, width=width, height=height, over=plan.over, covers=covers)
 
     def _view_of(self, width: int, height: int) -> Any:
         """A target for the next frame: never the view that is shown, which a frame in parts must leave alone."""
@@ -222,7 +225,7 @@ class Picture:
             self._adapter, drawn["integrator"], frame_ms=seconds * 1e3, gpu_ms=drawn["gpu_ms"],
             draw_calls=drawn["draw_calls"], resolution=(drawn["width"], drawn["height"]),
             samples=drawn["samples_per_pixel"], accumulated=self.samples, accumulate_to=REST_FRAMES * self._rest_n,
-            scale=plan.scale, mirrors=drawn["mirrors"] if plan.mirrors else None,
+            scale=plan.scale, light_fields=drawn["light_fields"], mirrors=drawn["mirrors"] if plan.mirrors else None,
         )  # fmt: skip
 
 

@@ -50,6 +50,7 @@ class Statistics:
     accumulated: int = 0  # per pixel, since the camera rests
     accumulate_to: int = 0
     scale: float = 1.0  # of the picture's width and height, by the pacing
+    light_fields: Mapping[str, float] = field(default_factory=dict)  # `Streaming.statistics`
     mirrors: int | None = 0  # planar reflectors with a mirrored view; None: left out, by the pacing
 
 
@@ -60,6 +61,7 @@ class Pace:
     refine: bool = True  # accumulate samples while nothing moves
     adaptive: bool = True  # draw fewer pixels while something moves, where the adapter is slow
     target_ms: float = 1e3 * BUDGET_S  # of a frame in motion
+    covers: bool | None = None  # means over places of each pixel in motion; None: as the adapter is fast enough
     touched_s: float = -math.inf  # when the last event came
     answering: bool = False  # an event was just seen: the interface answers before the picture is refined further
 

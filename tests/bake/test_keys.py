@@ -30,6 +30,7 @@ from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,
     ImageEnvironment,
+    LightFieldWish,
     MaterialTextures,
     Mesh,
     PointLight,
@@ -45,7 +46,8 @@ from tests.bake.small_scenes import GREY, MIRROR, TINY
 
 NOTHING: tuple[str, ...] = ()
 PROBES = ("probe/",)
-BAKED = ("light_map/", *PROBES)
+FIELDS = ("light_field/",)
+BAKED = ("light_map/", *PROBES, *FIELDS)
 OF_BALL = ("probe/ball/",)
 CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
@@ -136,6 +138,12 @@ POINT: Answers = {
     "outer_deg": (40.0, LIGHTS),
 }
 DIRECTIONAL: Answers = {"direction": ((0.0, -0.6, 0.8), LIGHTS), "irradiance": ((1.0, 1.0, 0.5), LIGHTS)}
+WISH: Answers = {
+    "points": (9, FIELDS),
+    "texels": (12, FIELDS),
+    "offset_m": (0.02, FIELDS),
+    "error": (0.1, FIELDS),
+}
 SCENE: Answers = {
     "name": ("renamed", NOTHING),
     "objects": (lambda objects: objects[::-1], SURFACES),
@@ -149,8 +157,10 @@ SCENE: Answers = {
     "warnings": (("a face is missing",), NOTHING),
     "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes",)),
     "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
+    "light_fields": ({"ball": LightFieldWish(), "other ball": LightFieldWish()}, FIELDS),
     "reflector_rules": ((ReflectorRule("floor", use=False),), NOTHING),
     "parts": ({"ball": "balls"}, NOTHING),  # given by the names of the objects, which are in the key
+    "borders": ({"ball": ((1.0, 0.0, 0.0, 0.0),)}, NOTHING),  # given by the faces of the parts, likewise
     "origin": ("builtin:room", NOTHING),
     "measured": (lambda files: {"grey": files["grey"].with_name("dusk.exr")}, LIT),
     "materials": (lambda materials: {**materials, "grey": Material(kd=0.4)}, LIT),
@@ -188,6 +198,10 @@ CASES: list[tuple[type, Answers, Callable[[Scene], Any], Callable[[Scene, Any], 
         DirectionalLight, DIRECTIONAL, lambda scene: scene.lights[1],
         lambda scene, new: replace(scene, lights=(scene.lights[0], new)),
     ),
+    (
+        LightFieldWish, WISH, lambda scene: scene.light_fields["ball"],
+        lambda scene, new: replace(scene, light_fields={"ball": new}),
+    ),
 ]  # fmt: skip
 SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     "geometry": {"texels": (64, ("geometry/", *BAKED))},
@@ -218,6 +232,14 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
     },
     "interreflection": {},
     "probe": {"texels": (32, PROBES), "samples": (17, PROBES), "noise": (0.2, PROBES)},
+    "light_field": {
+        "points": (15, NOTHING),  # the scene says how many
+        "texels": (12, FIELDS),
+        "strata": (3, FIELDS),
+        "onward": (3, FIELDS),
+        "levels": (1, FIELDS),
+        "blocks": (False, FIELDS),
+    },
 }
 
 
@@ -261,6 +283,7 @@ def scene(tmp_path: Path) -> Scene:
         textures={"worn": MaterialTextures(**textures)},
         probe_planes={"ball": np.array([[0.0, 1.0, 0.0, 0.0]])},
         probe_centres={"ball": (0.0, 1.0, 0.0)},
+        light_fields={"ball": LightFieldWish(points=8)},
         measured={"grey": tmp_path / "noon.exr"},
     )
 
@@ -364,7 +387,7 @@ def test_the_bake_itself(scene: Scene, keys: Callable[..., dict[str, str]]) -> N
     for bounces in (Bounces((32, 1, 1, 1)), Bounces((64, 1, 1)), Bounces(fixed=frozenset({"sheet"}))):
         after = keys(scene, bounces=bounces)
         assert stale(before, after) == starting(before | after, (BOUNCED,))
-    assert stale(before, keys(scene, probes="traced")) == starting(before, PROBES)
+    assert stale(before, keys(scene, probes="traced")) == starting(before, (*PROBES, *FIELDS))
     photons = keys(scene, light_map="photons")
     assert stale(before, photons) == starting(before | photons, BAKED)
     more = keys(scene, TINY.changed(light_map={"photons_per_texel": 65}), light_map="photons")

@@ -13,7 +13,8 @@ from scipy.ndimage import map_coordinates
 from lambent.bake.bake import bake
 from lambent.core.photometry import LM_PER_W, photometric
 from lambent.scenes.ies import Photometry
-from lambent.scenes.scene import IesLight
+from lambent.scenes.scene import DirectionalLight, IesLight, PointLight
+from lambent.scenes.triangle_lights import joined, small_lights
 from tests.bake.small_scenes import TINY, plane
 from tests.scenes.test_gltf import document, loaded
 
@@ -47,6 +48,28 @@ def test_a_luminaire_shines_as_its_file_says(mi: Any, aim: tuple[float, float, f
     ds, light_here = emitter_of(light).sample_direction(it, mi.Point2f(0.5), True)
     got = photometric(array_of(light_here) * np.maximum(array_of(ds.d) @ normal, 0)[:, None])
     np.testing.assert_allclose(got, illuminance(light, points, normal), rtol=1e-3, atol=1e-3)
+
+
+def test_lights_of_edited_views_shine_as_their_own_files_say(mi: Any) -> None:
+    from lambent.bake.tracing.rays import array_of, vectors
+    from lambent.bake.transport.device_lights import light_at, lights_on_device
+
+    narrow = Photometry((10.0, 40.0), (0.0, 180.0, 360.0), ((900.0, 300.0), (100.0, 0.0), (900.0, 300.0)))
+    first = IesLight((0.1, 2.0, -0.2), LAMP, W_SR, (0.6, -0.8, 0.0), 25.0)
+    second = IesLight((-1.0, 1.0, 0.5), narrow, W_SR, (0.0, 1.0, 0.0), 70.0)
+    sun, lamp = DirectionalLight((0.0, -1.0, 0.0), (2.0, 2.0, 2.0)), PointLight((0.0, 1.0, 0.0), (3.0, 3.0, 3.0))
+    lights = joined([small_lights([sun, first]), small_lights([lamp, second])])
+    assert lights.luminaires == {1: first, 3: second} and lights.near.tolist() == [False, True, True, True]
+    points = np.random.default_rng(1).normal(0, 2, (4000, 3))
+    on_device, up = lights_on_device(lights), np.array([0.0, 1.0, 0.0])
+    for m, light_here, normal in ((1, first, up), (3, second, -up)):
+        expected = illuminance(light_here, points, normal)
+        towards, _, _, _, light, share, _ = light_at(on_device, mi.UInt32(m), vectors(mi.Point3f, points))
+        got = photometric(array_of(light * share) * np.maximum(array_of(towards) @ normal, 0)[:, None])
+        assert (expected > 0).sum() > 100
+        np.testing.assert_allclose(got, expected, rtol=2e-3, atol=1e-3 * expected.max())
+    share = np.array(light_at(on_device, mi.UInt32(2), vectors(mi.Point3f, points))[5])
+    np.testing.assert_allclose(share, 1 / ((points - lamp.position) ** 2).sum(axis=1), rtol=1e-4)
 
 
 def test_its_rays_carry_its_flux_where_it_shines(mi: Any) -> None:

@@ -14,9 +14,10 @@ from lambent.bake.engine import engine
 from lambent.bake.tracing.solids import is_closed
 from lambent.core.camera import Camera
 from lambent.core.cubemap import texel_solid_angles
+from lambent.core.geometry import triangle_areas
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.store.contract import scene_record
+from lambent.store.contract import scene_record, whole_objects
 from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, furnace, room_with_step, turned_inwards
 
 
@@ -40,7 +41,13 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     objects = {o.name: o for o in scene_record(store).objects}
     parts = sorted(name for name in objects if name.startswith("bar"))
     assert "ball" in objects and len(parts) > 1 and "bar" not in objects
-    assert sum(objects[name].face_count for name in parts) == len(two_rooms().object("bar").mesh.faces)
+    positions, faces = (store.read(f"geometry/{name}") for name in ("positions", "faces"))
+    owned = [faces[o.first_face : o.first_face + o.face_count] for o in (objects[name] for name in parts)]
+    area = sum(triangle_areas(positions[own].astype(float)).sum() for own in owned)
+    assert area == pytest.approx(triangle_areas(two_rooms().object("bar").mesh.corners).sum(), rel=1e-5)
+    for name, own in zip(parts, owned, strict=True):
+        (n, d), *_ = ((np.array(border[:3]), border[3]) for border in objects[name].borders)
+        assert (positions[own] @ n + d).min() > -1e-5, "faces end at the border"
     colours = {}
     for name in parts:
         radiance = store.read(f"probe/{name}/radiance").astype(float)
@@ -78,12 +85,18 @@ def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixtur
 def test_parts_of_a_solid_are_solid() -> None:
     engine()
     from lambent.bake.probes.division import split
+    from lambent.bake.surfaces.atlas import object_records
     from lambent.bake.tracing.solids import SolidTest
 
     scene = two_rooms()
-    faces = len(scene.object("bar").mesh.faces)
-    cut = split(scene, {"bar": "0" * (faces // 2) + "1" * (faces - faces // 2)})
+    cut = split(scene, {"bar": [((-1.0, 0.0, 0.0, 0.3),), ((1.0, 0.0, 0.0, -0.3),)]})
+    assert cut.object("bar.part1").mesh.bounds[1][0] == cut.object("bar.part2").mesh.bounds[0][0] == np.float32(0.3)
     assert not is_closed(cut.object("bar.part1").mesh)
+    wholes = whole_objects(object_records(cut))
+    assert [o.name for o in wholes] == [o.name for o in scene.objects]
+    parts = sum(len(o.mesh.faces) for o in cut.objects if o.name.startswith("bar."))
+    faces = {o.name: len(o.mesh.faces) for o in scene.objects} | {"bar": parts}  # cut faces are two or three
+    assert {o.name: o.face_count for o in wholes} == faces
     from lambent.bake.tracing.scene_builder import SceneBuilder
 
     builder = SceneBuilder(cut)

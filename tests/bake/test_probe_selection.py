@@ -11,11 +11,9 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.bake.probes.selection import (
     Mirrored,
-    basis_of,
     by_distance,
     by_planes,
     error,
-    irradiance_of,
     specular_occlusion,
 )
 from lambent.core.camera import Camera
@@ -34,18 +32,6 @@ def rays(**given: object) -> Mirrored:
     values = {"origins": 0 * one, "directions": one, "normals": one, "radiance": one * 0 + 1.0}
     scalars = {"irradiance": np.ones(1), "fresnel": np.ones(1), "own": np.zeros(1, bool)}
     return Mirrored(**{**values, **scalars, **given})
-
-
-def test_irradiance_of_a_cube_against_its_integral() -> None:
-    w = normalize(face_directions(64))
-    n = normalize(np.random.default_rng(0).normal(size=(50, 3)))
-    even = irradiance_of(np.full((6, 16, 16, 3), 2.0))
-    assert np.allclose(basis_of(n) @ even, 2 * np.pi, rtol=2e-3)
-    a = normalize(np.array([1.0, 2.0, -2.0]))
-    linear = irradiance_of(np.repeat((w @ a)[..., None], 3, axis=-1))  # L = a.w: E = 2 pi/3 a.n
-    assert np.allclose(basis_of(n) @ linear, 2 * np.pi / 3 * (n @ a), atol=5e-3)
-    squared = irradiance_of(np.repeat((w @ a)[..., None] ** 2, 3, axis=-1))  # E = pi/4 (1 + (a.n)^2)
-    assert np.allclose(basis_of(n) @ squared, np.pi / 4 * (1 + (n @ a) ** 2), atol=5e-3)
 
 
 def test_error_and_share_by_hand() -> None:

@@ -16,6 +16,7 @@ from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import (
     DirectionalLight,
     Environment,
+    IesLight,
     ImageEnvironment,
     Light,
     PointLight,
@@ -24,6 +25,7 @@ from lambent.scenes.scene import (
     SunSky,
 )
 from lambent.scenes.triangle_lights import joined, small_lights
+from tests.bake.test_luminaires import LAMP
 from tests.bake.test_transport import View
 from tests.tools.z_test import assert_same_image
 
@@ -91,8 +93,9 @@ def test_many_lights_are_the_light_itself(material: Material, sky: str) -> None:
         DirectionalLight((0.3, -1.0, 0.2), (3.0, 2.0, 1.0)),
         PointLight((0.2, 1.0, -0.3), (3.0, 2.0, 1.0)),
         PointLight((0.1, 0.9, 0.2), (3.0, 2.0, 1.0), (0.1, -1.0, 0.0), 10.0, 40.0),
+        IesLight((0.1, 0.9, 0.2), LAMP, (0.03, 0.02, 0.01), (0.48, -0.64, 0.6), 25.0),
     ],
-    ids=["directional", "point", "spot"],
+    ids=["directional", "point", "spot", "luminaire"],
 )
 def test_lights_without_extent(light: Light) -> None:
     assert_converged(scene(replace_alpha(SATIN), None, (light,)), 64)

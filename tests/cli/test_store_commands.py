@@ -87,6 +87,8 @@ def test_exposure_as_ev100(lambent, refused, store, tmp_path):
     said = lambent(*common, "--exposure", "-2").json
     assert said["exposure_ev"] == -2 and said["ev100"] == pytest.approx(np.log2(LM_PER_W / 1.2) + 2)
     assert "leave out --exposure" in refused(*common, "--ev100", "9", "--exposure", "1")
+    line = refused(*common, "--ev100", "500")
+    assert "--ev100" in line and "-57 to 71" in line and "--exposure" not in line
 
 
 def test_noise_of_the_light_map(lambent, refused, store, tmp_path):

@@ -345,3 +345,23 @@ def test_surroundings_say_what_an_environment_says() -> None:
     assert ImageEnvironment(**Surroundings(**values).model_dump()) == ImageEnvironment(**values)
     with pytest.raises(ValueError, match="layout"):
         Surroundings(file="sky.hdr", layout="round")
+
+
+def test_a_material_is_merged_with_another_and_parted_again(tmp_path: Path) -> None:
+    paint = Material(kd=0.5)
+    one = Session.new("room", CAMERA, {name: paint for name in ("wall", "door", "frame")})
+    one.tint("wall", "diffuse", 2.0)
+    one.merge("frame", "door")
+    one.merge("door", "wall")
+    assert [*one.document.materials] == ["wall"] and one.document.merged == {"frame": "wall", "door": "wall"}
+    one.save(tmp_path / "room.edits.json")
+    assert Session.open(tmp_path / "room.edits.json").document.merged == one.document.merged
+    one.undo()
+    assert [*one.document.materials] == ["wall", "door"] and one.document.merged == {"frame": "door"}
+    for material, other in (("wall", "wall"), ("wall", "floor"), ("floor", "wall"), ("frame", "wall")):
+        with pytest.raises(UserError, match="unknown material"):
+            one.merge(material, other)
+    both = one.document.model_dump(mode="json") | {"merged": {"door": "wall"}}
+    (tmp_path / "both.edits.json").write_text(json.dumps(both))
+    with pytest.raises(UserError, match=r"'door' is merged"):
+        Session.open(tmp_path / "both.edits.json")

@@ -153,6 +153,14 @@ def test_the_documented_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert not np.allclose(read_image(tmp_path / "tray.exr"), edited.image(), rtol=0.02)
 
 
+def test_a_store_from_before_a_merge_is_refused(store: Store) -> None:
+    merged = Session.new("room", CAMERA, MATERIALS, size=SIZE)
+    name, other = list(MATERIALS)[:2]
+    merged.merge(name, other)
+    with pytest.raises(UserError, match=f"merges with {other}"):
+        edited_picture(store, merged)
+
+
 def test_transport_by_steps_of_earlier_versions_is_not_misread(store: Store) -> None:
     name = view_artefact_name(CAMERA, *SIZE, "transport", "200/terms")
     old = store.artefact(name)

@@ -15,6 +15,7 @@ from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import MaterialTextures, Texture
+from tests.realtime.lit_plate import plate_field
 from tests.realtime.test_realtime_planar import mirror, scene_of, state
 
 MOST = 11
@@ -22,7 +23,7 @@ ENTRIES = {
     "vertex_main", "mask_main", "solid_main", "shade_main", "fringe_main", "sky_main", "planar_main",
     "planar_buffer_main", "planar_buffer_sky_main", "planar_buffer_mips_main", "planar_clean_main", "first_cells_main",
     "cells_main", "planar_walls_main", "accumulate_main", "tonemap_main", "smooth_main", "prefilter_main",
-    "enlarge_main",
+    "enlarge_main", "coverage_main", "missed_main", "cover_main",
 }  # fmt: skip
 
 
@@ -63,7 +64,7 @@ def test_no_pipeline_samples_more_than_eleven_textures(device: Any, counted: lis
     probes = {name: replace(probe, planes=planes, distance=distance) for name, probe in scene.probes.items()}
     textures = {"floor": MaterialTextures(**every), "paint": MaterialTextures(**{**every, "opacity": None})}
     renderer = Renderer(device, replace(scene, probes=probes, textures=textures))
-    small = replace(state(n=1), width=16, height=16, antialias=True)
+    small = replace(state(n=1), width=16, height=16, antialias=True, covers=True)
     for integrator in INTEGRATORS:
         renderer.image(replace(small, integrator=integrator))
     for look_up in look_ups():
@@ -74,6 +75,17 @@ def test_no_pipeline_samples_more_than_eleven_textures(device: Any, counted: lis
     assert {entry for entry, _ in counted} == ENTRIES
     assert max(count for _, count in counted) <= MOST, counted
     assert max(count for _, count in counted) > 8, "those of shading are counted"
+
+
+def test_a_light_field_fills_the_slots_that_a_stage_has(device: Any, counted: list[tuple[str, int]]) -> None:
+    """With all textures of a material, and beside a planar reflector's."""
+    every = {name: constant(*[0.5] * channels) for name, channels in on_gpu.CHANNELS.items()}
+    scene = scene_of(mirror(0.15))
+    fields = dict.fromkeys((o.name for o in scene.record.objects), plate_field(2, 14))
+    textures = {"floor": MaterialTextures(**every)}
+    renderer = Renderer(device, replace(scene, light_fields=fields, textures=textures))
+    renderer.image(replace(state(n=1), width=16, height=16, lookup="light_field"))
+    assert max(count for _, count in counted) == 15, "of 16"
 
 
 def test_masked_reflectors_are_drawn_in_motion(device: Any) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.probes.selection import basis_of
 from lambent.core.camera import Camera, pixel_rays
 from lambent.core.colour import luminance
 from lambent.core.directions import normalize, reflect
+from lambent.core.irradiance import basis_of
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Lobe, Material
 from lambent.materials.shader_layout import lobe_shader

@@ -13,6 +13,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.outline import REACH_PX
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.targets import DISPLAY_FORMAT, target_texture
+from lambent.store.contract import ObjectRecord, whole_objects
 from lambent.store.store import Store
 from lambent.viewer.picking import Geometry
 from tests.viewer.small_store import MATERIALS, write_small_store
@@ -29,7 +30,12 @@ def renderer(device: Any, tmp_path_factory: pytest.TempPathFactory) -> Renderer:
 
 
 def line(renderer: Renderer, state: FrameState, name: str) -> np.ndarray:
-    texture = renderer.outline().draw(state, name).texture
+    record = next(one for one in renderer.scene.record.objects if one.name == name)
+    return line_of(renderer, state, record)
+
+
+def line_of(renderer: Renderer, state: FrameState, record: ObjectRecord) -> np.ndarray:
+    texture = renderer.outline().draw(state, record).texture
     width, height = state.size
     data = renderer.device.queue.read_texture({"texture": texture}, {"bytes_per_row": 4 * width}, (width, height, 1))
     return np.frombuffer(data, np.uint8).reshape(height, width, 4)[..., 3] / 255
@@ -43,20 +49,35 @@ def spread(flags: np.ndarray, reach: int) -> np.ndarray:
     return np.any([padded[y : y + height, x : x + width] for y in shifts for x in shifts], axis=0)
 
 
-@pytest.mark.parametrize("camera", [FRONT, BESIDE], ids=lambda c: c.name)
-@pytest.mark.parametrize("name", ["ball", "wall"])
-def test_the_line_runs_along_the_border_of_what_is_seen(renderer: Renderer, camera: Camera, name: str) -> None:
+def check_line(renderer: Renderer, camera: Camera, record: ObjectRecord, names: set[str]) -> None:
+    """The line of a record is the border of what rays see of the objects with these names."""
     baked = renderer.scene
     geometry = Geometry(baked.positions, baked.faces, baked.record.objects)
     rays = pixel_rays(camera, *SIZE)
     found = [[geometry.pick(camera.position, ray) for ray in row] for row in rays]
-    seen = np.array([[item is not None and item.name == name for item in row] for row in found])
+    seen = np.array([[item is not None and item.name in names for item in row] for row in found])
     others = np.pad(~seen, 1, mode="edge")
     border = seen & (others[2:, 1:-1] | others[:-2, 1:-1] | others[1:-1, 2:] | others[1:-1, :-2])
-    alpha = line(renderer, FrameState(camera, *SIZE), name)
+    alpha = line_of(renderer, FrameState(camera, *SIZE), record)
     assert border.any()
     assert (alpha[border] > 0.3).mean() > 0.97
     assert (alpha[~spread(border, REACH_PX)] == 0).all()
+
+
+@pytest.mark.parametrize("camera", [FRONT, BESIDE], ids=lambda c: c.name)
+@pytest.mark.parametrize("name", ["ball", "wall"])
+def test_the_line_runs_along_the_border_of_what_is_seen(renderer: Renderer, camera: Camera, name: str) -> None:
+    check_line(renderer, camera, next(o for o in renderer.scene.record.objects if o.name == name), {name})
+
+
+def test_an_object_in_parts_has_one_line(renderer: Renderer) -> None:
+    floor, wall, ball = renderer.scene.record.objects
+    room, other = whole_objects([*(o.model_copy(update={"part_of": "room"}) for o in (floor, wall)), ball])
+    assert (room.name, room.first_face, room.face_count) == ("room", 0, floor.face_count + wall.face_count)
+    assert other == ball and np.allclose(room.bounds, renderer.scene.record.bounds)
+    check_line(renderer, FRONT, room, {"floor", "wall"})
+    apart = wall.model_copy(update={"part_of": "room", "first_face": wall.first_face + 1})
+    assert len(whole_objects([floor.model_copy(update={"part_of": "room"}), apart])) == 2, "others are between them"
 
 
 def test_motion_and_samples_do_not_move_the_line(renderer: Renderer) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,14 @@ from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.patterns import radius
 from lambent.realtime.planar_integrators import interleaved_table, multi_ring_table
-from lambent.realtime.planar_view import MARGIN_PX, MOST_MARGIN, STEP_PX, covered_share, planar_views
+from lambent.realtime.planar_view import (
+    MARGIN_PX,
+    MOST_MARGIN,
+    STEP_PX,
+    covered_share,
+    on_screen,
+    planar_views,
+)
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.structs import FRAME_DTYPE
 from lambent.realtime.unbaked import unbaked_scene
@@ -232,10 +239,10 @@ def test_covered_share_of_a_square_that_fills_half_the_frame() -> None:
     camera = Camera(name="c", position=(0, 0, 1), target=(0, 0, 0), fov_y_deg=90)
     aspect = WIDTH / HEIGHT
     square = np.array([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], float)
-    assert covered_share(frame_of(camera), square) == pytest.approx(0.5, abs=1e-6)
+    assert covered_share(on_screen(frame_of(camera), square)) == pytest.approx(0.5, abs=1e-6)
     inner = np.array([(-aspect / 2, -0.5, 0), (aspect / 2, -0.5, 0), (aspect / 2, 0.5, 0), (-aspect / 2, 0.5, 0)])
-    assert covered_share(frame_of(camera), inner) == pytest.approx(0.25, abs=1e-6)
-    assert covered_share(frame_of(camera), inner + np.array([0, 0, 2])) == 0
+    assert covered_share(on_screen(frame_of(camera), inner)) == pytest.approx(0.25, abs=1e-6)
+    assert covered_share(on_screen(frame_of(camera), inner + np.array([0, 0, 2]))) == 0
 
 
 def test_spirals_of_a_tile_share_the_lobe_evenly() -> None:
@@ -253,11 +260,12 @@ def test_spirals_of_a_tile_share_the_lobe_evenly() -> None:
 def test_wide_lobes_have_a_wider_buffer() -> None:
     width, height = 640, 480
     frame, sizes = frame_of(CAMERA, width, height), []
-    for m in (0.01, 0.05, 0.1, 0.4):
-        (view,) = planar_views(frame, [FLOOR], width, height, 4, {"floor": m})
-        sizes.append(view.size)
+    for m, whole in product((0.01, 0.05, 0.1, 0.4), (True, False)):
+        (view,) = planar_views(frame, [FLOOR], width, height, 4, {"floor": m}, whole)
         at, wide = view.uniform["offset"], np.array(view.size)
-        assert np.all(at >= MARGIN_PX)
+        if whole:
+            sizes.append(view.size)
+            assert np.all(at >= MARGIN_PX)
         corner = view.frame["clip_from_world"].T.astype(float) @ [0.1, 0.4, 0.0, 1]  # the target's image
         flat = frame["clip_from_world"].T.astype(float) @ [0.1, -0.4, 0.0, 1]
         pixel = [(v[:2] / v[3] * [1, -1] + 1) / 2 * size for v, size in ((corner, wide), (flat, (width, height)))]

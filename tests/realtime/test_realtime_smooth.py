@@ -29,8 +29,9 @@ def smoothed(device) -> Any:
     target = device.create_texture(size=size, format=DISPLAY_FORMAT, usage=use.RENDER_ATTACHMENT | use.COPY_SRC)
     rows = {"bytes_per_row": SIZE * 4}
 
-    def run(grey: np.ndarray) -> np.ndarray:
+    def run(grey: np.ndarray, mixed: np.ndarray | None = None) -> np.ndarray:
         pixels = np.repeat(np.round(grey * 255).astype(np.uint8)[..., None], 4, axis=-1)
+        pixels[..., 3] = 255 if mixed is None else np.where(mixed, 0, 255)
         device.queue.write_texture({"texture": given}, np.ascontiguousarray(pixels), rows, size)
         part = Whole(device.create_command_encoder())
         context = SimpleNamespace(
@@ -70,6 +71,12 @@ def test_slanted_edges_come_near_the_truth(smoothed, slope: float, left: float) 
         before = np.abs(turn(hard) - turn(truth))[inside].mean()
         after = np.abs(smoothed(turn(hard)) - turn(truth))[inside].mean()
         assert after < left * before
+
+
+def test_means_over_surfaces_are_not_blended_again(smoothed) -> None:
+    """Neither they, which are marked, nor the pixels beside them."""
+    line = half_plane(0.3, 1)
+    np.testing.assert_allclose(smoothed(line, np.ones((SIZE, SIZE), bool)), line, atol=0.5 / 255)
 
 
 def test_fine_lines_keep_their_light(smoothed) -> None:

@@ -18,11 +18,13 @@ from lambent.materials.document import Lobe, Material
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
-from lambent.realtime.sun import BLOCK, block_ranges, squares_of
+from lambent.realtime.sun import BLOCK, block_ranges
+from lambent.realtime.sun_squares import squares_of
 from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, merge, patch, placed
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import SunRecord
+from tests.realtime import test_realtime_planar as planar
 
 Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.9, 0.2]))
@@ -199,12 +201,36 @@ def test_first_square_holds_what_cameras_see_and_the_last_all() -> None:
     assert len(squares_of(TOWARDS, corners, np.zeros((0, 3))).squares) == 1
 
 
-def test_blocks_know_the_least_and_the_greatest_depth() -> None:
+def test_blocks_know_the_least_and_the_greatest_depth_about_them() -> None:
     depths = np.random.default_rng(0).random((2, 4 * BLOCK, 4 * BLOCK)).astype(np.float32)
     found = block_ranges(depths)
     assert found.shape == (2, 4, 6, 2)
-    corner = depths[1, BLOCK : 2 * BLOCK, :BLOCK]
+    corner = depths[1, : 3 * BLOCK, : 2 * BLOCK]
     assert found[1, 1, 0].tolist() == [corner.min(), corner.max()]
-    half = depths[1, 2 * BLOCK :, : 2 * BLOCK]
-    assert found[1, 1, 4].tolist() == [half.min(), half.max()]
-    assert found[1, 2, 4].tolist() == [depths[1].min(), depths[1].max()]
+    inner = depths[1, BLOCK:, : 3 * BLOCK]
+    assert found[1, 2, 1].tolist() == [inner.min(), inner.max()]
+    for level in (found[1, 1, 4], found[1, 2, 4]):  # of 2 x 2 blocks, and of one
+        assert level.tolist() == [depths[1].min(), depths[1].max()]
+
+
+def test_a_mirror_shows_sunlight_and_shadows(device: Any) -> None:
+    """As the camera below the floor sees them: a wall with the shadows of a box and a ball on it."""
+    sun = SunRecord(direction=tuple(normalize(np.array([0.3, 0.5, 0.8]))), irradiance=IRRADIANCE, radius_rad=0.005)
+    above, below = (planar.scene_of(planar.mirror(0.001), floor) for floor in (True, False))
+    dull = [o.model_copy(update={"emission": (0.0, 0.0, 0.0)}) for o in above.record.objects]
+    lit = [
+        replace(baked, sun=sun, record=baked.record.model_copy(update={"objects": tuple(dull[: len(baked.probes)])}))
+        for baked in (above, below)
+    ]
+    (x, y, z), (u, v, w) = planar.CAMERA.position, planar.CAMERA.target
+    turned = replace(planar.CAMERA, position=(x, -y, z), target=(u, -v, w), up=(0, -1, 0))
+    expected = Renderer(device, lit[1]).image(replace(planar.state(), camera=turned))[:, ::-1]
+    renderer = Renderer(device, lit[0])
+    found = renderer.image(planar.state(n=3, integrator="rings", planar="interleaved"))
+    floor = renderer.image(planar.state(planar="off"))[..., 2] == 0  # the dark probe
+    on_wall = floor & (expected[..., 2] < 0.5)  # not the sky
+    sunny, shaded = on_wall & (expected[..., 0] > 0.2), on_wall & (expected[..., 0] < 0.01)
+    assert sunny.sum() > 300 and shaded.sum() > 40
+    difference = np.abs(found - expected).max(axis=-1)
+    assert np.median(difference[on_wall]) < 0.01 and (difference[on_wall] < 0.1).mean() > 0.9
+    assert np.median(found[sunny][:, 0] / expected[sunny][:, 0]) == pytest.approx(1, rel=0.02)

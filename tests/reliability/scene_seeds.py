@@ -337,6 +337,7 @@ material = "copper"
 probe_centre = [0.0, 1.5, 0.0]
 probe_planes = [[1.0, 0.0, 0.0, 2.6]]
 light_map_scale = 0.5
+light_field = { points = 64, texels = 48, offset_m = 0.01, error = 0.05 }
 
 [objects.scene]
 emission = [0.4, 0.3, 0.2]

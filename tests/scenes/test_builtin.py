@@ -20,7 +20,7 @@ def room() -> Scene:
     return load_scene("builtin:room")
 
 
-@pytest.mark.parametrize("name", ["room", "box", "teatray", "earrings", "cornell", "vase", "loft", "ring"])
+@pytest.mark.parametrize("name", ["room", "box", "teatray", "earrings", "cornell", "vase", "loft", "ring", "pavilion"])
 def test_builtin_scenes_are_without_fault(name: str) -> None:
     scene = load_scene(f"builtin:{name}")
     assert scene.warnings == () and validate(scene) == []

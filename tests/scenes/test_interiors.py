@@ -11,7 +11,8 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.latlong import lat_long_direction, lat_long_directions
 from lambent.scenes import load_scene
-from lambent.scenes.interiors import HEIGHT, INTERIORS, lat_long_image
+from lambent.scenes.computed import COMPUTED, HEIGHT, lat_long_image
+from lambent.scenes.interiors import INTERIORS
 from lambent.scenes.scene import ComputedEnvironment
 
 HEAD = 'format = "lambent-scene"\nversion = 1\ngeometry = "builtin:box"\n'
@@ -31,17 +32,17 @@ def test_interiors_are_lit_by_small_bright_lights(name: str) -> None:
     assert image.max() > 1e4 * image.min()
 
 
-@pytest.mark.parametrize("name", INTERIORS)
+@pytest.mark.parametrize("name", COMPUTED)
 def test_the_image_is_the_mean_of_the_interior(name: str) -> None:
     """Texels that no edge crosses are the radiance in their direction: the image is oriented as core.latlong."""
-    at_centre = INTERIORS[name](lat_long_directions(HEIGHT, 2 * HEIGHT))
+    at_centre = COMPUTED[name](lat_long_directions(HEIGHT, 2 * HEIGHT))
     near = np.isclose(lat_long_image(name), at_centre, rtol=0.05, atol=1e-3).all(axis=-1)
     assert near.mean() > 0.95
 
 
 def test_every_direction_meets_a_wall() -> None:
     axes = np.concatenate([np.eye(3), -np.eye(3), lat_long_direction([0, 1.0, np.pi], [0.0, 2.0, 1.0])])
-    for interior in INTERIORS.values():
+    for interior in COMPUTED.values():
         assert np.isfinite(interior(axes)).all() and interior(axes).shape == axes.shape
 
 
@@ -53,7 +54,7 @@ def test_a_scene_names_an_interior(tmp_path: Path) -> None:
     file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "nave"\n{materials}')
     assert load_scene(file).environment == ComputedEnvironment("nave")
     file.write_text(f'{HEAD}[environment]\nkind = "computed"\nname = "crypt"\n{materials}')
-    with pytest.raises(UserError, match=r"crypt.*gallery, nave"):
+    with pytest.raises(UserError, match=r"crypt.*gallery, nave, park"):
         load_scene(file)
 
 

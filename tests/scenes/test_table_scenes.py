@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import pytest
 
-from lambent.materials.bsdf import MaterialBSDF
 from lambent.scenes import load_scene
 from lambent.scenes.builtin import earrings, teatray
 from lambent.scenes.builtin.wood import wood
-from lambent.scenes.geometry import signed_volume
 from lambent.scenes.geometry.drape import Drape
 from lambent.scenes.scene import Mesh, Scene, SceneObject
-from tests.scenes.test_geometry import boundary_edges
+from tests.scenes.soundness import (  # noqa: F401
+    test_closed_things_are_closed_and_the_right_side_out,
+    test_materials_give_back_no_more_than_they_get,
+)
 
 # Pixels at 512x512 of Ben-Artzi 2007, table 4.2, and which of our objects they are.
 PUBLISHED: Mapping[str, Mapping[str, tuple[int, tuple[str, ...]]]] = {
@@ -47,21 +48,6 @@ def samples(mesh: Mesh) -> np.ndarray:
     """Corners, middles of the edges and centres of all triangles."""
     c = mesh.corners
     return np.concatenate([c.reshape(-1, 3), ((c + np.roll(c, 1, axis=1)) / 2).reshape(-1, 3), c.mean(axis=1)])
-
-
-def test_closed_things_are_closed_and_the_right_side_out(scene: Scene) -> None:
-    for o in scene.objects:
-        if o.name not in OPEN:
-            assert boundary_edges(o.mesh) == 0, o.name
-            middle = np.mean(o.mesh.bounds, axis=0).astype(np.float32)
-            assert signed_volume(replace(o.mesh, positions=o.mesh.positions - middle)) > 0, o.name
-
-
-def test_materials_give_back_no_more_than_they_get(scene: Scene) -> None:
-    theta = np.radians([0, 30, 60, 80])
-    wo = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
-    for name, material in scene.materials.items():
-        assert MaterialBSDF(material).albedo(wo).max() < 1.02, name
 
 
 @pytest.mark.parametrize("module", [teatray, earrings])

@@ -22,6 +22,7 @@ from lambent.scenes.scene import (
     DirectionalLight,
     IesLight,
     ImageEnvironment,
+    LightFieldWish,
     PointLight,
     SceneObject,
 )
@@ -66,6 +67,7 @@ light_map_scale = 2.0
 material = "gold"
 probe_centre = [0.0, 0.5, 0.0]
 probe_planes = [[0.0, 2.0, 0.0, 0.0]]
+light_field = { points = 64, texels = 48, offset_m = 0.01, error = 0.05 }
 [objects.lamp]
 emission = [1.0, 2.0, 3.0]
 [[lights]]
@@ -104,6 +106,7 @@ keys = [
     assert scene.probe_centres == {"sphere": (0, 0.5, 0)} and np.array_equal(
         scene.probe_planes["sphere"], [[0, 1, 0, 0]]
     )
+    assert scene.light_fields == {"sphere": LightFieldWish(64, 48, 0.01, 0.05)}
     assert [c.name for c in scene.cameras] == ["front"] and scene.paths[0].keys[1].position == (1, 0.5, 2)
     assert set(scene.sources) == {path, tmp_path / "gold.json", tmp_path / "sky.hdr"}
 
@@ -172,6 +175,16 @@ def test_geometry_can_be_scaled(tmp_path: Path) -> None:
     assert any("is its unit the metre?" in warning for warning in scene.warnings)
 
 
+def test_a_light_field_is_asked_for_by_pattern_and_taken_back(tmp_path: Path) -> None:
+    text = MATERIALS + '[objects."s*"]\nlight_field = true\n[objects.%s]\nlight_field = %s'
+    assert load_scene(written(tmp_path, text % ("lamp", "true"))).light_fields == dict.fromkeys(
+        ("sphere", "lamp"), LightFieldWish()
+    )
+    assert load_scene(written(tmp_path, text % ("sphere", "false"))).light_fields == {}
+    only = load_scene(written(tmp_path, text % ("sphere", "{ points = 9 }"))).light_fields
+    assert only == {"sphere": LightFieldWish(points=9)}
+
+
 def test_the_same_geometry_twice_gets_names_of_its_own(tmp_path: Path) -> None:
     head = HEAD.replace('"builtin:box"', '["builtin:box", "builtin:box"]')
     names = [o.name for o in load_scene(written(tmp_path, MATERIALS, head)).objects]
@@ -204,6 +217,15 @@ WRONG = {
     MATERIALS + "[[lights]]\nkind='ies'\nfile='../a.ies'\nposition=[0.0,0.0,0.0]": r"lights.file.*leaves its folder",
     MATERIALS + "[[lights]]\nkind='ies'\nfile='none.ies'\nposition=[0.0,0.0,0.0]": r"lights.file: file not found",
     "[objects.lamp]\nemission=[1.0,1.0,1.0]\nlumens=5": r"says its light twice, by emission and lumens",
+    "[objects.sphere]\nlight_field = 'yes'": r"light_field: is true, false, or a table of points.*; found yes",
+    "[objects.sphere]\nlight_field = { poins = 9 }": r"light_field.poins: unknown key; did you mean 'points'",
+    "[objects.sphere]\nlight_field = { points = 0 }": r"light_field.points.*greater than or equal to 1; found 0",
+    "[objects.sphere]\nlight_field = { points = 70000 }": r"light_field.points.*65535; found 70000",
+    "[objects.sphere]\nlight_field = { texels = 7 }": r"light_field.texels.*greater than or equal to 8; found 7",
+    "[objects.sphere]\nlight_field = { texels = 4096 }": r"light_field.texels.*1024; found 4096",
+    "[objects.sphere]\nlight_field = { offset_m = -0.1 }": r"light_field.offset_m.*greater than 0; found -0.1",
+    "[objects.sphere]\nlight_field = { offset_m = nan }": r"light_field.offset_m.*; found nan",
+    "[objects.sphere]\nlight_field = { error = inf }": r"light_field.error.*finite.*; found inf",
     "exposure_ev = 1.0\nexposure_ev100 = 9.0": r"exposure twice",
     "name = ": r"not a TOML document",
     "name = '\\x00'\nx = [" + "[" * 5000: r"not a TOML document|unknown key",

@@ -36,7 +36,7 @@ SCENE = Scene(
 
 def write_view(folder, session, lights, seed=0):
     """The points of the view, and transport for the materials of a session."""
-    meta = view_meta(CAMERA, *SIZE)
+    meta, merged = view_meta(CAMERA, *SIZE), session.document.merged
     with Store.create(folder, {}) as store:
 
         def put(kind, part, array, **more):
@@ -50,11 +50,17 @@ def write_view(folder, session, lights, seed=0):
 
         worn = np.concatenate([np.full(len(pixel), k) for k, pixel in enumerate(SHOWN.values())])
         put("view_points", "pixel", np.concatenate(list(SHOWN.values())).astype(np.uint32))
-        put("view_points", "object", worn.astype(np.uint32), objects=[list(one) for one in OBJECTS])
+        put(
+            "view_points",
+            "object",
+            worn.astype(np.uint32),
+            objects=[[name, merged.get(own, own)] for name, own in OBJECTS],
+        )
         put("view_points", "theta_o", np.zeros(len(worn), np.float32))
         put("view_points", "backdrop", np.full((SIZE[1], SIZE[0], 3), 0.125, np.float16))
         rng, said = np.random.default_rng(lights + seed), []
-        for name, pixels in SHOWN.items():
+        for name in session.document.materials:
+            pixels = np.concatenate([shown for own, shown in SHOWN.items() if merged.get(own, own) == name])
             for k, term in enumerate(session.original(name).terms):
                 counts = [8 for _ in term.factors]
                 said.append(

@@ -56,6 +56,7 @@ def made(monkeypatch, tmp_path):
     monkeypatch.setattr(interreflections, "interreflections", lambda *_: light(held))
     monkeypatch.setattr(interreflections, "series_of", lambda *_: held["series"])
     monkeypatch.setattr(interreflections, "light_of", lambda light, _: np.full((3, 4), 1 + 1 / light.samples))
+    monkeypatch.setattr(interreflections, "noted_noise", lambda *_: held.get("noted"))
     monkeypatch.setattr(interreflections.Store, "open", lambda folder: None)
     painter = SimpleNamespace(run=lambda task: task(), give=given.append)
 
@@ -108,6 +109,13 @@ def test_what_a_store_has_is_shown_and_nothing_is_baked_unasked(made):
     assert made.bounced.series == "16,8,1" and made.bounced.fixed == {*NAMES[3:]}, "as in the store"
     assert made.asked[0].bounces == Bounces((16, 8, 1), 1024, frozenset(NAMES[3:]))
     assert set(made.asked[0].kept) == {*NAMES[:3]}, "what it takes to go on"
+
+
+def test_the_noise_of_a_finished_store_is_shown_at_once(made):
+    made.held.update(samples=64, noted=0.031)
+    tick(made)
+    tick(made)
+    assert made.bounced.samples == 64 and made.bounced.noise == 0.031
 
 
 def test_a_proposal_is_there_before_the_bake_and_can_be_changed(made):

@@ -127,6 +127,29 @@ def test_the_panel_of_interreflections(driver):
     assert bounced.baking is None and state._bake.begun[-1].closed
 
 
+def test_materials_that_look_the_same_are_merged_from_the_panel(driver):
+    state, bounced = driver.state, driver.state.bounced
+    until(state, lambda: state.painter.frame is not None and bounced.is_measuring)
+    driver.click("Interreflections")
+    rows = tuple(Row(name, "edited", 20, 0.5, 0.5) for name in ("tray", "wall"))
+    asked = state._bake.asked
+    asked[0].proposal, asked[0].running = Proposal(asked[0].bounces, rows, {}, {"wall": "tray"}, 10, 20), False
+    until(state, lambda: bounced.is_measured)
+    driver.frame(2)
+    assert "merge##tray" not in driver.rects
+    assert driver.rects["merge##wall"][2] <= driver.rects["Interreflections"][2], "not cut off"
+    driver.click("merge##wall")
+    assert state.session.document.merged == {"wall": "tray"}
+    until(state, lambda: len(state._bake.begun) == 2)
+    driver.frame(2)
+    assert "wall##edited" not in driver.rects, "measured anew first"
+    for lights in LIGHTS:
+        state._bake.begun[1].arrive(lights)
+        until(state, lambda: not state._bake.begun[1].arrived and not state.loading.busy)
+    until(state, lambda: len(asked) == 2 and bounced.is_measuring)
+    assert set(asked[1].session.document.materials) == {"tray"}
+
+
 def test_the_panel_shows_the_difference_to_a(driver):
     state = driver.state
     driver.click("difference")

@@ -352,3 +352,28 @@ def test_an_error_in_the_thread_reaches_the_window(ready):
     with pytest.raises(ZeroDivisionError, match="in the thread"):
         until(state, lambda: False)
     assert dataclasses.is_dataclass(state.painter.frame)
+
+
+def test_a_merged_material_is_drawn_and_edited_as_the_other(ready):
+    state, bakes = ready
+    state.select("tray")
+    before = settled(state).radiance.reshape(-1, 3)
+    state.session.merge("tray", "wall")
+    until(state, lambda: len(bakes.begun) == 2)
+    assert state.material == "wall" and bakes.begun[1].session.document.merged == {"tray": "wall"}
+    assert np.allclose(settled(state).radiance.reshape(-1, 3), before, atol=1e-4), "as before, until it is baked"
+    for lights in LIGHTS:
+        bakes.begun[1].arrive(lights, seed=3)
+        until(state, lambda: not bakes.begun[1].arrived and not state.loading.busy)
+    assert state.loading.view.objects == (("plate", "wall"), ("back", "wall")) and state.materials == ("wall",)
+    merged = settled(state).radiance.reshape(-1, 3)
+    assert np.allclose(merged, exact(state), atol=1e-4)
+    state.session.tint("wall", "diffuse", 2.0)
+    twice = settled(state).radiance.reshape(-1, 3)
+    backdrop = state.loading.view.backdrop.reshape(-1, 3)
+    for pixels in SHOWN.values():
+        assert np.allclose((twice - backdrop)[pixels], 2 * (merged - backdrop)[pixels], rtol=1e-3, atol=1e-4)
+    state.session.undo()
+    state.session.undo()
+    until(state, lambda: len(bakes.begun) == 3)
+    assert set(bakes.begun[2].session.document.materials) == {"tray", "wall"}, "parted again"

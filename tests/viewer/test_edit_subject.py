@@ -16,7 +16,7 @@ from lambent.scenes.scene import ImageEnvironment
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
 from lambent.viewer import edit
-from lambent.viewer.modes.edit.subject import kind_of, opened
+from lambent.viewer.modes.edit.subject import kind_of, opened, scene_for
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -111,8 +111,30 @@ def test_a_session_opens_with_its_view_and_all_materials(tmp_path):
         opened(tmp_path / "gold.edits.json", tmp_path)
 
 
+def test_merged_materials_and_hard_edges_last_with_the_session(tmp_path):
+    subject = opened(type(tmp_path)("builtin:teatray"), tmp_path, crease_deg=40.0)
+    assert subject.scene.crease_deg == 40
+    subject.session.merge("nickel", "glaze")
+    subject.session.save(tmp_path / "tray.edits.json")
+    again = opened(tmp_path / "tray.edits.json", tmp_path)
+    assert again.scene.crease_deg == 40 and "nickel" not in again.session.document.materials
+    dressed = scene_for(again.session)
+    assert dressed.crease_deg == 40 and {o.material for o in dressed.objects} == {*again.session.document.materials}
+    assert opened(tmp_path / "tray.edits.json", tmp_path, crease_deg=20.0).scene.crease_deg == 20
+    text = json.loads((tmp_path / "tray.edits.json").read_text())
+    (tmp_path / "gold.edits.json").write_text(json.dumps(text | {"merged": {"gold": "glaze"}}))
+    with pytest.raises(UserError, match=r"unknown material.*gold"):
+        opened(tmp_path / "gold.edits.json", tmp_path)
+    with Store.create(tmp_path / "baked", {}) as store:
+        store.set_document("source", "builtin:teatray")
+    with pytest.raises(UserError, match=r"--crease-angle|crease"):
+        opened(tmp_path / "baked", tmp_path, crease_deg=40.0)
+
+
 def test_options_of_the_other_mode_are_refused(tmp_path):
     Material(name="brass").save(tmp_path / "brass.json")
+    with pytest.raises(UserError, match=r"--crease-angle.*is for scenes|is for scenes.*--crease-angle"):
+        edit.run(tmp_path / "brass.json", crease_deg=40.0)
     with pytest.raises(UserError, match=r"--camera.*is for scenes|is for scenes.*--camera"):
         edit.run(tmp_path / "brass.json", camera="front")
     box = type(tmp_path)("builtin:teatray")

@@ -89,8 +89,11 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
 
 
 def fold(session, *headers):
-    """Fold panels, or unfold them."""
+    """Fold panels, or unfold them; one that is unfolded has scrolled the column, so its head comes into sight first."""
     for header in headers:
+        session.move(SIZE[0] - 8, 500)  # beside plots and lists, which have the wheel for themselves
+        session.tool("click", "--repeat", 30, 4)
+        session.settle()
         session.click(*session.point(header, 0.3))
     session.settle()
 
@@ -116,3 +119,42 @@ def test_a_window_that_closes_early_ends_the_bake_which_goes_on_the_next_time(op
     store.refresh()
     assert transport_lights(store, camera, PIXELS, PIXELS) == [400, 4000]
     assert second.close() == 0, second.log()
+
+
+TWINS = """mtllib twins.mtl
+v -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nv -1 1.5 -1\nv 1 1.5 -1\nv 1 1.5 1
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+o floor\nusemtl oak\nf 1/1 2/2 3/3 4/4
+o back\nusemtl plaster\nf 4/1 3/2 6/3 5/4
+o side\nusemtl stucco\nf 3/1 2/2 7/3 6/4
+"""
+
+
+def test_twins_are_merged_and_a_finished_store_says_its_noise(opened, tmp_path):
+    (tmp_path / "twins.obj").write_text(TWINS)
+    kinds = {"oak": ".5 .3 .2", "plaster": ".6 .6 .6", "stucco": ".6 .6 .6"}
+    (tmp_path / "twins.mtl").write_text("".join(f"newmtl {name}\nKd {kd}\n" for name, kd in kinds.items()))
+    session = opened(tmp_path / "twins.obj", tmp_path)
+    before = session.wait_for(lambda state: state["lights"] == 4000 and state["baking"] is None and not state["busy"])
+    assert set(before["edited"]) == set(kinds)
+    fold(session, "Material", "View")
+    session.click(*session.point("Interreflections"))
+    session.wait_for(lambda state: "merge##stucco" in state["rects"])
+    session.settle()
+    session.click(*session.point("merge##stucco"))
+    merged = session.wait_for(lambda state: any("new transport" in text for text in state["messages"]))
+    assert merged["merged"] == {"stucco": "plaster"} and set(merged["edited"]) == {"oak", "plaster"}
+    there = session.wait_for(lambda state: state["baking"] is None and state["lights"] == 4000 and not state["busy"])
+    assert there["brightness"] == pytest.approx(before["brightness"], rel=0.01), "they look the same"
+    session.click(*session.point("bake"))
+    whole = session.wait_for(lambda state: state["samples"] == 1024 and not state["busy"])
+    assert whole["noise"] > 0 and whole["brightness"] > 1.02 * before["brightness"]
+    session.tool("key", "ctrl+s")
+    session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
+    assert session.close() == 0, session.log()
+
+    again = opened(next(tmp_path.glob("*.edits.json")), tmp_path)
+    shown = again.wait_for(lambda state: state["samples"] == 1024 and not state["busy"])
+    assert shown["noise"] == pytest.approx(whole["noise"], rel=0.2) and shown["merged"] == {"stucco": "plaster"}
+    assert shown["baking"] is None, "nothing is baked again"
+    assert again.close() == 0, again.log()

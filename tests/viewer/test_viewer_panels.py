@@ -344,3 +344,16 @@ def test_controls_of_a_narrow_column_can_be_used(monkeypatch, state, geometry, s
     driver.drag("mx", 0.3, 0.9)
     assert state.materials.edits.current("brass").lobes[0].mx > 0.2
     driver.close()
+
+
+def test_a_panel_that_is_opened_comes_into_sight(monkeypatch, state, geometry):
+    driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (800, 600))
+    driver.frame(2)
+    for panel, last in (("Film", "make film##film file"), ("Drawing", "frame")):
+        before = driver.rects[panel][1]
+        driver.click(panel, 0.3)
+        driver.frame(3)
+        assert 560 < driver.rects[last][3] <= 600 and driver.rects[panel][1] < before, "scrolled as far as it has to"
+        driver.click(panel, 0.3)
+        driver.frame(3)
+    driver.close()

@@ -78,6 +78,8 @@ def seen_in_place(state):
         "selected": state.material,
         "pointed": state.pointed,
         "edited": {name: sorted(one.curves) for name, one in state.session.document.materials.items()},
+        "merged": state.session.document.merged,
+        "noise": state.bounced.noise,
         "samples": state.bounced.samples,
         "busy": state.painter.busy,
         "number": frame.number if frame is not None else 0,

@@ -19,7 +19,7 @@ from lambent.store.textures import texture_records, write_textures
 
 KIND = "geometry"
 NEEDS = ()
-REVISION = 3
+REVISION = 4
 REFLECTORS = "reflectors"  # document: the key of everything that reflectors in the scene record depend on
 
 

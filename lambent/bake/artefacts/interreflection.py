@@ -154,7 +154,10 @@ def _put_tails(context: BakeContext, view: View) -> None:
     """The document of the tails: an array without numbers, whose notes say what they are."""
     tails = tails_of(_editables(context), context.bounces)
     environment = environment_note(context.environment)
-    meta = {**view.meta, "tails": tails.said(), "series": list(context.bounces.series), "environment": environment}
+    meta = {
+        **view.meta, "tails": tails.said(), "series": list(context.bounces.series), "environment": environment,
+        "points": points_key(context, view),
+    }  # fmt: skip
     context.put(KIND, view.name(KIND, "tails"), tails.hits.astype(np.uint32), meta)
 
 

@@ -19,6 +19,7 @@ from lambent.bake.methods import LightMapMethod
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
 from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN = 4, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES = 4, 2, 3, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -73,6 +74,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         effort.append([LightMapMethod.photons, how.photons_per_texel])
     if _may_have_sun(context.scene):
         effort.append(["without the sun", REVISION_OF_SUN])
+        if panes_of(context.scene):
+            effort.append(["nor the sun through panes", REVISION_OF_PANES])
     geometry = context.keys("geometry")["geometry/positions"]
     samples = key_of(KIND, REVISION, geometry, material_inputs(context.scene), light_inputs(context.scene), effort)
     filtered = key_of("irradiance", REVISION_OF_IRRADIANCE, samples)
@@ -145,16 +148,16 @@ def _sampled_maps(context: BakeContext) -> Maps:
         for side in range(_sides(context)):
             raw, labels = _samples(context, stage, side, sampling)
             context.progress(0, 1, "denoising")
-            found.append(finished(raw, context.traced.texels, labels))
+            found.append(finished(raw, context.traced.texels, labels, context.traced.cuts))
         return found
 
     how: Settings = context.settings(KIND)
-    first = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth, context.traced.sun))
+    first = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth))
     if not how.gather_samples:
         return first
     back = first[1][0] if len(first) > 1 else None
     cache = context.traced.cache(first[0][0], back)
-    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache, context.traced.sun))
+    return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache))
 
 
 def _samples(
@@ -165,11 +168,13 @@ def _samples(
 
     tile, texels = context.settings(KIND).tile_texels, context.traced.texels
     writer = context.samples(KIND, _of_side(stage, side), (2, texels.height, texels.width, 4), (2, tile, tile, 4))
-    scene = context.traced.whole(diffuse=how.cache is None)
+    diffuse = how.cache is None
+    scene = context.traced.whole(diffuse=diffuse)
     sides, labels = context.traced.in_view(SIGNS[side])
     if faces is not None:
         sides = replace(sides, valid=sides.valid & faces[texels.face])
     if writer.missing:
+        how = replace(how, unseen=context.traced.unseen(diffuse=diffuse))
         covered = np.zeros(texels.width * texels.height, bool)
         covered[texels.index[sides.valid.any(axis=1)]] = True
         of_map = covered.reshape(texels.height, texels.width)
@@ -197,7 +202,7 @@ def _photon_maps(context: BakeContext) -> Maps:
         )  # fmt: skip
     writer.finish()
     context.progress(0, 1, "denoising")
-    return photon_map.finished(context.store.read(PHOTONS), context.traced.labels)
+    return photon_map.finished(context.store.read(PHOTONS), context.traced.labels, context.traced.cuts)
 
 
 def _photon_map(context: BakeContext) -> PhotonMap:
@@ -211,7 +216,7 @@ def _dominant_direction(context: BakeContext) -> None:
 
     front, back = finished_maps(context)
     cache = context.traced.cache(front, back)
-    how = moments(cache, context.settings(KIND).max_depth, context.traced.sun)
+    how = moments(cache, context.settings(KIND).max_depth)
     raw, _ = _samples(context, MOMENTS, 0, how, _bumpy_faces(context))
     context.put(KIND, DOMINANT_DIRECTION, dominant_direction(raw, front, context.traced.labels), context.provenance())
 

@@ -21,6 +21,7 @@ from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, share
 KIND = "probe"
 NEEDS = ("geometry", "light_map")
 REVISION = 4
+SHARING = "sharing"  # the step that finds whose probe each object shows
 PARTS = ("radiance", "distance", "planes")
 TOO_FEW = "%s: its probe has not seen %.0f %% of what it mirrors; a tenth is looked up %.0f degrees or more off"
 log = logging.getLogger(__name__)
@@ -104,7 +105,8 @@ def _owners(context: BakeContext) -> dict[str, str]:
     key = key_of(SHARED_PROBES, 1, names, look, given, lamps, *geometry_inputs(scene))
     said = store.documents.get(SHARED_PROBES)
     if not isinstance(said, dict) or said.get("key") != key:
-        owners = _shared(context, names) if len(names) > 1 else {}
+        with context.timed(SHARING):
+            owners = _shared(context, names) if len(names) > 1 else {}
         store.set_document(SHARED_PROBES, {"key": key, "owners": owners})
     return shared_probes(store)
 

@@ -11,8 +11,9 @@ perpendicular to the normal), t is its projection onto the shading plane and b =
 `si.sh_frame`, which Mitsuba derives from the uv's (dp/du), or arbitrarily for a mesh that has none.
 Isotropic materials without a normal map do not use it.
 
-Where a texture says that there is no surface, `eval_null_transmission` is 1 and the flag Null is set: `tracing.rays` go
-on there. Mitsuba's own integrators do not: for them the surface is whole.
+`eval_null_transmission` is what goes straight on. It is 1 where a texture says that there is no surface, with the flag
+Null: `tracing.rays` go on there. Mitsuba's own integrators do not: for them the surface is whole. It is between 0 and 1
+on clear glass (`materials.clear`), whose lobes scatter that same light: who adds it to theirs counts it twice.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ import mitsuba as mi
 from lambent.bake.bsdfs.textured import SurfaceTextures, faced_side, facing_frame, textures_dict
 from lambent.bake.engine import once_per_variant
 from lambent.materials import bsdf
+from lambent.materials.clear import MOST, clear_terms, transmittance
 from lambent.materials.document import Material, material_from
+from lambent.scenes.panes import is_clear
 from lambent.scenes.scene import MaterialTextures
 
 PLUGIN = "lambent_material"
@@ -49,7 +52,9 @@ def material_dict(
     Surfaces without textures that scatter light alike have equal dictionaries, whatever their materials' names.
     """
     scattering = material if diffuse else bsdf.specular_only(material)
-    result = {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
+    result: dict[str, Any] = {"type": PLUGIN, "material": scattering.model_dump_json(exclude={"name", "provenance"})}
+    if is_clear(material, textures):
+        result["clear"] = True
     if textures is not None:
         result |= textures_dict(textures)
     return result
@@ -80,6 +85,7 @@ def register_material_plugin() -> type:
             self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
             if "opacity" in self.textures:
                 self.m_flags |= int(mi.BSDFFlags.Null)
+            self.clear = clear_terms(self.material) if props.get("clear") else None
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             material, frame = self._enabled(ctx, si, active), self._frame(si, active)
@@ -116,7 +122,10 @@ def register_material_plugin() -> type:
             return dr.select(active, kd * seen, 0.0)
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
-            return dr.select(self.textures.is_hole(si, active), mi.Color3f(1.0), mi.Color3f(0.0))
+            passed = mi.Color3f(0.0)
+            if self.clear is not None:
+                passed = mi.Color3f(transmittance(dr.abs(si.wi.z), self.clear, dr)) * self.textures.specular(si, active)
+            return dr.select(self.textures.is_hole(si, active), mi.Color3f(1.0), dr.minimum(passed, MOST))
 
         def has_attribute(self, name: str, active: Any = True) -> Any:
             return mi.Bool(name in ATTRIBUTES)

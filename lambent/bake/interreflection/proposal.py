@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 SMALL = 0.01  # share of the view, and of the light that is passed on, below which a material is fixed
 MOST_BYTES = 2 << 30  # of a store, before compression
+ENTRY_BYTES = (
+    6  # of an entry that is edited: its light, and a step of one byte or two (editing.interreflection.entries)
+)
 LISTED = 10  # materials that are fixed, in a table
 MOST_CELLS = 1 << 22  # bands times tails of a point: each thread has a row of them
 
@@ -125,7 +128,7 @@ class Proposal:
 
     def merged(self, scene: Scene) -> Scene:
         """The scene with the materials that are merged."""
-        return _merged(scene, self.same)
+        return scene.merged(self.same)
 
     def said(self) -> dict[str, Any]:
         """For JSON; `Proposal.of` is the inverse."""
@@ -211,7 +214,7 @@ def propose(
     found = _proposal(scene, view, bounces, given, kept, most_bytes, progress)
     if not (merging and found.reasons and alike):
         return replace(found, alike=alike)
-    return replace(_proposal(_merged(scene, alike), view, bounces, given, kept, most_bytes, progress), same=alike)
+    return replace(_proposal(scene.merged(alike), view, bounces, given, kept, most_bytes, progress), same=alike)
 
 
 def propose_all(
@@ -245,7 +248,7 @@ class Held:
 
     def merged(self, scene: Scene) -> Scene:
         """The scene with the materials that are merged."""
-        return _merged(scene, self.same)
+        return scene.merged(self.same)
 
 
 def held_by(folder: Path, scene: Scene, view: View, series: Sequence[int]) -> Held | None:
@@ -318,13 +321,18 @@ def _proposal(
         )
         for row in rows
     ]  # fmt: skip
-    memory = trial.bake_bytes(fixing(), costs), round(_raw(costs, trial.shown))
+    memory = trial.bake_bytes(fixing(), costs), round(_held(costs, trial.shown))
     return Proposal(fixing(), tuple(rows), {}, {}, *memory, trial.begin_s, tuple(reasons))
 
 
 def _raw(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
     """Bytes of a store before compression."""
     return sum(cost.raw_bytes * points[name] for name, cost in costs.items())
+
+
+def _held(costs: Mapping[str, Cost], points: Mapping[str, int]) -> float:
+    """Bytes of the entries while they are edited."""
+    return sum(ENTRY_BYTES * cost.entries * points[name] for name, cost in costs.items())
 
 
 def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
@@ -339,10 +347,6 @@ def same_materials(scene: Scene, keep: Collection[str] = ()) -> dict[str, str]:
             if other != name:
                 found[name] = other
     return found
-
-
-def _merged(scene: Scene, same: Mapping[str, str]) -> Scene:
-    return replace(scene, objects=tuple(replace(o, material=same.get(o.material, o.material)) for o in scene.objects))
 
 
 def bytes_said(count: float) -> str:

@@ -16,16 +16,15 @@ from lambent.bake.light.denoise import fill
 from lambent.bake.light.noise import chart_means
 from lambent.bake.light.sampling import Sampling
 from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.sun import Sun
 from lambent.core.arrays import Floats, Indices
 from lambent.core.colour import luminance
 
 SAMPLES = 64  # per texel, then averaged with its neighbours
 
 
-def moments(cache: path_tracer.Cache, max_depth: int, unseen: Sun | None = None) -> Sampling:
+def moments(cache: path_tracer.Cache, max_depth: int) -> Sampling:
     """First moments of incident light, sampled like irradiance; surfaces show the finished light map."""
-    return Sampling((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, cache, path_tracer.moment, unseen)
+    return Sampling((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, cache, path_tracer.moment)
 
 
 def dominant_direction(raw: Floats, irradiance: Floats, labels: Indices) -> NDArray[np.float16]:

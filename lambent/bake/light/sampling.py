@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.seams import blend_seams
+from lambent.bake.light.stitching import Cuts, stitched
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, independent, vectors
@@ -49,17 +50,15 @@ class Sampling:
     unseen: Sun | None = None
 
 
-def path_traced(samples: tuple[int, int], noise: float, max_depth: int, unseen: Sun | None = None) -> Sampling:
+def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
     """All bounces, for the whole scene."""
-    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)), unseen=unseen)
+    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
 
 
-def gathered(
-    samples: int, noise: float, max_depth: int, cache: path_tracer.Cache, unseen: Sun | None = None
-) -> Sampling:
+def gathered(samples: int, noise: float, max_depth: int, cache: path_tracer.Cache) -> Sampling:
     """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
     per_pass = max(1, min(GATHER_PASS, samples // 2))
-    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache, unseen=unseen)
+    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
 
 
 def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
@@ -147,12 +146,12 @@ def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:
     return mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1]))
 
 
-def finished(raw: Floats, texels: Texels, labels: Indices) -> tuple[Floats, dict[str, float]]:
+def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[Floats, dict[str, float]]:
     """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and its noise and samples, to note."""
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
     meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
-    return cleaned(halves.mean(axis=0), known, texels, labels), meta
+    return cleaned(halves.mean(axis=0), known, texels, labels, cuts), meta
 
 
 def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
@@ -161,10 +160,10 @@ def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
     return raw[..., :3] / np.maximum(count, 1), count[0, ..., 0] > 0
 
 
-def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices) -> NDArray[np.float16]:
-    """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended."""
+def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
+    """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended and closed."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
     clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
     clean = fill(blend_seams(clean, known, texels, labels), known, labels)
-    return np.minimum(clean, HALF_MAX).astype(np.float16)
+    return np.minimum(stitched(clean, cuts, labels), HALF_MAX).astype(np.float16)

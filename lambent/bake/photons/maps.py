@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.light.sampling import cleaned, relative_noise
+from lambent.bake.light.stitching import Cuts
 from lambent.bake.photons.density import Kernel, shares
 from lambent.bake.photons.shooting import learnt_sky, shoot
 from lambent.bake.surfaces.coverage import texel_areas
@@ -81,12 +82,14 @@ class PhotonMap:
         for i, kernel in enumerate(self._kernels):
             yield np.stack([kernel.irradiance(shot[half::2, i].mean(axis=0)) for half in (0, 1)]), kernel.known
 
-    def finished(self, batches: Floats, labels: Indices) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
+    def finished(
+        self, batches: Floats, labels: Indices, cuts: Cuts
+    ) -> list[tuple[NDArray[np.float16], dict[str, float]]]:
         """Per side the light map (H, W, 3), and its noise before denoising, of texels counted equally and by area."""
         maps = []
         for halves, known in self.halves(batches):
             noise = relative_noise(halves[:, known]), relative_noise(halves[:, known], self._shares[known])
-            clean = cleaned(halves.mean(axis=0), known, self.texels, labels)
+            clean = cleaned(halves.mean(axis=0), known, self.texels, labels, cuts)
             maps.append((clean, dict(zip(("noise", "noise_by_area"), noise, strict=True))))
         return maps
 

@@ -57,7 +57,7 @@ def shoot(
     sky : SkyPhotons, optional
         Draws the environment's photons; without, they start on a disc as large as the scene.
     unseen : Sun, optional
-        Whose photons count from their second surface on.
+        Whose photons count from their second surface on, clear glass that they pass straight through not counted.
     """
     sums = dr.zeros(mi.UInt64, int(np.prod(shape)) * 3)
     rng = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def shoot(
         ray, power, first = _emitted(scene, sampler, sky, unseen)
         count = partial(_count, sums, shape)
         power *= dr.opaque(mi.Float, scale)
-        _trace(scene, sampler, ray, power, count, max_bounces, rays.has_holes(scene), first)
+        _trace(scene, sampler, ray, power, count, max_bounces, rays.has_holes(scene), first, unseen)
         dr.eval(sums)
     return np.array(sums).astype(np.float64).reshape(*shape, 3) / (scale * photons)
 
@@ -149,11 +149,12 @@ def _from_environment(scene: Any, place: Any, direction: Any) -> tuple[Any, Any]
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0, unseen=None):  # type: ignore[no-untyped-def]
     width = dr.width(power)
     ray = mi.Ray3f(ray)
     power = mi.Color3f(power)
     bounces = dr.zeros(mi.UInt32, width)
+    straight = dr.full(mi.Bool, True, width)  # through clear glass alone, from the light
     active = dr.full(mi.Bool, True, width) & (dr.mean(power) > 0)
     ctx = mi.BSDFContext(mi.TransportMode.Importance)
     while active:
@@ -162,7 +163,7 @@ def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0):  #
         true_cosine = dr.dot(si.n, -ray.d)
         active &= true_cosine * si.wi.z > 0
         tilt = dr.minimum(dr.abs(si.wi.z) / dr.maximum(dr.abs(true_cosine), 1e-6), STEEPEST)
-        count(si, power * tilt * dr.select(bounces == 0, first, 1.0), true_cosine < 0, active)
+        count(si, power * tilt * dr.select(straight, first, 1.0), true_cosine < 0, active)
         active &= bounces < max_bounces
 
         sample, weight = si.bsdf(ray).sample(ctx, si, sampler.next_1d(active), sampler.next_2d(active), active)
@@ -174,6 +175,7 @@ def _trace(scene, sampler, ray, power, count, max_bounces, holes, first=1.0):  #
         active &= (sample.pdf > 0) & (true_out * sample.wo.z > 0) & dr.isfinite(survive)
         active &= sampler.next_1d(active) < survive
         power = dr.select(active, scattered / dr.maximum(survive, 1e-9), 0.0)
+        straight &= mi.Bool(False) if unseen is None else unseen.goes_on(si, sample.wo, active & straight)
         ray = rays.leaving(scene, si.p, si.n, direction)
         bounces += 1
 

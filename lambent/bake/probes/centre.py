@@ -43,22 +43,30 @@ def probe_centre(builder: SceneBuilder, name: str, without: Any, solids: SolidTe
 
 def centre_of(mesh: Mesh, middle: Floats, solids: SolidTest, without: Any) -> Floats:
     """The centre for a mesh of a scene with this middle, or for a part of one; `solids` are those of `without`."""
-    centre = _middle(mesh)
-    axis = flat_axis(mesh)
+    return _centre(mesh.positions, flat_axis(mesh), middle, solids, without)
+
+
+def centre_among(points: Floats, normals: Floats, middle: Floats, solids: SolidTest | None, without: Any) -> Floats:
+    """The same for points (n, 3), even over a surface of unit normals (n, 3); not moved out of solids without any."""
+    return _centre(points, _axis_of(normals, np.full(len(points), 1 / len(points))), middle, solids, without)
+
+
+def _centre(points: Floats, axis: Floats | None, middle: Floats, solids: SolidTest | None, without: Any) -> Floats:
+    centre = _middle(points)
     if axis is not None:
-        return _above(mesh, centre, axis, middle, without)
-    return _moved_out(centre, solids, without)
+        return _above(points, centre, axis, middle, without)
+    return centre if solids is None else _moved_out(centre, solids, without)
 
 
 def outside(mesh: Mesh, middle: Floats, whole: Any) -> Floats:
     """About where the probe of a mesh will stand, in the whole scene."""
     axis = flat_axis(mesh)
-    return _middle(mesh) if axis is None else _above(mesh, _middle(mesh), axis, middle, whole)
+    centre = _middle(mesh.positions)
+    return centre if axis is None else _above(mesh.positions, centre, axis, middle, whole)
 
 
-def _middle(mesh: Mesh) -> Floats:
-    low, high = (np.asarray(corner, float) for corner in mesh.bounds)
-    return np.asarray((low + high) / 2)
+def _middle(points: Floats) -> Floats:
+    return np.asarray((points.min(axis=0).astype(float) + points.max(axis=0)) / 2)
 
 
 def flat_axis(mesh: Mesh) -> Floats | None:
@@ -67,22 +75,26 @@ def flat_axis(mesh: Mesh) -> Floats | None:
     area = triangle_areas(corners)
     if area.sum() <= 0:
         return None
-    n = triangle_normals(corners)
-    values, vectors = np.linalg.eigh(np.einsum("t,ti,tj->ij", area / area.sum(), n, n))
+    return _axis_of(triangle_normals(corners), area / area.sum())
+
+
+def _axis_of(n: Floats, weights: Floats) -> Floats | None:
+    """Unit axis that most of the normals (k, 3), of these weights (k,), are along; None where there is none."""
+    values, vectors = np.linalg.eigh(n.T @ (weights[:, None] * n))
     return np.asarray(vectors[:, 2]) if values[2] > FLAT_SHARE else None
 
 
-def _above(mesh: Mesh, centre: Floats, axis: Floats, middle: Floats, without: Any) -> Floats:
+def _above(points: Floats, centre: Floats, axis: Floats, middle: Floats, without: Any) -> Floats:
     axis = axis if axis @ (middle - centre) >= 0 else -axis
-    top = centre + axis * ((mesh.positions - centre) @ axis).max()
-    size = float(np.ptp(mesh.positions, axis=0).max())
+    top = centre + axis * ((points - centre) @ axis).max()
+    size = float(np.ptp(points, axis=0).max())
     free = float(distances(without, rays_from(top + axis * CONTACT_M, axis[None]))[0])
     return np.asarray(top + axis * min(EYE_HEIGHT_M, size / 2, free / 2))
 
 
 def places_above(mesh: Mesh, middle: Floats, without: Any) -> Floats:
     """(n, 3) where the probe of a flat object may stand: over its middle, then over points all over it."""
-    axis, centre = flat_axis(mesh), _middle(mesh)
+    axis, centre = flat_axis(mesh), _middle(mesh.positions)
     if axis is None:
         return np.asarray(centre[None])
     steps = (np.arange(GRID) + 0.5) / GRID
@@ -90,7 +102,7 @@ def places_above(mesh: Mesh, middle: Floats, without: Any) -> Floats:
     flat = mesh.positions @ across
     at = flat.min(axis=0) + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * np.ptp(flat, axis=0)
     over = at @ across.T + axis * (axis @ centre)
-    return np.stack([_above(mesh, place, axis, middle, without) for place in (centre, *over)])
+    return np.stack([_above(mesh.positions, place, axis, middle, without) for place in (centre, *over)])
 
 
 def _moved_out(centre: Floats, solids: SolidTest, without: Any) -> Floats:

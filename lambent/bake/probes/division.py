@@ -1,11 +1,11 @@
 """Objects that one probe cannot stand for, cut into parts that have a probe each.
 
 The surface of an object sees points that are hidden from its probe. Where their share is above HIDDEN, the object is
-halved across the axis that leaves the least hidden, and so are its parts, if that lowers the share to WORTH of it. A
-face belongs to the half that its middle lies in, and is drawn with the probe of that part. Where viewers see the
-object, a cut is made only if it pays (`worth`): most that one probe misses is not seen, or blurred.
+halved across the axis that leaves the least hidden, and so are its parts, if that lowers the share to WORTH of it.
+Faces are cut along with it. Where viewers see the object, a cut is made only if it pays (`worth`): most of what one
+probe misses is not seen, or blurred. Near a cut the renderer mixes the light of both probes: parts carry their borders.
 
-Flat objects are left whole: planar reflectors show them.
+Flat objects are left whole: planar reflectors show them. So are objects with a light field.
 """
 
 from __future__ import annotations
@@ -19,11 +19,13 @@ import numpy as np
 from lambent.bake.artefacts.geometry import REVISION
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.surfaces.cutting import cut_across
 from lambent.bake.timing import Timed, untimed
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import triangle_areas
+from lambent.core.plain import quad
 from lambent.core.progress import Progress, silent
-from lambent.scenes.scene import Mesh, Scene, SceneObject
+from lambent.scenes.scene import Border, Mesh, Scene, SceneObject
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
 
@@ -31,11 +33,18 @@ if TYPE_CHECKING:
     from lambent.bake.tracing.scene_builder import SceneBuilder
     from lambent.bake.tracing.solids import SolidTest
 
+Cut = list[tuple[Border, ...]]  # the borders of each part, as `store.contract` has them
 PARTS = "parts"  # document: the cuts, and the key of everything they depend on
 HIDDEN = 0.2  # share above which one probe does not do
 WORTH = 0.85  # times the share: a cut that leaves more is not made
+SOFT = 0.5  # of the distance of the halves' middles: the width over which their probes are mixed
 DEPTH = 2  # cuts of cuts: at most four parts
 FACES = 24  # an object of fewer is left whole
+RAYS, LEAST_RAYS = 8192, 256  # from an object, and from each of its parts
+BURIED = 0.9  # share above which a centre may lie in a solid: of what is looked for from there, nothing is seen
+LEAST_RAD = 0.06  # that an object measures for the median viewer: smaller ones are left whole
+CERTAIN = 0.75  # of HIDDEN by few rays: of an object with less, too little is hidden
+MOST = 24  # objects that cuts are tried on, the largest
 
 
 def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untimed) -> Scene:
@@ -44,112 +53,151 @@ def divided(scene: Scene, store: Store, progress: Progress, timed: Timed = untim
     shiny = sorted(name for name, material in scene.materials.items() if needs_probe(material))
     clear = sorted(n for n, m in scene.materials.items() if m.transmits or n in scene.textures)
     worn = [o.material for o in scene.objects]
-    key = key_of("geometry", REVISION, "parts that pay", *geometry_inputs(scene), centres, shiny, clear, worn)
+    whole = [sorted(scene.light_fields)] if scene.light_fields else []  # keys of stores without any stay as they were
+    looks = [centres, shiny, clear, worn, *whole]
+    key = key_of("geometry", REVISION, "parts with borders", *geometry_inputs(scene), *looks)
     found = store.documents.get(PARTS)
     if not isinstance(found, dict) or found.get("key") != key:
         with timed(PARTS):
             found = {"key": key, "cuts": cuts_of(scene, progress)}
         store.set_document(PARTS, found)
-    return split(scene, found["cuts"]) if found["cuts"] else scene
+    return split(scene, {name: [tuple(map(quad, borders)) for borders in cut] for name, cut in found["cuts"].items()})
 
 
-def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, str]:
-    """By name of the objects to be cut, the digits of the parts of their faces. Deterministic."""
+def cuts_of(scene: Scene, progress: Progress = silent) -> dict[str, Cut]:
+    """By name of the objects that are cut, the borders of each of their parts. Deterministic."""
     shiny = [o for o in scene.objects if needs_probe(scene.materials[o.material]) and o.name not in scene.probe_centres]
-    shiny = [o for o in shiny if len(o.mesh.faces) >= FACES]
+    shiny = [o for o in shiny if len(o.mesh.faces) >= FACES and o.name not in scene.light_fields]
     if not shiny:
         return {}
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.centre import flat_axis
-    from lambent.bake.tracing.scene_builder import SceneBuilder
+    from lambent.bake.tracing.scene_builder import SceneBuilder, bare_scene
     from lambent.bake.tracing.solids import SolidTest
     from lambent.bake.tracing.visibility import viewing_places
 
     curved = [o for o in shiny if flat_axis(o.mesh) is None]
     if not curved:
         return {}
+    bare = bare_scene(scene.corners)
+    places = viewing_places(scene, bare)
+    tried = _worth_trying(scene, curved, bare, places)
+    if not tried:
+        return {}
     builder = SceneBuilder(scene)
-    solids = SolidTest(builder, None)
-    whole = builder.build()
-    places, cuts = viewing_places(scene, whole), {}
-    for i, o in enumerate(curved):
-        progress(i, len(curved), "what probes see")
-        pieces = _pieces_of(builder, o, solids, whole, places)
-        if len(pieces) > 1:
-            part = np.zeros(len(o.mesh.faces), int)
-            for number, faces in enumerate(pieces):
-                part[faces] = number
-            cuts[o.name] = "".join(map(str, part))
+    whole, solids, cuts = builder.build(), SolidTest(builder, None), dict[str, Cut]()
+    for i, o in enumerate(tried):
+        progress(i, len(tried), "what probes see")
+        cut = _cut_of(builder, o, solids, whole, places)
+        if len(cut) > 1:
+            cuts[o.name] = cut
     return cuts
 
 
-def _pieces_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: Any, places: Floats) -> list[Indices]:
-    """Faces of the object's parts; one where it stays whole. Viewers are at `places`, if there are any."""
-    from lambent.bake.probes.centre import centre_of
+def _worth_trying(scene: Scene, objects: list[SceneObject], bare: Any, places: Floats) -> list[SceneObject]:
+    """Those that viewers see large and of which much seems hidden from one probe, the MOST largest, in their order."""
+    from lambent.bake.probes.screening import hidden_shares, median_distances, widths
+
+    meshes = [o.mesh for o in objects]
+    size = widths(meshes)
+    large = np.arange(len(objects))
+    if len(places):
+        size /= np.maximum(median_distances(meshes, places), size)
+        large = np.flatnonzero(size > LEAST_RAD)
+    numbers = {o.name: number for number, o in enumerate(scene.objects)}
+    owner = np.repeat(np.arange(len(scene.objects)), [len(o.mesh.faces) for o in scene.objects])
+    hidden = hidden_shares(bare, owner, [meshes[i] for i in large], [numbers[objects[i].name] for i in large])
+    tried = large[hidden > CERTAIN * HIDDEN]
+    return [objects[i] for i in sorted(tried[np.argsort(-size[tried], kind="stable")][:MOST])]
+
+
+def _cut_of(builder: SceneBuilder, o: SceneObject, anywhere: SolidTest, whole: Any, places: Floats) -> Cut:
+    """The borders of the object's parts; of one where it stays whole. Viewers are at `places`, if there are any."""
+    from lambent.bake.probes.centre import centre_among, centre_of
     from lambent.bake.probes.hidden import hidden_share, seen_from, spread
     from lambent.bake.probes.worth import POINTS, pays, seen_in, small_probe
 
     without = builder.build(leave_out={o.name})
     solids, middle = anywhere.within(without), np.mean(builder.scene.bounds, axis=0)
+    points, normals = spread(o.mesh, RAYS)
+    surface = seen_from(points, normals, without)
 
-    def centre(part: Mesh) -> Floats:
-        return centre_of(part, middle, solids, without)
+    def share(mine: Flags) -> float:
+        """From the middle, or, where that seems to lie in a solid, from where it is moved out to."""
+        seen, part = surface.among(mine), (points[mine], normals[mine], middle)
+        hidden = hidden_share(seen, centre_among(*part, None, without), without)
+        return hidden if hidden < BURIED else hidden_share(seen, centre_among(*part, solids, without), without)
 
-    def share(faces: Indices) -> float:
-        part = sub_mesh(o.mesh, faces)
-        return hidden_share(seen_from(part, without), centre(part), without)
-
-    everything = np.arange(len(o.mesh.faces))
-    pieces = _cut(o.mesh, everything, share, DEPTH)[0]
-    if len(pieces) < 2 or not len(places):
-        return pieces
-    meshes = [sub_mesh(o.mesh, faces) for faces in pieces]
+    cut = _cut(points, np.ones(RAYS, bool), (), share, DEPTH)[0]
+    if len(cut) < 2 or not len(places):
+        return cut
+    meshes = parts_of(o.mesh, cut)
     areas = np.array([triangle_areas(mesh.corners).sum() for mesh in meshes])
     counts = np.ceil(POINTS * areas / areas.sum()).astype(int)
     material = builder.scene.materials[o.material]
     seen = [seen_in(*spread(m, n), places, material, whole) for m, n in zip(meshes, counts, strict=True)]
-    known = [(s, c) for s, c in ((s, centre(m)) for s, m in zip(seen, meshes, strict=True)) if s is not None]
+    known = [(s, centre_of(m, middle, solids, without)) for s, m in zip(seen, meshes, strict=True) if s is not None]
     if not known:
-        return [everything]
-    trials = [(small_probe(without, whole, c), c) for c in [centre(o.mesh), *(c for _, c in known)]]
-    return pieces if pays([s for s, _ in known], trials[1:], trials[0]) else [everything]
+        return [()]
+    centres = [centre_of(o.mesh, middle, solids, without), *(c for _, c in known)]
+    trials = [(small_probe(without, whole, c), c) for c in centres]
+    return cut if pays([s for s, _ in known], trials[1:], trials[0]) else [()]
 
 
-def _cut(mesh: Mesh, faces: Indices, share: Callable[[Indices], float], depth: int) -> tuple[list[Indices], float]:
-    """Faces in pieces, by the cuts that leave least hidden from their probes, and how much that is."""
-    whole = share(faces)
-    if depth == 0 or whole <= HIDDEN or len(faces) < FACES:
-        return [faces], whole
-    middles = mesh.positions[mesh.faces[faces]].mean(axis=1)
-    best, least = [faces], WORTH * whole
+def _cut(
+    points: Floats, mine: Flags, borders: tuple[Border, ...], share: Callable[[Flags], float], depth: int
+) -> tuple[Cut, float]:
+    """The part of a surface within `borders`, which has `mine` (n,) of its points (n, 3), in parts, and what they miss.
+
+    The cuts are those that leave the least `share` hidden.
+    """
+    hidden = share(mine)
+    if depth == 0 or hidden <= HIDDEN:
+        return [borders], hidden
+    best, least = [borders], WORTH * hidden
     for axis in range(3):
-        lower = middles[:, axis] < (middles[:, axis].min() + middles[:, axis].max()) / 2
-        if lower.all() or not lower.any():
+        low, high = float(points[mine, axis].min()), float(points[mine, axis].max())
+        lower = points[:, axis] < (low + high) / 2
+        if min((mine & lower).sum(), (mine & ~lower).sum()) < LEAST_RAYS:
             continue
-        halves = [_cut(mesh, half, share, depth - 1) for half in (faces[lower], faces[~lower])]
-        left = float(np.average([hidden for _, hidden in halves], weights=[lower.sum(), (~lower).sum()]))
+        a, b, c, d = (np.append(np.eye(3)[axis], -(low + high) / 2) / (SOFT * (high - low) / 2)).tolist()
+        sides = (lower, (-a, -b, -c, -d)), (~lower, (a, b, c, d))
+        halves = [_cut(points, mine & side, (*borders, border), share, depth - 1) for side, border in sides]
+        left = float(np.average([missed for _, missed in halves], weights=[(mine & side).sum() for side, _ in sides]))
         if left < least:
-            best, least = [piece for pieces, _ in halves for piece in pieces], left
-    return best, least if len(best) > 1 else whole
+            best, least = [part for parts, _ in halves for part in parts], left
+    return best, least if len(best) > 1 else hidden
 
 
-def split(scene: Scene, cuts: Mapping[str, str]) -> Scene:
+def split(scene: Scene, cuts: Mapping[str, Cut]) -> Scene:
     """The scene with objects in the parts of `cuts_of`; `Scene.parts` maps each to its whole."""
-    cut = {o.name: _parts_of(o, cuts[o.name]) for o in scene.objects if o.name in cuts}
-    if not cut:
+    if not cuts:
         return scene
+    cut = {o.name: _objects_of(o, cuts[o.name]) for o in scene.objects if o.name in cuts}
     objects = tuple(part for o in scene.objects for part in cut.get(o.name, (o,)))
     owners = {part.name: name for name, parts in cut.items() for part in parts}
     planes = {part: scene.probe_planes[owner] for part, owner in owners.items() if owner in scene.probe_planes}
     rules = (rule for r in scene.reflector_rules for rule in (r, replace(r, objects=f"{r.objects}.part*")))
-    planes = {**scene.probe_planes, **planes}
-    return replace(scene, objects=objects, parts=owners, probe_planes=planes, reflector_rules=tuple(rules))
+    borders = {part.name: own for name, parts in cut.items() for part, own in zip(parts, cuts[name], strict=True)}
+    return replace(
+        scene, objects=objects, parts=owners, borders=borders, probe_planes={**scene.probe_planes, **planes},
+        reflector_rules=tuple(rules),
+    )  # fmt: skip
 
 
-def _parts_of(o: SceneObject, digits: str) -> tuple[SceneObject, ...]:
-    part = np.array(list(digits), int)
-    meshes = (sub_mesh(o.mesh, np.flatnonzero(part == number)) for number in range(part.max() + 1))
+def _objects_of(o: SceneObject, cut: Cut) -> tuple[SceneObject, ...]:
+    meshes = parts_of(o.mesh, cut)
     return tuple(replace(o, name=f"{o.name}.part{i}", mesh=mesh) for i, mesh in enumerate(meshes, 1))
+
+
+def parts_of(mesh: Mesh, cut: Cut) -> list[Mesh]:
+    """The mesh cut along the borders of its parts, which leaves no faces that belong to two of them."""
+    for plane in dict.fromkeys(max(border, quad(-x for x in border)) for borders in cut for border in borders):
+        mesh = cut_across(mesh, plane)
+    middles = np.concatenate([mesh.corners.mean(axis=1), np.ones((len(mesh.faces), 1))], axis=1)
+    inside = np.stack([(middles @ np.array(borders).reshape(-1, 4).T).min(axis=1, initial=np.inf) for borders in cut])
+    part = inside.argmax(axis=0)
+    return [sub_mesh(mesh, np.flatnonzero(part == number)) for number in range(len(cut))]
 
 
 def family(parts: Mapping[str, str], name: str) -> set[str]:

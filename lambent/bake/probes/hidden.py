@@ -32,10 +32,13 @@ class Seen:
     hits: Floats
     valid: Flags
 
+    def among(self, mine: Flags) -> Seen:
+        """Those of them that are `mine` (n,)."""
+        return Seen(self.origins[mine], self.directions[mine], self.hits[mine], self.valid[mine])
 
-def seen_from(mesh: Mesh, without: Any, count: int = RAYS) -> Seen:
-    """Cosine distributed rays from points evenly spread over a mesh; `without` is the Mitsuba scene without it."""
-    points, normals = spread(mesh, count)
+
+def seen_from(points: Floats, normals: Floats, without: Any) -> Seen:
+    """Cosine distributed rays from points (n, 3) of unit normals (n, 3), all over a surface that `without` lacks."""
     directions = cosine_directions(normals)
     return seen_along(array_of(leaving(without, points, normals, directions).o).astype(float), directions, without)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lambent.bake.probes.centre import encloses, flat_axis, places_above, probe_centre
 from lambent.bake.probes.division import HIDDEN, family
+from lambent.bake.probes.hidden import RAYS as HIDDEN_RAYS
 from lambent.bake.probes.hidden import hidden_share, parallax_deg, seen_along, seen_from, spread
 from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import MIRROR_DEPTH, Surroundings, bake_probe
@@ -144,7 +145,7 @@ class ProbeSet:
             if found.scales:
                 meta["seen_irradiance"] = [float(value) for value in found.irradiance]
         if rays is None:
-            of_surface = seen_from(self._scene.object(name).mesh, seen)
+            of_surface = seen_from(*spread(self._scene.object(name).mesh, HIDDEN_RAYS), seen)
         else:
             of_surface = seen_along(rays.origins, rays.directions, seen)
         meta["hidden_share"] = round(hidden_share(of_surface, centre, seen), 3)

@@ -28,8 +28,9 @@ from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import array_of, independent, leaving, rays_from, towards
 from lambent.core.arrays import Flags, Floats
 from lambent.core.colour import luminance
-from lambent.core.cubemap import face_directions, sample, texel_solid_angles
-from lambent.core.directions import normalize, reflect
+from lambent.core.cubemap import sample
+from lambent.core.directions import basis, normalize, reflect
+from lambent.core.irradiance import basis_of, irradiance_of
 from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.materials.document import Material
 from lambent.materials.lobes import fresnel
@@ -41,9 +42,6 @@ TRIES = 8  # viewers that are tried for each point
 GRAZING = 0.05  # least cosine of a viewer
 OWN = 0.15
 WORTH = 0.85
-# E(n) of radiance up to the second band is a sum over BASIS of n (Ramamoorthi & Hanrahan 2001, eq. 10): the weight of
-# each is the cosine lobe's coefficient times the square of the harmonic's norm.
-WEIGHTS = np.array([1 / 4, 1 / 2, 1 / 2, 1 / 2, 15 / 16, 15 / 16, 5 / 64, 15 / 16, 15 / 64])
 
 
 @dataclass(frozen=True)
@@ -79,17 +77,36 @@ def mirrored(
     view = normalize(eyes[found] - at)
     directions = -view if material.transmits else reflect(view, n)
     ray = leaving(scene, at, n, directions)
-    sampler = independent(seed & 0xFFFFFFFF, len(at))
-    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), depth, cache)
-    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
+    radiance = light_along(scene, ray, depth, cache, seed)
     met = scene.ray_intersect_preliminary(ray).shape
     own = np.isin(np.array(dr.reinterpret_array(mi.UInt32, met)), family)
     below = scene.ray_intersect(rays_from(array_of(leaving(scene, at, n, n).o), -n))
     irradiance = array_of(cache.irradiance(below, below.is_valid())).astype(float)
     r0 = max((float(np.mean(lobe.r0)) for lobe in material.lobes), default=1.0)
     share = np.asarray(fresnel(np.abs((view * n).sum(axis=1)), r0))
-    origins, radiance = array_of(ray.o).astype(float), array_of(value).astype(float)
-    return Mirrored(origins, directions, n, radiance, luminance(irradiance), share, own)
+    return Mirrored(array_of(ray.o).astype(float), directions, n, radiance, luminance(irradiance), share, own)
+
+
+def widest_lobe(material: Material) -> float:
+    """Roughness sqrt(mx my) of a material's widest lobe; 0 without lobes."""
+    return max(((lobe.mx * lobe.my) ** 0.5 for lobe in material.lobes), default=0.0)
+
+
+def spread_mirrored(view: Floats, n: Floats, roughness: float, spread: int, rng: np.random.Generator) -> Floats:
+    """(k, spread, 3) directions above surfaces of normals n (k, 3), mirrored in facets of Beckmann slopes."""
+    t, b = basis(n)
+    slope = roughness / np.sqrt(2) * rng.standard_normal((2, len(n), spread, 1))
+    facet = normalize(n[:, None] + slope[0] * t[:, None] + slope[1] * b[:, None])
+    w = reflect(np.broadcast_to(view[:, None], facet.shape), facet)
+    below = np.minimum((w * n[:, None]).sum(axis=-1, keepdims=True), 0)
+    return np.asarray(w - 2 * below * n[:, None])
+
+
+def light_along(scene: Any, ray: Any, depth: int, cache: LightMapCache | None, seed: int) -> Floats:
+    """Radiance (k, 3) of one path along each ray; one that is not finite counts as black."""
+    sampler = independent(seed & 0xFFFFFFFF, dr.width(ray.o))
+    value = path_tracer.radiance(scene, sampler, path_tracer.camera_start(ray), depth, cache)
+    return array_of(dr.select(dr.all(dr.isfinite(value)), value, 0.0)).astype(float)
 
 
 def together(found: list[Mirrored]) -> Mirrored | None:
@@ -122,10 +139,14 @@ def _free(scene: Any, points: Floats, normals: Floats, eyes: Floats) -> Flags:
 
 
 def error(rays: Mirrored, looked_up: Floats) -> float:
-    """Mean difference of luminances (n,) to those of the rays, in log(1 + L/m), m the median, as the eye sees it."""
-    true, shown = luminance(rays.radiance) * rays.fresnel, looked_up * rays.fresnel
+    """Mean difference of luminances (n,) to those of the rays."""
+    return float(difference(looked_up * rays.fresnel, luminance(rays.radiance) * rays.fresnel).mean())
+
+
+def difference(shown: Floats, true: Floats) -> Floats:
+    """Differences (n,) of luminances (n,) in log(1 + L/m), m the median of the true ones, as the eye sees them."""
     m = max(float(np.median(true)), 1e-6)
-    return float(np.abs(np.log1p(shown / m) - np.log1p(true / m)).mean())
+    return np.asarray(np.abs(np.log1p(shown / m) - np.log1p(true / m)))
 
 
 def by_planes(rays: Mirrored, radiance: Floats, centre: Floats, planes: Floats) -> Floats:
@@ -140,20 +161,6 @@ def by_distance(rays: Mirrored, radiance: Floats, centre: Floats, distance: Floa
 
 def _found(radiance: Floats, directions: Floats) -> Floats:
     return np.asarray(luminance(sample(radiance.astype(float), normalize(directions))))
-
-
-def basis_of(n: Floats) -> Floats:
-    """(..., 9) products of the components of unit vectors that WEIGHTS belong to."""
-    x, y, z = n[..., 0], n[..., 1], n[..., 2]
-    return np.stack([np.ones_like(x), x, y, z, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y], axis=-1)
-
-
-def irradiance_of(radiance: Floats) -> Floats:
-    """Luminance of the irradiance that a cube of radiance (6, N, N, 3) gives, as a sum (9,) over `basis_of` normals."""
-    n = radiance.shape[1]
-    w = normalize(face_directions(n)).reshape(-1, 3)
-    weighted = luminance(radiance.astype(float)).reshape(-1) * np.broadcast_to(texel_solid_angles(n), (6, n, n)).ravel()
-    return np.asarray(WEIGHTS * (weighted @ basis_of(w)))
 
 
 def specular_occlusion(rays: Mirrored, irradiance: Floats) -> Floats:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from lambent.bake.probes.centre import outside
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.probes.hidden import SHORT, spread
-from lambent.bake.probes.selection import viewers_of
+from lambent.bake.probes.selection import viewers_of, widest_lobe
 from lambent.bake.tracing.rays import leaving, rays_from
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
@@ -82,8 +82,7 @@ def shared(builder: SceneBuilder, whole: Any, places: Floats, names: Collection[
     clear = np.array([scene.materials[scene.object(name).material].transmits for name in names])
     alone = np.array([any(scene.object(name).emission) for name in names])  # left out, a lamp would be missed
     pairs = pairs[(clear[pairs[:, 0]] == clear[pairs[:, 1]]) & ~given[pairs[:, 0]] & ~alone[pairs].any(axis=1)]
-    lobes = [scene.materials[scene.object(name).material].lobes for name in names]
-    blur = np.array([max(((lobe.mx * lobe.my) ** 0.5 for lobe in mine), default=0.0) for mine in lobes])
+    blur = np.array([widest_lobe(scene.materials[scene.object(name).material]) for name in names])
     one, other = pairs.T
     close = np.linalg.norm(centres[one] - centres[other], axis=1) < NEAR * looked.reach[one]
     pairs = pairs[(one != other) & close & (looked.size[one] < SMALL + blur[one])]

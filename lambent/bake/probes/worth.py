@@ -10,18 +10,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
 import numpy as np
 
 from lambent.bake.probes.planes import bounding_planes
 from lambent.bake.probes.probe import Probe, Surroundings, bake_probe
-from lambent.bake.probes.selection import TRIAL_TEXELS, WORTH, viewers_of
-from lambent.bake.tracing import path_tracer
-from lambent.bake.tracing.rays import array_of, independent, leaving
+from lambent.bake.probes.selection import (
+    TRIAL_TEXELS,
+    WORTH,
+    difference,
+    light_along,
+    spread_mirrored,
+    viewers_of,
+    widest_lobe,
+)
+from lambent.bake.tracing.rays import array_of, leaving
 from lambent.core.arrays import Floats
 from lambent.core.colour import luminance
 from lambent.core.cubemap import sample
-from lambent.core.directions import basis, normalize, reflect
+from lambent.core.directions import normalize
 from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.materials.document import Material
 
@@ -47,26 +53,19 @@ def seen_in(points: Floats, normals: Floats, places: Floats, material: Material,
     found, eyes = viewers_of(points, normals, places, whole, rng)
     if found.sum() < LEAST:
         return None
-    at, n, view = (np.repeat(a[found], SPREAD, axis=0) for a in (points, normals, normalize(eyes - points)))
-    widest = max(((lobe.mx * lobe.my) ** 0.5 for lobe in material.lobes), default=0.0)
-    t, b = basis(n)
-    slope = widest / np.sqrt(2) * rng.standard_normal((2, len(n), 1))
-    facet = normalize(n + slope[0] * t + slope[1] * b)
-    w = -view if material.transmits else reflect(view, facet)
-    below = (w * n).sum(axis=1, keepdims=True)
-    if not material.transmits:
-        w = w - 2 * np.minimum(below, 0) * n
-    ray = leaving(whole, at, n, w)
-    light = path_tracer.radiance(whole, independent(1, len(at)), path_tracer.camera_start(ray), DEPTH)
-    value = luminance(array_of(dr.select(dr.all(dr.isfinite(light)), light, 0.0)).astype(float))
-    origins = array_of(ray.o).astype(float)
-    shape = (-1, SPREAD, 3)
-    return Seen(origins.reshape(shape), w.reshape(shape), value.reshape(-1, SPREAD).mean(axis=1))
+    at, n, view = points[found], normals[found], normalize(eyes[found] - points[found])
+    if material.transmits:
+        w = np.repeat(-view[:, None], SPREAD, axis=1)
+    else:
+        w = spread_mirrored(view, n, widest_lobe(material), SPREAD, rng)
+    ray = leaving(whole, np.repeat(at, SPREAD, axis=0), np.repeat(n, SPREAD, axis=0), w.reshape(-1, 3))
+    light = luminance(light_along(whole, ray, DEPTH, None, 1))
+    return Seen(array_of(ray.o).astype(float).reshape(w.shape), w, light.reshape(-1, SPREAD).mean(axis=1))
 
 
 def small_probe(first: Any, whole: Any, centre: Floats) -> Probe:
     """A probe for a trial; `first` is the scene that it sees itself."""
-    return bake_probe(Surroundings(first, whole, None, DEPTH), centre, TRIAL_TEXELS, SAMPLES, 0, noise=1.0)
+    return bake_probe(Surroundings(first, whole, None, DEPTH), centre, TRIAL_TEXELS, SAMPLES, 0, noise=np.inf)
 
 
 def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:
@@ -74,12 +73,10 @@ def differences(seen: Seen, probe: Probe, centre: Floats) -> Floats:
     origins, w = (seen.origins - centre).reshape(-1, 3), seen.directions.reshape(-1, 3)
     planes = bounding_planes(probe.distance, probe.normals).astype(float)
     ways = planes_lookup(origins, w, planes), distance_lookup(origins, w, inverse_depth(probe.distance.astype(float)))
-    scale = max(float(np.median(seen.light)), 1e-6)
     errors = []
     for directions in ways:
         found = luminance(sample(probe.radiance.astype(float), normalize(directions)))
-        shown = found.reshape(-1, SPREAD).mean(axis=1)
-        errors.append(np.abs(np.log1p(shown / scale) - np.log1p(seen.light / scale)))
+        errors.append(difference(found.reshape(-1, SPREAD).mean(axis=1), seen.light))
     return np.asarray(min(errors, key=lambda error: float(error.mean())))
 
 

@@ -116,11 +116,11 @@ class SkyGuide:
         return dr.gather(mi.Float, self._share, table * BINS + number, active) * density
 
 
-def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> SkyGuide | None:
+def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False, panes: bool = False) -> SkyGuide | None:
     """The guide of a scene, None where no group needs a table. Deterministic.
 
     `whole` is the scene as it is traced (mi.Scene), `sky` its environment (mi.Emitter). With `keep_open`, groups that
-    see most of their sky have tables, too.
+    see most of their sky have tables, too; with `panes`, clear glass passes the sky straight on.
     """
     bins = SkyBins(sky)
     if not bins.luminance.any():
@@ -128,7 +128,7 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> Sky
     size_m = CELL_M
     while True:
         groups = groups_of(scene, size_m)
-        pre_pass = _PrePass(whole, bins, _both_sides(whole, *_points_and_normals(scene, SURFACE_POINTS)), groups)
+        pre_pass = _PrePass(whole, bins, _both_sides(whole, *_points_and_normals(scene, SURFACE_POINTS)), groups, panes)
         if len(pre_pass.group) <= 4 * MOST_TABLES:
             break
         size_m = groups.size_m * 1.5
@@ -154,8 +154,10 @@ def learn(scene: Scene, whole: Any, sky: Any, *, keep_open: bool = False) -> Sky
 class _PrePass:
     """Points by group, and rays from them."""
 
-    def __init__(self, whole: Any, bins: SkyBins, points: tuple[Floats, Floats, Flags], groups: Groups) -> None:
-        self._whole, self._bins, self._holes = whole, bins, rays.has_holes(whole)
+    def __init__(
+        self, whole: Any, bins: SkyBins, points: tuple[Floats, Floats, Flags], groups: Groups, panes: bool
+    ) -> None:
+        self._whole, self._bins, self._holes, self._panes = whole, bins, rays.has_holes(whole), panes
         position, normal, crossed = points
         number = np.array(groups.of(vectors(mi.Point3f, position), vectors(mi.Vector3f, normal)))
         order = np.argsort(number, kind="stable")
@@ -188,11 +190,15 @@ class _PrePass:
         w = self._bins.direction(bins, sampler.next_2d())
         p = dr.gather(mi.Point3f, vectors(mi.Point3f, self._position[which]), place)
         n = dr.gather(mi.Vector3f, vectors(mi.Vector3f, self._normal[which]), place)
-        dark = rays.in_shadow(self._whole, rays.leaving(self._whole, p, n, w), mi.Bool(True), self._holes)
+        ray = rays.leaving(self._whole, p, n, w)
+        if self._panes:
+            seen = mi.luminance(rays.passed(self._whole, ray, mi.Bool(True)))
+        else:
+            seen = dr.select(rays.in_shadow(self._whole, ray, mi.Bool(True), self._holes), 0.0, 1.0)
         crossed = dr.gather(mi.Bool, mi.Bool(self._crossed[which].ravel()), place)
         cosine = dr.dot(w, n)
         cosine = dr.select(crossed, dr.abs(cosine), dr.maximum(cosine, 0.0))
-        return np.array(dr.select(dark, 0.0, cosine)).reshape(len(which), count)
+        return np.array(seen * cosine).reshape(len(which), count)
 
     def sees_most(self, brought: Floats) -> Flags:
         """Groups that see most of the light of the hemisphere that they face."""

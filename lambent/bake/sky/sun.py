@@ -6,7 +6,7 @@ of the light map is exactly the light that the renderer adds again, whatever dis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +17,8 @@ from lambent.core.colour import luminance
 from lambent.core.directions import normalize
 from lambent.core.latlong import lat_long_direction
 from lambent.core.plain import triple
-from lambent.scenes.scene import DirectionalLight, Environment, Scene
+from lambent.scenes.panes import panes_of
+from lambent.scenes.scene import DirectionalLight, Environment, Light, Scene
 from lambent.store.contract import SunRecord
 
 BRIGHT = 8.0  # times the mean radiance: less is no sun
@@ -55,15 +56,29 @@ def sun_of(scene: Scene) -> FoundSun | None:
     suns = [FoundSun(_of_lights(light, lights)) for light in lights]
     if scene.environment is not None and (found := _of_environment(scene.environment)) is not None:
         suns.append(found)
-    return max(suns, key=lambda one: float(luminance(np.array(one.record.irradiance))), default=None)
+    brightest = max(suns, key=lambda one: float(luminance(np.array(one.record.irradiance))), default=None)
+    if brightest is None:
+        return None
+    return replace(brightest, record=brightest.record.model_copy(update={"panes": panes_of(scene)}))
 
 
 def _of_lights(light: DirectionalLight, lights: list[DirectionalLight]) -> SunRecord:
     """The sun that a light is, with all that shine along it."""
-    towards = [-normalize(np.asarray(one.direction, float)) for one in (light, *lights)]
-    along = [one for one, w in zip(lights, towards[1:], strict=True) if w @ towards[0] > 1 - ALIGNED]
+    towards = -normalize(np.asarray(light.direction, float))
+    along = [one for one in lights if _is_along(one, towards)]
     irradiance = np.sum([one.irradiance for one in along], axis=0)
-    return SunRecord(direction=triple(towards[0]), irradiance=triple(irradiance), radius_rad=0.0)
+    return SunRecord(direction=triple(towards), irradiance=triple(irradiance), radius_rad=0.0)
+
+
+def is_sun(light: Light, found: FoundSun) -> bool:
+    """Whether a light of the scene is a part of its sun."""
+    if found.picture is not None or not isinstance(light, DirectionalLight):
+        return False
+    return _is_along(light, np.array(found.record.direction))
+
+
+def _is_along(light: DirectionalLight, towards: Floats) -> bool:
+    return bool(-normalize(np.asarray(light.direction, float)) @ towards > 1 - ALIGNED)
 
 
 @lru_cache(maxsize=4)

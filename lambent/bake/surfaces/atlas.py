@@ -53,10 +53,12 @@ def unwrap(
     local, measures = zip(*(snapped(chart.corners) for chart in charts), strict=True)
     places, (width, height) = packed(list(local), list(measures))
     placed = [(corners + place) / (width, height) for corners, place in zip(local, places, strict=True)]
+    of_each: list[list[tuple[Chart, Floats]]] = [[] for _ in scene.objects]
+    for chart, uv in zip(charts, placed, strict=True):
+        of_each[chart.owner].append((chart, uv))
     uv2: dict[str, Floats] = {}
     objects = []
-    for owner, o in enumerate(scene.objects):
-        mine = [(chart, uv) for chart, uv in zip(charts, placed, strict=True) if chart.owner == owner]
+    for o, mine in zip(scene.objects, of_each, strict=True):
         mesh, uv2[o.name] = _split(o.mesh, mine)
         objects.append(replace(o, mesh=mesh))
     progress(1, 1, "unwrapping")
@@ -65,8 +67,8 @@ def unwrap(
 
 def areas_of(scene: Scene, pieces: list[Piece]) -> Floats:
     """(N,) square metres of pieces."""
-    corners = [scene.objects[piece.owner].mesh.corners for piece in pieces]
-    return np.array([triangle_areas(c[p.faces].astype(float)).sum() for c, p in zip(corners, pieces, strict=True)])
+    meshes = [scene.objects[piece.owner].mesh for piece in pieces]
+    return np.array([triangle_areas(mesh.corners_of(p.faces)).sum() for mesh, p in zip(meshes, pieces, strict=True)])
 
 
 def scales_of(scene: Scene, pieces: list[Piece]) -> Floats:
@@ -131,6 +133,7 @@ def object_records(scene: Scene) -> tuple[ObjectRecord, ...]:
         records.append(ObjectRecord(
             name=o.name, material=o.material, first_face=first, face_count=len(o.mesh.faces), emission=o.emission,
             bounds=(triple(low), triple(high)), probe=needs_probe(scene.materials[o.material]),
+            part_of=scene.parts.get(o.name, ""), borders=scene.borders.get(o.name, ()),
         ))  # fmt: skip
         first += len(o.mesh.faces)
     return tuple(records)

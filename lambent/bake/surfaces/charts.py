@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xatlas
 
+from lambent.bake.surfaces.layers import in_first_layer, layers_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
@@ -26,7 +27,10 @@ FLAT_DEG = 25.0  # between its normals and their mean, as long as a chart is mer
 SLIM = 0.35  # share of the texels it takes that a chart lies on, below which it may be merged, too
 ANGLES = np.arange(8) * np.pi / 16  # that charts are turned by, to take fewer texels
 LONGEST = 24.0  # texels: a merged chart with a longer side is halved even where that takes a little more...
+STRETCH = 2.5  # texels of surface that one of a chart by xatlas is long at most
 TRIED = 1.03  # ...up to this, because halves of halves may take less
+MANY = 4096  # faces of a merged chart that is not turned to find what it costs
+FEWEST = 4.0  # texels that a chart takes at least
 MIXED = 0.1  # texels that one texel is worth whose faces are mixed over a depth of one texel
 
 
@@ -76,8 +80,10 @@ def charts_of(objects: tuple[SceneObject, ...], pieces: list[Piece], sizes_m: Fl
     """Charts of all faces; `sizes_m` (N,) is the size of a texel on each piece, in metres."""
     unwrapped = _unwrapped(objects, pieces)
     charts = []
-    for owner, o in enumerate(objects):
-        mine = [i for i, piece in enumerate(pieces) if piece.owner == owner]
+    pieces_of_each: list[list[int]] = [[] for _ in objects]
+    for i, piece in enumerate(pieces):
+        pieces_of_each[piece.owner].append(i)
+    for owner, (o, mine) in enumerate(zip(objects, pieces_of_each, strict=True)):
         size = np.zeros(len(o.mesh.faces))
         for i in mine:
             size[pieces[i].faces] = sizes_m[i]
@@ -114,7 +120,11 @@ def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece]) -> list[tu
 
 
 def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], size_m: float, first: int) -> list[Chart]:
-    """The charts of a piece, its vertices counted from `first`. Charts without area have no corners (K, 0, 2)."""
+    """The charts of a piece, its vertices counted from `first`.
+
+    Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
+    corners (K, 0, 2).
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -124,16 +134,28 @@ def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], siz
     shape = (len(vertex_of), len(vertex_of))
     graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=shape)
     label = connected_components(graph, directed=False)[1][indices[:, 0]]
-    corners = _in_metres(mesh.positions[mesh.faces[piece.faces]].astype(float), uv[indices].astype(float), label)
-    order = np.argsort(label, kind="stable")
+    world = mesh.corners_of(piece.faces) / size_m
+    corners = _in_texels(world, uv[indices].astype(float), label)
+    lost = ~np.isfinite(corners).all(axis=(1, 2)) | _is_stretched(world, corners)
     charts = []
-    for mine in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
-        here = corners[mine] / size_m if np.isfinite(corners[mine]).all() else np.zeros((len(mine), 0, 2))
-        charts.append(Chart(piece.owner, piece.faces[mine], here, first + indices[mine]))
+    for mine in _groups(np.where(lost, -1, label)):
+        if not lost[mine[0]]:
+            kept = mine
+            while not (inside := in_first_layer(corners[kept], world[kept])).all():  # a smaller chart lies anew
+                kept = kept[inside]
+            lost[np.setdiff1d(mine, kept)] = True
+            charts.append(Chart(piece.owner, piece.faces[kept], corners[kept], first + indices[kept]))
+    charts.append(Chart(piece.owner, piece.faces[lost], np.zeros((lost.sum(), 0, 2)), first + indices[lost]))
     return charts
 
 
-def _in_metres(world: Floats, uv: Floats, label: Indices) -> Floats:
+def _groups(label: Indices) -> list[Indices]:
+    """Numbers of the faces of each label (F,)."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def _in_texels(world: Floats, uv: Floats, label: Indices) -> Floats:
     """Corners (F, 3, 2) of charts as long as the triangles (F, 3, 3) are, by least squares; NaN where that fails.
 
     xatlas fits small charts into whole texels of its own, each axis by itself: lengths^2 = a du^2 + b dv^2.
@@ -161,6 +183,12 @@ def _in_metres(world: Floats, uv: Floats, label: Indices) -> Floats:
     return np.asarray(uv * scale[label][:, None])
 
 
+def _is_stretched(world: Floats, corners: Floats) -> Flags:
+    """Which triangles (F, 3, 3) have an edge much longer than on the chart (F, 3, 2), both in texels."""
+    length, on_chart = (np.linalg.norm(np.roll(a, -1, axis=1) - a, axis=2) for a in (world, corners))
+    return np.asarray(((length > 1) & (length > STRETCH * on_chart)).any(axis=1))
+
+
 def texels_taken(extents: Floats) -> Floats:
     """Texels of rectangles (..., 2) as they are packed: sides are a texel long at least."""
     return np.asarray((np.maximum(extents, 1) + 1).prod(axis=-1))
@@ -183,46 +211,58 @@ def _turns(angles: Floats) -> Floats:
 
 def _merged(mesh: Mesh, owner: int, charts: list[Chart], size_m: Floats) -> list[Chart]:
     """Charts of an object, small ones merged where that takes fewer texels."""
-    kept, small, lost, taken = [], [], [], 0.0
-    for chart in charts:
-        if not chart.corners.size:
-            lost.append(chart.faces)
-            continue
-        edge = chart.corners - chart.corners[:, :1]
-        area = float(np.abs(cross_2d(edge[:, 1], edge[:, 2])).sum() / 2)
-        here = float(texels_taken(np.ptp(chart.corners.reshape(-1, 2), axis=0)))
-        if (area < SMALL or area < SLIM * here) and _is_flat(mesh, chart.faces):
-            small.append(chart)
-            taken += here
-        else:
-            kept.append(chart)
+    lost = np.concatenate([chart.faces for chart in charts if not chart.corners.size])
+    kept = [chart for chart in charts if chart.corners.size]
+    is_small, taken = _small(mesh, kept)
+    small = [chart for chart, one in zip(kept, is_small, strict=True) if one]
+    kept = [chart for chart, one in zip(kept, is_small, strict=True) if not one]
     if small:
         merged = _by_direction(mesh, owner, np.concatenate([chart.faces for chart in small]), size_m, 1)
         extents = np.array([np.ptp(chart.corners.reshape(-1, 2), axis=0) for chart in merged])
         kept += merged if texels_taken(extents).sum() < taken else small
-    if lost:
-        kept += _by_direction(mesh, owner, np.concatenate(lost), size_m, 2 + len(charts))
-    return kept
+    return kept + _by_direction(mesh, owner, lost, size_m, 1 + len(kept))
 
 
-def _is_flat(mesh: Mesh, faces: Indices) -> bool:
-    """Whether all these faces look almost one way: on rounded things, seams along six directions would be seen."""
-    vectors = area_vectors(mesh.positions[mesh.faces[faces]].astype(float))
-    return bool((normalize(vectors) @ normalize(vectors.sum(axis=0)) > np.cos(np.radians(FLAT_DEG))).all())
+def _small(mesh: Mesh, charts: list[Chart]) -> tuple[Flags, float]:
+    """Which charts are better merged (N,), and the texels that these take.
+
+    All faces of one look almost one way: on rounded things, seams along six directions would be seen.
+    """
+    if not charts:
+        return np.zeros(0, bool), 0.0
+    counts = [len(chart.faces) for chart in charts]
+    starts = np.cumsum([0, *counts[:-1]])
+    corners, faces = (np.concatenate(a) for a in zip(*((c.corners, c.faces) for c in charts), strict=True))
+    edge = corners - corners[:, :1]
+    area = np.add.reduceat(np.abs(cross_2d(edge[:, 1], edge[:, 2])) / 2, starts)
+    low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
+    here = texels_taken(high - low)
+    vectors = area_vectors(mesh.corners_of(faces))
+    mean = np.repeat(normalize(np.add.reduceat(vectors, starts)), counts, axis=0)
+    flat = np.minimum.reduceat((normalize(vectors) * mean).sum(axis=1), starts) > np.cos(np.radians(FLAT_DEG))
+    small = ((area < SMALL) | (area < SLIM * here)) & flat
+    return small, float(here[small].sum())
 
 
 def _by_direction(mesh: Mesh, owner: int, faces: Indices, size_m: Floats, first: int) -> list[Chart]:
     """Merged charts of some faces; vertices of different `first` differ. `size_m` (F,) is of all faces."""
-    corners, size_m = mesh.positions[mesh.faces[faces]].astype(float), size_m[faces]
+    corners, size_m = mesh.corners_of(faces).astype(float), size_m[faces]
     normals, areas = triangle_normals(corners), triangle_areas(corners)
-    axis = np.abs(normals).argmax(axis=1)
+    axis = np.where(areas > 0, np.abs(normals).argmax(axis=1), np.ptp(corners, axis=1).argmin(axis=1))
     towards = 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0)
     charts: list[Chart] = []
     for direction in np.unique(towards):
-        for mine in _clusters(corners, areas, size_m, np.flatnonzero(towards == direction), direction // 2):
-            flat = np.delete(corners[mine], direction // 2, axis=2) / _mean_size(areas[mine], size_m[mine])
-            number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
-            charts.append(Chart(owner, faces[mine], upright(flat), -number))  # negative: none of a chart by xatlas
+        left, depth = [np.flatnonzero(towards == direction)], direction // 2
+        while left:
+            for mine in _clusters(corners, areas, size_m, left.pop(), depth):
+                local = corners[mine] / _mean_size(areas[mine], size_m[mine])
+                flat = upright(np.delete(local, depth, axis=2))
+                layers = layers_of(flat, local[:, :, depth])
+                if len(layers) > 1:
+                    left += [mine[layer] for layer in layers]
+                    continue
+                number = mesh.faces[faces[mine]].astype(np.int64) + len(mesh.positions) * (first + len(charts))
+                charts.append(Chart(owner, faces[mine], flat, -number))  # negative: none of a chart by xatlas
     return charts
 
 
@@ -237,13 +277,17 @@ def _clusters(corners: Floats, areas: Floats, size_m: Floats, faces: Indices, de
     def cost(mine: Indices) -> tuple[float, float]:
         size = _mean_size(areas[mine], size_m[mine])
         points = corners[mine].reshape(-1, 3) / size
-        sides = np.ptp(np.delete(points, depth, axis=1) @ turns, axis=1)
+        tried = turns if len(mine) < MANY else turns[:1]  # it will be halved anyway
+        sides = np.ptp(np.delete(points, depth, axis=1) @ tried, axis=1)
         mixed = areas[mine].sum() / size**2 * np.ptp(points[:, depth])
         return float(texels_taken(sides).min() + MIXED * mixed), float(sides[0].max())
 
     left, found = [(faces, *cost(faces))], []
     while left:
         mine, price, side = left.pop()
+        if price <= 2 * FEWEST:
+            found.append(mine)
+            continue
         best: tuple[float, list[tuple[Indices, float, float]]] = (np.inf, [])
         for axis in range(3):
             along = centres[mine, axis]

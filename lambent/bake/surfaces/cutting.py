@@ -19,6 +19,7 @@ LEAST_M = 10.0  # a shorter triangle is never cut
 TIMES = 4.0  # as long as viewers see, from where on an object's triangles are cut
 MOST_FACES = 20_000  # of an object, after which nothing more is cut
 ROUNDS = 64
+ON_PLANE = 1e-6  # metres, and share of the largest coordinate: a closer vertex lies on a plane
 
 
 def lengths_of(corners: Floats) -> Floats:
@@ -74,19 +75,49 @@ def _halved(mesh: Mesh, wanted: Flags) -> Mesh:
         first = hit.argmax(axis=1)
         faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
         a, b, c = faces[hit.any(axis=1)].T
-        mesh, middle = _with_middles(mesh, a, b)
+        mesh, middle = _with_vertices(mesh, a, b)
         place = np.concatenate([place, place.max() + 1 + np.arange(len(mesh.positions) - len(place))])
         halves = [np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)]
         faces = np.concatenate([faces[~hit.any(axis=1)], *halves])
     return replace(mesh, faces=faces.astype(np.uint32))
 
 
-def _with_middles(mesh: Mesh, a: Indices, b: Indices) -> tuple[Mesh, Indices]:
-    """The mesh with vertices between vertices a and b (N,), one for each pair, and their numbers (N,)."""
+def cut_across(mesh: Mesh, plane: tuple[float, float, float, float]) -> Mesh:
+    """The mesh with new vertices where a plane (n, d), n.x + d = 0, crosses its edges: no triangle has two sides of it.
+
+    Triangles on both sides of an edge that vertices are shared by, or lie in one place, get the same vertex.
+    """
+    n, d = np.array(plane[:3], float), plane[3]
+    height = (mesh.positions.astype(float) @ n + d) / np.linalg.norm(n)
+    height[np.abs(height) < ON_PLANE * (1 + np.abs(mesh.positions).max(axis=1))] = 0
+    faces = mesh.faces.astype(np.int64)
+    for _ in range(2):  # first one of the edges that cross, then the other
+        ends = height[faces] * height[np.roll(faces, -1, axis=1)]
+        crossed = (ends < 0).any(axis=1)
+        if not crossed.any():
+            break
+        first = (ends < 0).argmax(axis=1)[crossed]
+        a, b, c = np.take_along_axis(faces[crossed], (first[:, None] + np.arange(3)) % 3, axis=1).T
+        mesh, between = _with_vertices(mesh, a, b, height)
+        height = np.append(height, np.zeros(len(mesh.positions) - len(height)))
+        halves = [np.stack([a, between, c], axis=1), np.stack([between, b, c], axis=1)]
+        faces = np.concatenate([faces[~crossed], *halves])
+    return replace(mesh, faces=faces.astype(np.uint32))
+
+
+def _with_vertices(mesh: Mesh, a: Indices, b: Indices, height: Floats | None = None) -> tuple[Mesh, Indices]:
+    """The mesh with vertices between vertices a and b (N,), one for each pair, and their numbers (N,).
+
+    They lie in the middle, or where `height` (V,), of opposite signs at both ends, is 0.
+    """
     pairs, index = np.unique(np.sort(np.stack([a, b], axis=1), axis=1), axis=0, return_inverse=True)
+    ends = np.ones((len(pairs), 2)) * (1, -1) if height is None else height[pairs]
+    low, high = ends[:, :1], ends[:, 1:]
 
     def between(values: Floats) -> Floats:
-        return np.asarray((values[pairs[:, 0]] + values[pairs[:, 1]]) / 2)
+        """The same to the bit from both ends."""
+        start, end = values.astype(float)[pairs.T]
+        return np.asarray((start * high - end * low) / (high - low))
 
     def longer(old: Floats, new: Floats) -> Floats:
         return np.concatenate([old, new]).astype(old.dtype)

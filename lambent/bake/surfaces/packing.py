@@ -56,23 +56,34 @@ def _touched(corners: Floats, width: int, height: int, taken: NDArray[np.uint8])
     """Mark cells less than a texel from a triangle (F, 3, 2), along rows and columns: it meets their 2 x 2 squares."""
     for f in range(len(corners)):
         t = corners[f]
-        low_x, high_x = min(t[0, 0], t[1, 0], t[2, 0]), max(t[0, 0], t[1, 0], t[2, 0])
-        low_y, high_y = min(t[0, 1], t[1, 1], t[2, 1]), max(t[0, 1], t[1, 1], t[2, 1])
-        for row in range(max(0, int(np.floor(low_y - 0.5))), min(height, int(np.floor(high_y + 0.5)) + 1)):
-            for column in range(max(0, int(np.floor(low_x - 0.5))), min(width, int(np.floor(high_x + 0.5)) + 1)):
-                if taken[row * width + column]:
-                    continue
-                x, y, apart = column + 0.5, row + 0.5, False
-                for i in range(3):  # the normals of the edges as separating axes
-                    a, b, c = t[i], t[(i + 1) % 3], t[(i + 2) % 3]
-                    nx, ny = b[1] - a[1], a[0] - b[0]
-                    inner = nx * (c[0] - a[0]) + ny * (c[1] - a[1])
-                    if inner < 0:
-                        nx, ny = -nx, -ny
-                    if nx * (x - a[0]) + ny * (y - a[1]) + abs(nx) + abs(ny) < 0:
-                        apart = True
-                if not apart:
+        rows, columns = near(t, width, height)
+        for row in range(rows[0], rows[1]):
+            for column in range(columns[0], columns[1]):
+                if not taken[row * width + column] and meets(t, column + 0.5, row + 0.5):
                     taken[row * width + column] = 1
+
+
+@numba.njit(cache=True)
+def near(t: Floats, width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """First and end of the rows, and of the columns, less than a texel from the rectangle around a triangle (3, 2)."""
+    low_x, high_x = min(t[0, 0], t[1, 0], t[2, 0]), max(t[0, 0], t[1, 0], t[2, 0])
+    low_y, high_y = min(t[0, 1], t[1, 1], t[2, 1]), max(t[0, 1], t[1, 1], t[2, 1])
+    rows = max(0, int(np.floor(low_y - 0.5))), min(height, int(np.floor(high_y + 0.5)) + 1)
+    return rows, (max(0, int(np.floor(low_x - 0.5))), min(width, int(np.floor(high_x + 0.5)) + 1))
+
+
+@numba.njit(cache=True)
+def meets(t: Floats, x: float, y: float) -> bool:
+    """Whether a triangle (3, 2) meets the square of 2 x 2 texels around (x, y), which lies near it."""
+    for i in range(3):  # the normals of the edges as separating axes
+        a, b, c = t[i], t[(i + 1) % 3], t[(i + 2) % 3]
+        nx, ny = b[1] - a[1], a[0] - b[0]
+        inner = nx * (c[0] - a[0]) + ny * (c[1] - a[1])
+        if inner < 0:
+            nx, ny = -nx, -ny
+        if nx * (x - a[0]) + ny * (y - a[1]) + abs(nx) + abs(ny) < 0:
+            return False
+    return True
 
 
 @numba.njit(cache=True)

@@ -7,6 +7,8 @@ contribution when chosen; a short pre-pass measures that, shadows included.
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -15,7 +17,7 @@ from lambent.bake.sky.guide import guided_sky, learn
 from lambent.bake.tracing import path_tracer, rays
 from lambent.bake.tracing.rays import array_of, independent, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, Indices
 from lambent.core.colour import luminance
 from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
 from lambent.scenes.scene import Scene
@@ -37,24 +39,36 @@ def balance_emitters(builder: SceneBuilder) -> None:
     emitters = builder.emitters()
     if len(emitters) < 2:
         return
-    position, normal = _points_and_normals(builder.scene, POINTS)
-    scene = builder.build()
-    width = POINTS * SAMPLES
-    sampler = independent(0, width)
-    at = dr.arange(mi.UInt32, width) // SAMPLES
-    si = dr.zeros(mi.SurfaceInteraction3f, width)
-    si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, position), at)
-    si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normal), at))
-    ds, value = path_tracer.sample_emitter(scene, si, sampler.next_2d(), mi.Bool(True), rays.has_holes(scene))
-    value *= dr.maximum(dr.dot(ds.d, si.n), 0.0)
-    brought = luminance(np.nan_to_num(array_of(value), posinf=0.0))
-    chosen = np.array(dr.reinterpret_array(mi.UInt32, ds.emitter))
+    brought, chosen = _brought(builder.scene, scene := builder.build(), scene)
     numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter in emitters]
     squares = np.bincount(chosen, brought**2, minlength=max(numbers) + 1)[numbers]
     counts = np.bincount(chosen, minlength=max(numbers) + 1)[numbers]
     weight = np.sqrt(squares / np.maximum(counts, 1))
     if weight.any():
         builder.weigh_emitters(weight / weight.mean() + FLOOR)
+
+
+def brought_by(emitter: Any, scene: Scene, whole: Any) -> float:
+    """Root mean square of what samples of one mi.Emitter bring to the surfaces of a scene; `whole` is its mi.Scene."""
+    alone = mi.load_dict({"type": "scene", "emitter": emitter}, optimize=False)
+    emitter.set_scene(whole)
+    return float(np.sqrt(np.mean(_brought(scene, whole, alone)[0] ** 2)))
+
+
+def _brought(scene: Scene, whole: Any, lights: Any) -> tuple[Floats, Indices]:
+    """Light that samples of the emitters of the mi.Scene `lights` bring, and Mitsuba's numbers of the emitters."""
+    position, normal = _points_and_normals(scene, POINTS)
+    width = POINTS * SAMPLES
+    sampler = independent(0, width)
+    at = dr.arange(mi.UInt32, width) // SAMPLES
+    si = dr.zeros(mi.SurfaceInteraction3f, width)
+    si.p = dr.gather(mi.Point3f, vectors(mi.Point3f, position), at)
+    si.n = mi.Normal3f(dr.gather(mi.Vector3f, vectors(mi.Vector3f, normal), at))
+    holes = rays.has_holes(whole)
+    ds, value = path_tracer.sample_emitter(whole, lights, si, sampler.next_2d(), mi.Bool(True), holes)
+    value *= dr.maximum(dr.dot(ds.d, si.n), 0.0)
+    brought = luminance(np.nan_to_num(array_of(value), posinf=0.0))
+    return brought, np.array(dr.reinterpret_array(mi.UInt32, ds.emitter))
 
 
 def _points_and_normals(scene: Scene, count: int) -> tuple[Floats, Floats]:

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.bake.engine import once_per_variant
+from lambent.bake.tracing.candela import Candela
 from lambent.scenes.scene import IesLight
 
 
@@ -29,10 +30,7 @@ def _emitter_class() -> Any:
             self._scale = mi.ScalarColor3f(*light.scale)
             theta, phi = np.radians(light.photometry.vertical_deg), np.radians(light.photometry.horizontal_deg)
             candela = np.array(light.photometry.candela)
-            self._theta, self._phi, self._candela = (
-                mi.Float(a.astype(np.float32).ravel()) for a in (theta, phi, candela)
-            )
-            self._ends = float(theta[0]) - 1e-6, float(theta[-1]) + 1e-6
+            self._candela = Candela([light.photometry])
             corners = candela[1:, 1:] + candela[1:, :-1] + candela[:-1, 1:] + candela[:-1, :-1]
             flux = corners * np.diff(phi)[:, None] * -np.diff(np.cos(theta))
             # A dark luminaire is drawn as any: its power is 0.
@@ -43,15 +41,7 @@ def _emitter_class() -> Any:
         def _intensity(self, w: Any, active: Any) -> Any:
             """W/sr towards unit world directions."""
             x, y, z = (dr.dot(w, axis) for axis in self._axes)
-            theta, phi = dr.safe_acos(z), dr.atan2(y, x)
-            phi = dr.select(phi < 0, phi + 2 * dr.pi, phi)
-            i, s = _place(self._phi, phi, active)
-            j, t = _place(self._theta, theta, active)
-            row = dr.width(self._theta)
-            corner = [dr.gather(mi.Float, self._candela, (i + a) * row + j + b, active) for a in (0, 1) for b in (0, 1)]
-            found = dr.lerp(dr.lerp(corner[0], corner[1], t), dr.lerp(corner[2], corner[3], t), s)
-            inside = (theta >= self._ends[0]) & (theta <= self._ends[1])
-            return mi.Color3f(self._scale) * dr.select(active & inside, found, 0.0)
+            return mi.Color3f(self._scale) * self._candela.towards(mi.UInt32(0), x, y, z, active)
 
         def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
             ds = dr.zeros(mi.DirectionSample3f)
@@ -73,10 +63,11 @@ def _emitter_class() -> Any:
 
         def sample_ray(self, time: Any, wavelength: Any, place: Any, direction: Any, active: Any = True) -> Any:
             cell, over, share = self._cells.sample_reuse_pmf(direction.x, active)
-            columns = dr.width(self._theta) - 1
+            theta, phi_nodes = self._candela.theta, self._candela.phi
+            columns = dr.width(theta) - 1
             i, j = cell // columns, cell % columns
-            low, high = (dr.cos(dr.gather(mi.Float, self._theta, j + k, active)) for k in (0, 1))
-            first, last = (dr.gather(mi.Float, self._phi, i + k, active) for k in (0, 1))
+            low, high = (dr.cos(dr.gather(mi.Float, theta, j + k, active)) for k in (0, 1))
+            first, last = (dr.gather(mi.Float, phi_nodes, i + k, active) for k in (0, 1))
             cosine, phi = dr.lerp(low, high, over), dr.lerp(first, last, direction.y)
             sine = dr.safe_sqrt(1 - cosine * cosine)
             x, y, z = (mi.Vector3f(axis) for axis in self._axes)
@@ -92,12 +83,3 @@ def _emitter_class() -> Any:
             return f"IesEmitter[{self._light.photometry.lumens:.0f} lm]"
 
     return IesEmitter
-
-
-def _place(nodes: Any, x: Any, active: Any) -> tuple[Any, Any]:
-    """The interval of rising `nodes` that x lies in, and where in it."""
-    last = dr.width(nodes) - 2
-    i = dr.binary_search(0, last, lambda k: dr.gather(mi.Float, nodes, k + 1, active) <= x)
-    i = dr.minimum(mi.UInt32(i), last)
-    low, high = (dr.gather(mi.Float, nodes, i + k, active) for k in (0, 1))
-    return i, dr.clip((x - low) / (high - low), 0.0, 1.0)

@@ -27,7 +27,8 @@ class Start:
     """Where paths start: `ray`, the interaction it leaves, and the density of its direction, pdf (sr^-1).
 
     The density weights the emitters that the ray meets; `direct` counts them in full, where nothing else samples them.
-    The ray itself does not see the sun that is given as `unseen`.
+    The ray does not see the sun that is given as `unseen`. If that passes panes, clear glass is not met until the path
+    is scattered: what a ray sees straight through it, emitters are sampled for from the start.
     """
 
     ray: Any
@@ -59,10 +60,19 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     )  # fmt: skip
 
 
-def sample_emitter(scene: Any, si: Any, u: Any, active: Any, holes: bool) -> tuple[Any, Any]:
-    """DirectionSample3f of Mitsuba's `sample_emitter_direction`, and the light over its density, 0 in shadow."""
-    ds, value = scene.sample_emitter_direction(si, u, False, active)
+def sample_emitter(
+    scene: Any, lights: Any, si: Any, u: Any, active: Any, holes: bool, unseen: Sun | None = None
+) -> tuple[Any, Any]:
+    """DirectionSample3f of an emitter of the mi.Scene `lights`, and its light over its density, 0 in shadow.
+
+    Light of the sun `unseen` is left out; where that passes panes, all other light does.
+    """
+    ds, value = lights.sample_emitter_direction(si, u, False, active)
     lit = active & (ds.pdf > 0)
+    if unseen is not None and unseen.first is None:
+        value = dr.select(lit, unseen.left_out(ds, value), 0.0)
+    if unseen is not None and unseen.passes_panes:
+        return ds, dr.select(lit, value, 0.0) * rays.passed_from(scene, si.p, si.n, ds.p, lit)
     lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)
     return ds, dr.select(lit, value, 0.0)
 
@@ -72,6 +82,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
     width = dr.width(ray.o)
     result = dr.zeros(mi.Color3f, width)
     throughput = dr.ones(mi.Color3f, width)
+    straight = dr.full(mi.Bool, unseen is not None, width)  # from the start, through clear glass alone
     depth = dr.zeros(mi.UInt32, width)
     active = dr.full(mi.Bool, True, width)
     ctx = mi.BSDFContext()
@@ -80,10 +91,12 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         ds = mi.DirectionSample3f(scene, si, origin)
         emitter = si.emitter(scene)
         pdf_emitter = scene.pdf_emitter_direction(origin, ds, active & ~direct)
+        if unseen is not None and unseen.first is not None:
+            pdf_emitter = dr.select(straight, unseen.first.pdf(origin, ds, active & straight), pdf_emitter)
         weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
         light = emitter.eval(si, active)
         if unseen is not None:
-            light -= dr.select((depth == 0) & ~si.is_valid(), unseen.radiance(ray.d), 0.0)
+            light -= dr.select(straight & ~si.is_valid(), unseen.radiance(ray.d), 0.0)
         result += dr.select(active, throughput * light * weight, 0.0)
         active &= si.is_valid() & (depth < max_depth)
         result += dr.select(active, throughput * cache(si, active), 0.0)
@@ -95,6 +108,8 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         ds, value = scene.sample_emitter_direction(at, sampler.next_2d(active), False, lit)
         lit &= ds.pdf > 0
         wo = si.to_local(ds.d)
+        if unseen is not None:
+            lit &= ~unseen.goes_on(si, wo, lit & straight)
         f, pdf_bsdf, sample, f_sample = bsdf.eval_pdf_sample(
             ctx, si, wo, sampler.next_1d(active), sampler.next_2d(active), active
         )
@@ -104,14 +119,15 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)
         result += dr.select(lit, brought, 0.0)
 
+        straight &= mi.Bool(False) if unseen is None else unseen.goes_on(si, sample.wo, active & straight)
         throughput *= f_sample
-        origin = mi.SurfaceInteraction3f(at)
-        pdf = mi.Float(sample.pdf)
-        direct = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        ray = rays.leaving(scene, si.p, si.n, si.to_world(sample.wo))
+        origin = dr.select(straight, origin, at)
+        direct = dr.select(straight, direct, mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta))
+        ray = rays.leaving(scene, si.p, si.n, dr.select(straight, ray.d, si.to_world(sample.wo)))
+        pdf = dr.select(straight, pdf, sample.pdf)
         depth += 1
         brightest = dr.max(throughput)
-        active &= (brightest > 0) & (pdf > 0)
+        active &= (brightest > 0) & (sample.pdf > 0)
         survive = dr.select(depth >= ROULETTE_DEPTH, dr.minimum(brightest, 0.95), 1.0)
         active &= sampler.next_1d(active) < survive
         throughput *= dr.rcp(dr.maximum(survive, 1e-6))
@@ -144,10 +160,10 @@ def irradiance(
     max_depth, cache
         As `radiance` takes them.
     unseen : Sun, optional
-        Whose direct light is left out.
+        Whose direct light is left out, straight through clear glass as well.
     """
-    (found, _), (aimed, _) = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
-    return found + aimed
+    found = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
+    return mi.Color3f(sum(light for light, _ in found))
 
 
 def moment(
@@ -155,24 +171,24 @@ def moment(
     unseen: Sun | None = None,
 ) -> Any:  # fmt: skip
     """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
-    both = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
-    return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in both))
+    found = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
+    return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in found))
 
 
 def _contributions(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None,
     unseen: Sun | None,
-) -> tuple[tuple[Any, Any], tuple[Any, Any]]:  # fmt: skip
+) -> list[tuple[Any, Any]]:  # fmt: skip
     """Contributions to the irradiance from BSDF and emitter sampling, each with its direction."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
     arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False, unseen), max_depth, cache)
-    ds, value = sample_emitter(scene, si, u_emitter, mi.Bool(True), rays.has_holes(scene))
-    if unseen is not None:
-        value = dr.select(dr.max(value) > 0, unseen.left_out(ds, value), 0.0)
+    first = None if unseen is None else unseen.first
+    lights = scene if first is None else first.scene
+    ds, value = sample_emitter(scene, lights, si, u_emitter, mi.Bool(True), rays.has_holes(scene), unseen)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)
-    return (dr.pi * arriving, ray.d), (direct, ds.d)
+    return [(dr.pi * arriving, ray.d), (direct, ds.d)]

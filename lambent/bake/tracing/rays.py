@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.directions import basis
 from lambent.core.sequences import cosine_hemisphere, r2
+from lambent.materials.clear import MOST
 
 ALIGNED_BYTES = 64  # the longest vectors that LLVM has
 OFFSET = 1e-5  # metres, and share of the largest coordinate, over a surface from where rays leave it
@@ -130,9 +131,37 @@ def hidden(scene: Any, p: Any, n: Any, target: Any, active: Any, holes: bool) ->
     return _blocked(scene, ray, mi.Point3f(target), mi.Bool(active)) if holes else scene.ray_test(ray, active)
 
 
+def straight_on(si: Any, active: Any) -> Any:
+    """What (mi.Color3f) the surfaces of interactions pass straight on: 1 in holes, 0 but on clear glass."""
+    return si.bsdf().eval_null_transmission(si, active)
+
+
+def passed(scene: Any, ray: Any, active: Any) -> Any:
+    """What (mi.Color3f) of the light along rays gets straight through holes and clear glass, 0 behind all else."""
+    return _passed(scene, mi.Ray3f(ray), mi.Bool(active), None)
+
+
+def passed_from(scene: Any, p: Any, n: Any, target: Any, active: Any) -> Any:
+    """The same of light from points elsewhere that falls onto points p of surfaces of normals n."""
+    return _passed(scene, towards(scene, p, n, target), mi.Bool(active), mi.Point3f(target))
+
+
+@dr.syntax
+def _passed(scene, ray, active, target):  # type: ignore[no-untyped-def]
+    share = dr.select(active, mi.Color3f(1.0), 0.0)
+    again = active
+    while again:
+        si = scene.ray_intersect(ray, again)
+        again &= si.is_valid()
+        share *= dr.select(again, straight_on(si, again), 1.0)
+        ray = leaving(scene, si.p, si.n, ray.d) if target is None else towards(scene, si.p, si.n, target)
+        again &= dr.max(share) > 0
+    return share
+
+
 def _is_hole(si: Any, active: Any) -> Any:
     met = active & si.is_valid()
-    return met & (si.bsdf().eval_null_transmission(si, met)[0] > 0.5)
+    return met & (straight_on(si, met)[0] > MOST)
 
 
 @dr.syntax

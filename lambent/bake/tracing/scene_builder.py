@@ -21,8 +21,8 @@ from lambent.bake.tracing.ies_emitter import ies_emitter
 from lambent.core.arrays import Floats
 from lambent.materials.factored.terms import Editable
 from lambent.materials.measured.patch_sheet import Lookup
+from lambent.scenes.computed import lat_long_image
 from lambent.scenes.environment_images import read_lat_long, up_turn
-from lambent.scenes.interiors import lat_long_image
 from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
@@ -91,12 +91,13 @@ class SceneBuilder:
             bsdf = tables.get(o.material)
             if bsdf is None:
                 material, textures = scene.materials[o.material], scene.textures.get(o.material)
-                look = (material_dict(material, diffuse=diffuse)["material"], textures and o.material)
+                said = material_dict(material, textures, diffuse=diffuse)
+                look = (said["material"], "clear" in said, textures and o.material)
                 if look not in bsdfs:
-                    bsdfs[look] = mi.load_dict(material_dict(material, textures, diffuse=diffuse))
+                    bsdfs[look] = mi.load_dict(said)
                 bsdf = bsdfs[look]
             self.meshes[o.name] = mesh_of(o, bsdf, (uv2 or {}).get(o.name))
-        self._lights = [emitter_of(light) for light in scene.lights]
+        self.lights = [emitter_of(light) for light in scene.lights]
         self.environment: Any = _emitter_of(scene.environment)
         if sampling is not None:
             self.environment = sampling.environment
@@ -109,10 +110,10 @@ class SceneBuilder:
         at a third more time for a ray. Graphics cards are watertight anyway.
         """
         parts: dict[str, Any] = {f"object_{i}": m for i, (n, m) in enumerate(self.meshes.items()) if n not in leave_out}
-        parts |= {f"light_{i}": light for i, light in enumerate(self._lights)}
+        parts |= {f"light_{i}": light for i, light in enumerate(self.lights)}
         if self.environment is not None:
             parts["environment"] = self.environment
-        if not self._lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
+        if not self.lights and self.environment is None and not any(any(o.emission) for o in self.scene.objects):
             parts["darkness"] = {
                 "type": "point",
                 "position": [0.0, 0.0, 0.0],
@@ -124,7 +125,7 @@ class SceneBuilder:
 
     def emitters(self) -> list[Any]:
         """All mi.Emitter: of objects, lights, environment."""
-        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self._lights
+        found = [mesh.emitter() for mesh in self.meshes.values() if mesh.is_emitter()] + self.lights
         return [*found, self.environment] if self.environment is not None else found
 
     def sampling(self) -> EmitterSampling:
@@ -183,6 +184,17 @@ def mesh_of(o: SceneObject, bsdf: Any, uv2: Floats | None = None) -> Any:
         padded = np.concatenate([uv2, np.zeros((vertices, 1))], axis=1)
         mesh.add_attribute(UV2_ATTRIBUTE, 3, padded.astype(np.float32).ravel())
     return mesh
+
+
+def bare_scene(corners: Floats) -> Any:
+    """mi.Scene of triangles (F, 3, 3) in one mesh without a material: for rays that ask what they meet."""
+    mesh = mi.Mesh("all", 3 * len(corners), len(corners))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(corners.astype(np.float32).ravel())
+    parameters["faces"] = mi.UInt32(np.arange(3 * len(corners), dtype=np.uint32))
+    parameters.update()
+    dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # without, Mitsuba warns
+    return mi.load_dict({"type": "scene", "all": mesh, "dark": dark}, optimize=False)
 
 
 def _rgb(value: tuple[float, float, float]) -> dict[str, Any]:

@@ -42,12 +42,15 @@ def _closed(scene: Scene) -> set[str]:
 
 
 class SolidTest:
-    """Tells points within closed, opaque objects, by the inner sides their rays meet."""
+    """Tells points within closed, opaque objects, by the inner sides their rays meet.
 
-    def __init__(self, builder: SceneBuilder, scene: Any) -> None:
+    With `sheets`, objects that are not closed have inner sides too: those that their normals point away from.
+    """
+
+    def __init__(self, builder: SceneBuilder, scene: Any, *, sheets: bool = False) -> None:
         materials, textures = builder.scene.materials, builder.scene.textures
         open_ = {n for n, m in materials.items() if m.transmits} | {n for n, t in textures.items() if t.opacity}
-        closed = _closed(builder.scene)
+        closed = {o.name for o in builder.scene.objects} if sheets else _closed(builder.scene)
         solid = [o.name in closed and o.material not in open_ for o in builder.scene.objects]
         self._scene, self._numbers = scene, builder.object_numbers()
         self._solid = mi.UInt32(np.array(solid, np.uint32))
@@ -62,10 +65,11 @@ class SolidTest:
         """For points (n, 3) on surfaces of normals (n, 3): whether they lie within a solid. (n,) bool."""
         found = np.zeros(len(positions), bool)
         for mine in slices(len(positions), POINTS_AT_ONCE):
-            found[mine] = self._share_of_inner_sides(positions[mine], normals[mine]) > EMBEDDED_SHARE
+            found[mine] = self.inner_share(positions[mine], normals[mine]) > EMBEDDED_SHARE
         return found
 
-    def _share_of_inner_sides(self, positions: Floats, normals: Floats) -> Floats:
+    def inner_share(self, positions: Floats, normals: Floats) -> Floats:
+        """Share (n,) of the rays of a few points, spread about their normals, that meet an inner side first."""
         thread = dr.arange(mi.UInt32, len(positions) * RAYS)
         at, k = thread // RAYS, thread % RAYS
         p = dr.gather(mi.Point3f, vectors(mi.Point3f, positions), at)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -13,11 +13,23 @@ from lambent.bake.tracing import rays
 from lambent.core.directions import basis
 
 
-class Sun:
-    """A sun on the device, in whatever scenes its scene is built into."""
+class FirstEmitters(Protocol):
+    """Emitters of a mi.Scene without a sun, and their density where light met in the whole scene (`FirstLight`)."""
 
-    def __init__(self, found: FoundSun) -> None:
-        self.record, self._picture = found.record, found.picture
+    scene: Any
+
+    def pdf(self, si: Any, ds: Any, active: Any) -> Any: ...
+
+
+class Sun:
+    """A sun on the device, in whatever scenes its scene is built into.
+
+    `first` are the other emitters of one such scene, that paths without the sun sample where they start.
+    """
+
+    def __init__(self, found: FoundSun, first: FirstEmitters | None = None) -> None:
+        self.record, self.first, self._picture = found.record, first, found.picture
+        self.passes_panes = bool(found.record.panes)
         self.direction = mi.Vector3f(*found.record.direction)
         if found.picture is not None:
             pixels = mi.TensorXf(found.picture.pixels)
@@ -46,6 +58,11 @@ class Sun:
         directional = mi.has_flag(ds.emitter.flags(), mi.EmitterFlags.DeltaDirection)
         return dr.select(directional & (dr.dot(ds.d, self.direction) > 1 - ALIGNED), 0.0, value)
 
+    def goes_on(self, si: Any, wi: Any, active: Any) -> Any:
+        """Whether light along wi (mi.Vector3f, local) gets to `si.wi` straight through clear glass."""
+        across = active & (wi.z * si.wi.z < 0)
+        return across & (dr.max(rays.straight_on(si, across)) > 0) if self.passes_panes else mi.Bool(False)
+
     def sky_share(self, environment: Any, w: Any) -> Any:
         """Share (mi.Color3f) of the environment's radiance in unit directions w that is not the sun's."""
         if self._picture is None:
@@ -64,7 +81,8 @@ class SunRays:
     """Irradiance of a sun on surfaces of a Mitsuba scene, by shadow rays to random places of its disc."""
 
     def __init__(self, sun: Sun, scene: Any) -> None:
-        self._sun, self._scene, self._holes = sun, scene, rays.has_holes(scene)
+        self._sun, self._scene = sun, scene
+        self._blocked_by_all = not (sun.passes_panes or rays.has_holes(scene))
         across, up = basis(np.array(sun.record.direction))
         self._across, self._up = mi.Vector3f(*map(float, across)), mi.Vector3f(*map(float, up))
         self._tangent = float(np.tan(sun.record.radius_rad))
@@ -81,5 +99,7 @@ class SunRays:
         w = dr.normalize(self._sun.direction + self._across * on_disc.x + self._up * on_disc.y)
         cosine = dr.dot(si.sh_frame.n, self._sun.direction)
         lit = active & (cosine != 0)
-        lit &= ~rays.in_shadow(self._scene, rays.leaving(self._scene, si.p, si.n, w), lit, self._holes)
-        return dr.select(lit, self._irradiance * cosine, 0.0)
+        ray = rays.leaving(self._scene, si.p, si.n, w)
+        if self._blocked_by_all:
+            return dr.select(lit & ~self._scene.ray_test(ray, lit), self._irradiance * cosine, 0.0)
+        return self._irradiance * cosine * rays.passed(self._scene, ray, lit)

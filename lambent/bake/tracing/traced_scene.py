@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from lambent.bake.light.cache import LightMapCache
-from lambent.bake.sky.sun import sun_of
+from lambent.bake.light.stitching import Cuts, cuts_of
+from lambent.bake.sky.sun import FoundSun, sun_of
 from lambent.bake.surfaces.atlas import Atlas
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
 from lambent.bake.tracing.emitters import balance_emitters
+from lambent.bake.tracing.first_light import FirstLight, sky_without
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.sun import Sun, SunRays
@@ -43,6 +45,7 @@ class TracedScene:
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
         self._whole: Any = None
         self._sampling: EmitterSampling | None = None
+        self._sky_without: tuple[Any] | None = None
         self._sides: dict[float, Sides] = {}
         self._views: dict[float, tuple[Sides, Indices]] = {}
 
@@ -85,8 +88,20 @@ class TracedScene:
     @cached_property
     def sun(self) -> Sun | None:
         """The sun whose direct light leaves the light map."""
-        found = sun_of(self.scene)
-        return None if found is None else Sun(found)
+        return None if self._found_sun is None else Sun(self._found_sun)
+
+    @cached_property
+    def _found_sun(self) -> FoundSun | None:
+        return sun_of(self.scene)
+
+    def unseen(self, *, diffuse: bool) -> Sun | None:
+        """That sun beside the emitters of `whole(diffuse=diffuse)`, as points of the light map sample them."""
+        if self._found_sun is None:
+            return None
+        builder, whole = self.builder(diffuse=diffuse), self.whole(diffuse=diffuse)
+        if self._sky_without is None:
+            self._sky_without = (sky_without(self._found_sun, builder, whole),)
+        return Sun(self._found_sun, FirstLight(builder, whole, self._found_sun, *self._sky_without))
 
     def cache(self, irradiance: Floats, irradiance_back: Floats | None) -> LightMapCache:
         """A light map (H, W, 3) as radiance cache of the scene without diffuse terms, with the sun that it lacks."""
@@ -97,6 +112,10 @@ class TracedScene:
     @cached_property
     def texels(self) -> Texels:
         return texels_of(self.merged, self.atlas.width, self.atlas.height)
+
+    @cached_property
+    def cuts(self) -> Cuts:
+        return cuts_of(self.merged, self.atlas.width, self.atlas.height)
 
     @cached_property
     def labels(self) -> Indices:

@@ -10,13 +10,13 @@ import logging
 from dataclasses import dataclass
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
 from lambent.bake.surfaces.atlas import areas_of, even, scales_of
 from lambent.bake.surfaces.charts import Piece
 from lambent.bake.surfaces.density import Views, coarse_objects, sizes_seen
 from lambent.bake.tracing.rays import rays_from, towards
+from lambent.bake.tracing.scene_builder import bare_scene
 from lambent.bake.tracing.visibility import viewing_places
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import points_on_triangles, triangle_areas, triangle_normals
@@ -38,17 +38,18 @@ class Viewers:
     reach_m: float
 
 
-def viewers_of(scene: Scene) -> Viewers | None:
+def viewers_of(scene: Scene, traced: Any = None) -> Viewers | None:
     """Eyes at the cameras and at free places in view of them, half each; None without cameras, or if they see nothing.
 
-    Places that are further away than cameras see are left out: rays that leave by a window end far outside.
+    Places that are further away than cameras see are left out: rays that leave by a window end far outside. `traced`
+    is the scene of opaque triangles, if there is one.
     """
     cameras = [*scene.cameras, *(key for path in scene.paths for key in path.keys)]
     opaque = _opaque(scene)
     if not cameras or not len(opaque):
         return None
     eyes = np.array([camera.position for camera in cameras], float)
-    traced = _traced(scene.corners.astype(float)[opaque])
+    traced = traced or bare_scene(scene.corners[opaque])
     _, distance = _seen(traced, eyes, RAYS // 16)
     if not len(distance):
         return None
@@ -63,7 +64,9 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
 
     Objects that get far larger texels than viewers need are logged as warnings.
     """
-    viewers, opaque = viewers_of(scene), _opaque(scene)
+    corners, opaque = scene.corners, _opaque(scene)
+    traced = bare_scene(corners[opaque]) if len(opaque) else None
+    viewers = viewers_of(scene, traced)
     if viewers is None:
         return even(scene, pieces, texels)
     eyes, nearest = viewers.eyes, NEAREST * viewers.reach_m
@@ -72,8 +75,6 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
     piece_of = np.zeros(first[-1], np.int64)
     for number, mine in enumerate(faces):
         piece_of[mine] = number
-    corners = scene.corners.astype(float)
-    traced = _traced(corners[opaque])
     face, distance = _seen(traced, eyes, RAYS)
     face, distance = face[distance > nearest], distance[distance > nearest]
     if not len(face):
@@ -102,17 +103,6 @@ def _opaque(scene: Scene) -> Indices:
 def _has_holes(scene: Scene, material: str) -> bool:
     textures = scene.textures.get(material)
     return textures is not None and textures.opacity is not None
-
-
-def _traced(corners: Floats) -> Any:
-    """mi.Scene of triangles (F, 3, 3) in one mesh."""
-    mesh = mi.Mesh("all", 3 * len(corners), len(corners))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(corners.astype(np.float32).ravel())
-    parameters["faces"] = mi.UInt32(np.arange(3 * len(corners), dtype=np.uint32))
-    parameters.update()
-    dark = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}  # without, Mitsuba warns
-    return mi.load_dict({"type": "scene", "all": mesh, "dark": dark}, optimize=False)
 
 
 def _seen(traced: Any, eyes: Floats, count: int) -> tuple[Indices, Floats]:

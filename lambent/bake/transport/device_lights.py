@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.tracing.candela import Candela
 from lambent.bake.tracing.rays import vectors
 from lambent.bake.transport.pieces import solid_angle
 from lambent.bake.transport.polygon_light import highest_part
@@ -33,7 +34,22 @@ def lights_on_device(lights: TriangleLights) -> dict[str, Any]:
             mi.Float(outer.astype(np.float32)),
             mi.Float(np.maximum(outer - inner, 1e-4).astype(np.float32)),
         ]
+    if lights.luminaires:
+        arrays |= _luminaires(lights)
     return arrays
+
+
+def _luminaires(lights: TriangleLights) -> dict[str, Any]:
+    """Which luminaire a light is, one past the last for others; their axes and intensities."""
+    those = list(lights.luminaires.values())
+    which = np.full(len(lights), len(those), np.uint32)
+    which[list(lights.luminaires)] = np.arange(len(those))
+    axes = np.array([one.axes for one in those])
+    return {
+        "luminaire": mi.UInt32(which),
+        "turned": [vectors(mi.Vector3f, axes[:, k]) for k in range(3)],
+        "candela": Candela([one.photometry for one in those]),
+    }
 
 
 def light_at(lights: dict[str, Any], m: Any, p: Any, n: Any = None) -> tuple[Any, ...]:
@@ -62,9 +78,19 @@ def light_at(lights: dict[str, Any], m: Any, p: Any, n: Any = None) -> tuple[Any
         angle = dr.acos(dr.clip(-dr.dot(centre, dr.gather(mi.Vector3f, lights["axes"], m)), -1, 1))
         outer, width = [dr.gather(mi.Float, one, m) for one in lights["cone"]]
         inside = dr.select(outer < np.float32(np.pi), dr.clip((outer - angle) / width, 0, 1), 1.0)
-        share = dr.select(is_point, inside / dr.squared_norm(to), share)
+        share = dr.select(is_point, inside * _candela(lights, m, -centre) / dr.squared_norm(to), share)
         wide &= ~is_point
     return centre, a, b, c, light, dr.select(near, share, 1.0), wide
+
+
+def _candela(lights: dict[str, Any], m: Any, w: Any) -> Any:
+    """What light m is multiplied by towards unit directions w: 1 where it is no luminaire."""
+    if "luminaire" not in lights:
+        return 1.0
+    which, axes = dr.gather(mi.UInt32, lights["luminaire"], m), lights["turned"]
+    is_one = which < dr.width(axes[0])
+    along = [dr.dot(w, dr.gather(mi.Vector3f, axis, which, is_one)) for axis in axes]
+    return dr.select(is_one, lights["candela"].towards(which, *along, active=is_one), 1.0)
 
 
 def brightest(p: NDArray[np.float32], lights: TriangleLights) -> float:

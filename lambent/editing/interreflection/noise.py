@@ -1,18 +1,31 @@
-"""Noise of interreflections, from two pictures of which the second has the samples of the first and more."""
+"""Noise of interreflections, from two pictures of which the second has the samples of the first and more.
+
+A bake whose progress goes through `PassNoise` leaves the figure in its store, for whoever opens it later.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from lambent.core.camera import Camera
 from lambent.core.colour import luminance
+from lambent.core.progress import Progress
 from lambent.editing.interreflection.folding import Cells
 from lambent.editing.interreflection.picture import frozen_light
 from lambent.editing.interreflection.powers import powers
-from lambent.editing.interreflection.stored import Interreflections
+from lambent.editing.interreflection.stored import Interreflections, interreflections
 from lambent.editing.products import Pixels
 from lambent.materials.factored.terms import Editable
+from lambent.store.contract import view_artefact_name
+from lambent.store.store import Store
+
+NOISE = "interreflection_noise"  # document: by the name of a view's tails, their key, samples and noise
+PASS = re.compile(r"interreflections, (\d+) samples")  # what the bake says of a pass
+Shot = tuple[Camera, tuple[int, int]]
 
 
 def light_of(light: Interreflections, materials: Mapping[str, Editable]) -> Pixels:
@@ -32,3 +45,73 @@ def noise(before: Pixels, after: Pixels, samples: tuple[int, int]) -> float:
     difference, mean = luminance((after - before).T), float(luminance(after.T).mean())
     variance = float(np.mean(np.square(difference))) * fewer / (more - fewer)
     return float(variance**0.5 / max(mean, 1e-30))
+
+
+class PassNoise:
+    """Takes the progress of a bake, looks at its last two passes, and notes their noise in the store.
+
+    Parameters
+    ----------
+    folder
+        Of the store.
+    shots
+        Camera, width and height of each view.
+    materials
+        All of the scene, as they are baked.
+    samples
+        That the bake ends with.
+    progress
+        Where all progress goes on to.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        shots: Sequence[Shot],
+        materials: Mapping[str, Editable],
+        samples: int,
+        progress: Progress,
+    ) -> None:
+        self._folder, self._shots, self._materials, self._samples = folder, shots, materials, samples
+        self._passed_on = progress
+        self._before: dict[int, tuple[int, Pixels]] = {}
+        self._found: dict[str, dict[str, object]] = {}
+
+    def progress(self, done: float, total: float, what: str) -> None:
+        """As `Progress`."""
+        self._passed_on(done, total, what)
+        said = PASS.fullmatch(what)
+        if said and done == total and 2 * int(said[1]) >= self._samples:
+            store = Store.open(self._folder)
+            for k, shot in enumerate(self._shots):
+                self._look(store, k, *shot)
+
+    def note(self, store: Store) -> None:
+        """Write what was found, once the bake has ended."""
+        if self._found:
+            store.set_document(NOISE, {**store.documents.get(NOISE, {}), **self._found})
+
+    def _look(self, store: Store, k: int, camera: Camera, size: tuple[int, int]) -> None:
+        pixels, samples = [], []
+        for name, one in self._materials.items():  # one at a time, for all their bands may not fit into memory
+            light = interreflections(store, camera, size, {name: one})
+            if light.parts:
+                pixels.append(light_of(light, self._materials))
+                samples.append(light.samples)
+        before, self._before[k] = self._before.get(k), (min(samples), np.concatenate(pixels, axis=1))
+        if before is not None and 0 < before[0] < min(samples):
+            name = _tails(camera, size)
+            share = noise(before[1], self._before[k][1], (before[0], min(samples)))
+            self._found[name] = {"key": store.artefact(name).key, "samples": min(samples), "noise": share}
+
+
+def noted_noise(store: Store, camera: Camera, size: tuple[int, int], samples: int) -> float | None:
+    """Noise of a view with so many samples, as its bake noted it; None where it did not."""
+    name = _tails(camera, size)
+    said = store.documents.get(NOISE, {}).get(name, {})
+    is_of_it = name in store and said.get("key") == store.artefact(name).key and said.get("samples") == samples
+    return float(said["noise"]) if is_of_it else None
+
+
+def _tails(camera: Camera, size: tuple[int, int]) -> str:
+    return view_artefact_name(camera, *size, "interreflection", "tails")

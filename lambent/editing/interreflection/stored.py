@@ -82,7 +82,13 @@ def interreflections(
             f"no interreflections of camera {camera.name}, {size[0]} x {size[1]}", file=store.folder,
             hint="bake them: `lambent bake SCENE -o STORE --only interreflection`",
         )  # fmt: skip
-    tails = Tails.of(store.artefact(name("interreflection", "tails")).meta["tails"])
+    known_tails = store.artefact(name("interreflection", "tails"))
+    if known_tails.meta.get("points", (now := store.artefact(name("view_points", "pixel")).key)) != now:
+        raise UserError(
+            "interreflections are of other materials than the view shows now", file=store.folder,
+            hint="bake them again: `lambent bake SCENE -o STORE --only interreflection`",
+        )  # fmt: skip
+    tails = Tails.of(known_tails.meta["tails"])
     pixel, number, theta_o = (store.read(name("view_points", part)) for part in ("pixel", "object", "theta_o"))
     worn = np.array([material for _, material in store.artefact(name("view_points", "object")).meta["objects"]])[number]
     edited = {material for material, _ in tails.slots}

@@ -40,17 +40,20 @@ class Cost:
         The errors as shares of the subject's own size under that metric (E against black).
     light : dict of float
         Side -> light that the written file scatters there over the subject's.
+    towards_light : float
+        f of the written file back towards the light over the subject's, where retro lobes were left out.
     """
 
     lost: tuple[str, ...] = ()
     errors: dict[str, float] = field(default_factory=dict)
     share: dict[str, float] = field(default_factory=dict)
     light: dict[Side, float] = field(default_factory=dict)
+    towards_light: float = 1.0
 
     @property
     def verdict(self) -> Verdict:
         """Whether the file stands for the subject, in a word with its reason."""
-        return verdict_of(self.share, self.light)
+        return verdict_of(self.share, self.light, self.towards_light)
 
 
 class Writer(Protocol):

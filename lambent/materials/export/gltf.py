@@ -137,6 +137,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
 def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMaterial, Cost]:
     """The glTF material that looks most like `material`, rounded as in the file, and its cost."""
     check, lost = pairs_of(material, CHECK_LOG2, seed=1), match.shape_losses(material)
+    towards_light = match.kept_towards_light(material)
     material = match.without_retro(material)
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     space = _Space(material, pairs.samples.f.shape[1])
@@ -149,7 +150,7 @@ def likeness(material: Material, progress: Progress = silent) -> tuple[GltfMater
         x, total = best(None, [np.where(np.arange(len(x)) == 0, 0.5, x) for x, _ in ends])
         ends.append((x, total / SIMPLER**2))
     fitted = space.read(min(ends, key=lambda end: end[1])[0], rounded=True)
-    return fitted, match.cost_of(check, fitted.eval(check), [*lost, *_lost(material, fitted)])
+    return fitted, match.cost_of(check, fitted.eval(check), [*lost, *_lost(material, fitted)], towards_light)
 
 
 class _Space:

@@ -48,12 +48,24 @@ def _retro_losses(material: Material) -> list[str]:
     wi = direction(np.radians(LOST_AT_DEG), 0.0)
     near = material.model_copy(update={"kt_d": BLACK, "lobes": material.reflection_lobes})
     whole, lost = (MaterialBSDF(one).albedo(wi).mean() for one in (near, Material(lobes=returned)))
-    peaks = (MaterialBSDF(one).eval(wi, wi).mean() for one in (without_retro(near), near))
-    least, most = (float(peak) for peak in peaks)
+    least, most = (_towards_light(one) for one in (without_retro(material), material))
     return [
         f"retro-reflection: the format has none; at {LOST_AT_DEG} degrees {lost / max(whole, 1e-9):.0%} of the "
         f"reflected light is lost, and f towards the light is {least:.3g} in place of {most:.3g} /sr"
     ]
+
+
+def _towards_light(material: Material) -> float:
+    """f back towards the light, 1/sr."""
+    wi = direction(np.radians(LOST_AT_DEG), 0.0)
+    return float(MaterialBSDF(material).eval(wi, wi).mean())
+
+
+def kept_towards_light(material: Material) -> float:
+    """What is left of f back towards the light without retro lobes, as a share; 1 where there are none."""
+    if not any(lobe.retro for lobe in material.lobes):
+        return 1.0
+    return _towards_light(without_retro(material)) / max(_towards_light(material), 1e-30)
 
 
 def match(
@@ -120,10 +132,10 @@ def _differences(pairs: Pairs) -> Callable[[Floats], Floats]:
     return differences
 
 
-def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
+def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str], towards_light: float = 1.0) -> Cost:
     """The cost of a written model with f (N, C) at `pairs`, including light that is not the material's.
 
-    A grey model of a material whose retro lobes alone are coloured has C = 1.
+    `towards_light` is of `kept_towards_light`. C is 1 of a grey model whose retro lobes alone had colour.
     """
     f_written = np.broadcast_to(f_written, pairs.samples.f.shape)
     light = light_ratios(pairs.samples, f_written)
@@ -132,7 +144,7 @@ def cost_of(pairs: Pairs, f_written: Floats, lost: Sequence[str]) -> Cost:
         for side, ratio in light.items()
         if abs(ratio - 1) > ALBEDO_TOLERANCE
     ]
-    return Cost((*lost, *mentioned), *errors_and_shares(pairs.samples, f_written), light)
+    return Cost((*lost, *mentioned), *errors_and_shares(pairs.samples, f_written), light, towards_light)
 
 
 def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str]:

@@ -11,7 +11,16 @@ from lambent.core.arrays import Floats
 from lambent.core.progress import Progress
 from lambent.materials.document import Lobe, Material
 from lambent.materials.export.contract import Cost
-from lambent.materials.export.match import ALPHA_MAX, ALPHA_MIN, cost_of, match, rounded, slope_start, without_retro
+from lambent.materials.export.match import (
+    ALPHA_MAX,
+    ALPHA_MIN,
+    cost_of,
+    kept_towards_light,
+    match,
+    rounded,
+    slope_start,
+    without_retro,
+)
 from lambent.materials.export.pairs import CHECK_LOG2, FIT_LOG2, Pairs, pairs_of
 
 
@@ -96,7 +105,8 @@ def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Prog
 
     Retro lobes have no counterpart: the others are matched without them, and the cost counts them.
     """
-    check, material = pairs_of(material, CHECK_LOG2, seed=1), without_retro(material)
+    check, towards_light = pairs_of(material, CHECK_LOG2, seed=1), kept_towards_light(material)
+    material = without_retro(material)
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     kd, kt_d = (np.array(rgb[: pairs.samples.f.shape[1]]) for rgb in (material.kd, material.kt_d))
     found = Likeness(kd, kt_d)
@@ -109,7 +119,7 @@ def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Prog
 
         best = _read(match(pairs, model, [start], (low, high), progress, tool.name)[0], material, tool, pairs)
         found = Likeness(rounded(best.kd), rounded(best.kt_d), tuple(tool.rounded(part) for part in best.parts))
-    return found, cost_of(check, found.eval(check, tool), lost)
+    return found, cost_of(check, found.eval(check, tool), lost, towards_light)
 
 
 def _diffuse_space(coefficient: Floats) -> tuple[Floats, Floats, Floats]:

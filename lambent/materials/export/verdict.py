@@ -17,6 +17,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "log": (0.2, 0.75),
 }
 LIGHT_LIMITS = (0.05, 0.25)  # relative difference of the light to either side
+RETRO_LIMITS = (0.3, 0.75)  # of f back towards the light: what a tape is made for, however little light it is
 _LIGHT: dict[Side, str] = {"reflection": "reflected light", "transmission": "transmitted light"}
 
 
@@ -39,8 +40,9 @@ class Verdict:
         return f"{self.word}: {self.reason}"
 
 
-def verdict_of(share: Mapping[str, float], light: Mapping[Side, float]) -> Verdict:
-    """The verdict by errors as shares of the subject's size, and by the light written over the subject's.
+def verdict_of(share: Mapping[str, float], light: Mapping[Side, float], towards_light: float = 1.0) -> Verdict:
+    """The verdict by errors as shares of the subject's size, and by what is written over the subject's: of the light,
+    and of f back towards the light.
 
     The worst figure decides; all figures beyond the same limit are named.
     """
@@ -48,6 +50,8 @@ def verdict_of(share: Mapping[str, float], light: Mapping[Side, float]) -> Verdi
         return Verdict("not compared", "the file was not compared with its source")
     measures = [(f"{name} {value:.0%}", value, *LIMITS[name]) for name, value in share.items()]
     measures += [(f"{_LIGHT[side]} {ratio:.2f} times", abs(ratio - 1), *LIGHT_LIMITS) for side, ratio in light.items()]
+    if towards_light != 1:
+        measures.append((f"f towards the light {towards_light:.2g} times", abs(towards_light - 1), *RETRO_LIMITS))
     unusable = [f"{text} (limit {limit:.0%})" for text, value, _, limit in measures if not value <= limit]
     if unusable:
         return Verdict("unusable", ", ".join(unusable))

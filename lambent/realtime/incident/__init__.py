@@ -8,12 +8,14 @@ and, where samples can be aimed at lamps through it (AIMS),
     fn aim_maps(x: vec3f) -> bool                        whether that can be done at x
     fn aimed_look_up(x: vec3f, w: vec3f) -> Aimed        incident_look_up, and how densely the probe's directions lie
     fn aim_towards(x: vec3f, q: vec3f) -> Towards        the way back, from a direction q of the probe
-The types are those of shaders/incident.wgsl. Bindings of its own are in group 2, from 3 on.
+The types are those of shaders/incident.wgsl. Bindings of its own are in group 2, from 3 on. A look-up whose light is
+not that of the probe's cube map has besides all functions of shaders/incident_light.wgsl.
 """
 
 from __future__ import annotations
 
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, cast
 
@@ -45,13 +47,15 @@ class LookUp(Protocol):
     def constants(self, probe: Probe) -> dict[str, int]:
         """Values of the shader's `override` constants."""
 
-    def resources(self, device: Any, probe: Probe) -> tuple[Any, ...]:
-        """Buffers and views of textures that its shader reads."""
+    def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
+        """Buffers and views of textures that its shader reads; what of them follows the view joins `streams`."""
 
 
 def look_ups() -> dict[str, LookUp]:
-    """All look-ups by name, from cheap to dear."""
-    found = [cast(LookUp, module) for module in modules_in(sys.modules[__name__], having="NAME").values()]
+    """All look-ups by name, from cheap to dear. A file may have several, in `LOOK_UPS`."""
+    here = sys.modules[__name__]
+    found = [cast(LookUp, module) for module in modules_in(here, having="NAME").values()]
+    found += [one for module in modules_in(here, having="LOOK_UPS").values() for one in module.LOOK_UPS]
     return {look_up.NAME: look_up for look_up in sorted(found, key=lambda one: one.COST)}
 
 
@@ -66,3 +70,15 @@ def look_up_of(probe: Probe, wanted: str, among: dict[str, LookUp]) -> LookUp:
 def shader_of(look_up: LookUp) -> str:
     """WGSL of a look-up."""
     return Path(look_up.__file__).with_suffix(".wgsl").read_text(encoding="utf-8")
+
+
+@cache
+def brings_light(look_up: LookUp) -> bool:
+    """Whether its light is its own, not that of the probe's cube map."""
+    return "fn incident(" in shader_of(look_up)
+
+
+def included(look_up: LookUp) -> dict[str, str]:
+    """What `shader_source.assemble` is given for a draw with that look-up."""
+    own = {"incident_light.wgsl": ""} if brings_light(look_up) else {}
+    return {"look_up.wgsl": shader_of(look_up), **own}

@@ -31,7 +31,7 @@ def constants(probe: Probe) -> dict[str, int]:
     return {}
 
 
-def resources(device: Any, probe: Probe) -> tuple[Any, ...]:
+def resources(device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
     assert probe.distance is not None, "this look-up does not serve the probe"
     distance = np.minimum(np.nan_to_num(probe.distance, nan=HALF_MAX, posinf=HALF_MAX), HALF_MAX)
     return (cube_texture(device, [inverse_depth(distance)], "r16float").create_view(dimension="cube"),)

@@ -25,5 +25,5 @@ def constants(probe: Probe) -> dict[str, int]:
     return {}
 
 
-def resources(device: Any, probe: Probe) -> tuple[Any, ...]:
+def resources(device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
     return ()

@@ -30,7 +30,7 @@ def constants(probe: Probe) -> dict[str, int]:
     return {"PLANES": padded_count(probe)}
 
 
-def resources(device: Any, probe: Probe) -> tuple[Any, ...]:
+def resources(device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
     return (device.create_buffer_with_data(data=about_centre(probe), usage=wgpu.BufferUsage.STORAGE),)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lambent.realtime.clusters import Seen
+from lambent.realtime.clusters import Ranges, Seen
 from lambent.realtime.context import FrameContext
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.pipelines import pipeline
@@ -18,7 +18,7 @@ class DepthPass:
 
     def __init__(self, layouts: Layouts) -> None:
         device, groups = layouts.device, [layouts.frame, layouts.material]
-        whole, masked = (device.create_shader_module(code=assemble(name)) for name in ("vertex.wgsl", "mask.wgsl"))
+        whole, masked = (device.create_shader_module(code=assemble(name)) for name in ("depth.wgsl", "mask.wgsl"))
         self._whole, self._masked, self._solid = (
             pipeline(device, module, entry, groups[:count], (), compare="greater", writes_depth=True)
             for module, entry, count in ((whole, "", 1), (masked, "mask_main", 2), (masked, "solid_main", 2))
@@ -59,7 +59,11 @@ def set_geometry(render: Any, resources: SceneResources) -> None:
 
 def draw_seen(render: Any, seen: Seen, first_face: int, face_count: int) -> int:
     """Encode what is seen of a range of faces; returns the draw calls."""
-    runs = seen.of(first_face, face_count)
+    return draw_runs(render, seen.of(first_face, face_count))
+
+
+def draw_runs(render: Any, runs: Ranges) -> int:
+    """Encode (first, count) of faces; returns the draw calls."""
     for first, count in runs:
         render.draw_indexed(count * 3, 1, first * 3)
     return len(runs)

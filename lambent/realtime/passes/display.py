@@ -15,7 +15,10 @@ class TonemapPass:
     def __init__(self, layouts: Layouts) -> None:
         self._layouts, self._layout = layouts, layouts.of("exact", "exact")
         groups = [layouts.frame, self._layout]
-        self._pipeline = screen_pipeline(layouts.device, "tonemap", groups, [DISPLAY_FORMAT])
+        self._plain, self._marked = (
+            screen_pipeline(layouts.device, "tonemap", groups, [DISPLAY_FORMAT], constants={"MARKED": marked})
+            for marked in (False, True)
+        )
 
     def encode(self, context: FrameContext) -> Steps:
         """Draw into the texture whose edges are then smoothed, or into `shown` where they are not."""
@@ -24,8 +27,9 @@ class TonemapPass:
         views = [(texture or context.radiance).create_view() for texture in (context.radiance, context.prior)]
         groups = [context.frame_group, self._layouts.group(self._layout, *views)]
         target = context.unsmoothed.create_view() if context.unsmoothed else context.shown
+        pipeline = self._marked if context.unsmoothed else self._plain
         for band in context.slicing.bands("tonemap", context.state.size):
-            context.cover("tonemap", [target], self._pipeline, groups, band)
+            context.cover("tonemap", [target], pipeline, groups, band)
             yield
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lambent.realtime.clusters import Seen
 from lambent.realtime.context import FrameContext
 from lambent.realtime.draws import Draw
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE
-from lambent.realtime.incident import shader_of
+from lambent.realtime.incident import included
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.depth import draw_seen, set_geometry
+from lambent.realtime.passes.depth import draw_runs, set_geometry
 from lambent.realtime.pipelines import pipeline, screen_pipeline
 from lambent.realtime.probe_light import kind_of
 from lambent.realtime.shader_source import assemble
@@ -27,6 +27,7 @@ class Stage:
     shader: str = ""
     front_face: str = "ccw"
     blended: bool = False  # laid over what is behind by its alpha, in no order, instead of standing for it
+    mixes_parts: bool = False  # draws with the light of an object's parts, mixed near their borders
 
     def shaders(self, draw: Draw) -> tuple[str, ...]:
         """Names of the files that the shader of a draw is assembled from."""
@@ -35,12 +36,15 @@ class Stage:
         return draw.shader, "planar_shown.wgsl" if draw.planar else "probe_light.wgsl", "shade.wgsl", self.shader
 
 
-SHADE = Stage("shade_main", "shade.wgsl")
+SHADE = Stage("shade_main", "shade.wgsl", mixes_parts=True)
 FRINGE = Stage("fringe_main", "fringe.wgsl", blended=True)  # of masked surfaces, after what is whole
-_OVER = {
-    "color": {"src_factor": "src-alpha", "dst_factor": "one-minus-src-alpha", "operation": "add"},
-    "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
-}
+_OVER, _ADDED = (
+    {
+        "color": {"src_factor": source, "dst_factor": behind, "operation": "add"},
+        "alpha": {"src_factor": "zero", "dst_factor": "one", "operation": "add"},
+    }
+    for source, behind in (("src-alpha", "one-minus-src-alpha"), ("one", "one"))
+)
 
 
 class Shading:
@@ -60,15 +64,18 @@ class Shading:
     ) -> None:  # fmt: skip
         """Encode into a render pass of `formats` whose group 0 is set; `light` is group 3."""
         set_geometry(render, context.resources)
+        draws = list(draws)
+        if self._stage.mixes_parts:
+            draws += [replace(draw, is_beyond=True) for draw in draws if draw.item.beyond]
         for draw in draws:
-            record = draw.item.record
-            if not seen.of(record.first_face, record.face_count):
+            runs = [run for faces in draw.faces for run in seen.of(*faces)]
+            if not runs:
                 continue
             render.set_pipeline(self._pipeline(draw, formats))
             render.set_bind_group(1, draw.material_group)
             render.set_bind_group(2, draw.object_group)
             render.set_bind_group(3, context.reflections if self._is_reflecting(draw) else light)
-            context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
+            context.counts["draw_calls"] += draw_runs(render, runs)
 
     def _is_reflecting(self, draw: Draw) -> bool:
         return draw.planar and self._reflections is not None
@@ -80,13 +87,14 @@ class Shading:
         if key not in self._pipelines:
             layouts = self._layouts
             if shaders not in self._modules:
-                code = assemble(*shaders[0], given={"look_up.wgsl": shader_of(draw.look_up)})
+                code = assemble(*shaders[0], given=included(draw.look_up))
                 self._modules[shaders] = layouts.device.create_shader_module(code=code)
             light = self._reflections if self._is_reflecting(draw) else self._light
             groups = [layouts.frame, layouts.material, layouts.object(draw.look_up.BINDINGS, kind_of(draw.cube)), light]
             self._pipelines[key] = pipeline(
                 layouts.device, self._modules[shaders], stage.entry, groups, formats, constants=constants,
-                compare="greater" if stage.blended else "equal", blend=_OVER if stage.blended else None,
+                compare="greater" if stage.blended else "equal",
+                blend=_OVER if stage.blended else _ADDED if draw.is_beyond else None,
                 front_face=stage.front_face,
             )  # fmt: skip
         return self._pipelines[key]
@@ -123,6 +131,18 @@ class LightPass:
             render.end()
             yield
         context.radiance = context.target.radiance
+
+    def missed(self, context: FrameContext, load_op: str) -> Steps:
+        """Draw where the target has depths of what the frame missed (`CoverPass`); the sky too, between thin things."""
+        format, layouts = context.target.radiance.format, self._layouts
+        light = layouts.group(layouts.light, *context.light)
+        for band in context.slicing.bands("missed light", context.state.size):
+            load_op = band.load_op if load_op == "clear" else load_op
+            render = context.begin("missed light", [context.target.radiance.create_view()], load_op, band=band)
+            self._shade.draw(render, context, context.draws, context.thin(band.shares), (format,), light)
+            self._draw_sky(render, context, format)
+            render.end()
+            yield
 
     def _draw_sky(self, render: Any, context: FrameContext, format: str) -> None:
         """The environment where the depth pass left infinity."""

@@ -64,7 +64,7 @@ class PlanarPass:
         cells = self._cells.views(view.size)[0]
         group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
-        draws = [draw.by(how, context.resources, draw.n) for draw in mine]
+        draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
         for band in context.slicing.bands("planar", context.state.size):
             render = context.begin("planar", layers, "load" if index else band.load_op, band=band)
             self._shading.draw(render, context, draws, context.seen(band.shares), (FORMAT,) * FOUND, group)

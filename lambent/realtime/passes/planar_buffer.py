@@ -17,7 +17,7 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.sun import SunPass
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.planar_view import PlanarView, levels_of
+from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, levels_of
 from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
@@ -30,12 +30,14 @@ FIRST_PX = 4  # side of the finest cells, CELL_PX of shaders/planar_view.wgsl
 MOST_LEVELS = 7  # of cells; the coarsest have 256 px
 FORMATS = LIGHT_FORMAT, PLANE_FORMAT = "rgba16float", "rgba32float"
 MIRRORED_N = 3  # samples per lobe of what is mirrored, from its probe
-STAGE = Stage("planar_buffer_main", "planar_buffer.wgsl", "cw")  # mirrored triangles turn the other way
+STAGE = Stage(
+    "planar_buffer_main", "planar_buffer.wgsl", "cw", mixes_parts=True
+)  # mirrored triangles turn the other way
 
 
 @dataclass(frozen=True)
 class PlanarBuffer:
-    """Textures of one size, used by one reflector after the other, and their views."""
+    """Textures of one size, used by all reflectors that need it, one after the other, and their views."""
 
     target: Target
     light: Any  # all levels
@@ -90,7 +92,7 @@ class PlanarCells:
             screen_pipeline(layouts.device, "planar_cells", [self._layout], [CELL_FORMAT], entry)
             for entry in ("first_cells_main", "cells_main")
         )
-        self.views = lru_cache(1)(self._new_views)
+        self.views = lru_cache(MOST_REFLECTORS)(self._new_views)
 
     def _new_views(self, size: tuple[int, int]) -> list[Any]:
         """Views of the cells of buffers of that size: all levels, then each."""
@@ -110,14 +112,14 @@ class PlanarCells:
 
 
 class PlanarBufferPass:
-    """Draws the mirrored views of a frame; they share one buffer, so each is shaded from before the next is drawn."""
+    """Draws the mirrored views of a frame; they may share a buffer, so each is shaded from before the next is drawn."""
 
     def __init__(self, layouts: Layouts, depth: DepthPass) -> None:
         device = layouts.device
         self._layouts, self._depth = layouts, depth
         self._sun = SunPass(layouts, "cw")
         self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
-        self.buffer = lru_cache(1)(lambda size: PlanarBuffer.of(device, size))
+        self.buffer = lru_cache(MOST_REFLECTORS)(lambda size: PlanarBuffer.of(device, size))
         self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
         self._frame = cache(lambda index: layouts.uniform(FRAME_DTYPE.itemsize))
         groups = [layouts.frame, layouts.cube]
@@ -152,7 +154,7 @@ class PlanarBufferPass:
             seen = context.seen(band.shares)
             self._shading.draw(render, context, context.draws, seen, FORMATS, light)
             render.set_pipeline(self._sky)
-            render.set_bind_group(1, resources.sky_group)
+            render.set_bind_group(1, resources.mirrored_sky_group)
             render.draw(3)
             context.counts["draw_calls"] += 1
             render.end()

@@ -13,6 +13,13 @@ fn filmic(c: vec3f) -> vec3f {
     return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
+// Light that the filmic curve shows as `shown`, 0 to 1.
+fn filmic_inverse(shown: vec3f) -> vec3f {
+    let a = 2.43 * shown - 2.51;
+    let b = 0.59 * shown - 0.03;
+    return (-b - sqrt(b * b - 0.56 * a * shown)) / (2.0 * a);
+}
+
 // Khronos PBR Neutral (2024): colours below .76 are kept, highlights roll off and lose saturation.
 fn neutral(c: vec3f) -> vec3f {
     let start = 0.76;

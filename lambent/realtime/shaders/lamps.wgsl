@@ -40,7 +40,7 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, out: f32) -> vec3f {
         let b = rejection((to_local * second.xyz) * per_t, wi);
         let light = lambent_lamp_response(lobe, wo, wi, a, b);
         let share = clamp(out - flux.w, 0.0, 1.0) * select(1.0, facing, place.w > 0.0);
-        sum += share * select(reaching(s, to), s.occlusion, place.w > 0.0) * flux.rgb * light;
+        sum += share * s.occlusion * flux.rgb * light;
     }
     return sum;
 }

@@ -10,5 +10,5 @@ struct BufferTexel {
     let to_eye = frame.eye.xyz - v.p_world;
     let given = select(vec3f(0.0, 1.0, 0.0), v.n_world, dot(v.n_world, v.n_world) > 1e-12);
     let n = normalize(given) * select(-1.0, 1.0, dot(given, to_eye) > 0.0);
-    return BufferTexel(vec4f(surface_light(v, front), 1.0), vec4f(n, -dot(n, to_eye)));
+    return BufferTexel(vec4f(part_share(v.p_world) * surface_light(v, front), 1.0), vec4f(n, -dot(n, to_eye)));
 }

@@ -1,5 +1,5 @@
 // Specular light of an object that has pixels on planar reflectors: what these reflect was found before; other pixels, and
-// lobes of transmission and retro-reflection, have the probe's light. Interleaved light is cleaned here, along columns, as
+// lobes of transmission and retro-reflection, have the probe's light. The sun is in neither. Interleaved light is cleaned here, along columns, as
 // far as the lobe is wider than the pixels it is mixed from.
 
 #include "colour.wgsl"
@@ -17,6 +17,7 @@ fn specular_light(wo: vec3f, s: Surface) -> vec3f {
     var sum = vec3f(0.0);
     if (reflecting) { sum = sharp.rgb + cleaned(wo, s, at, sharp.a); }
     for (var i = 0u; i < LOBES; i++) {
+        sum += sun_light(i, wo, s);
         if (reflecting && lobe_mirrors(lobes[i].lobe)) { continue; }
         sum += integrate(i, wo, s);
     }

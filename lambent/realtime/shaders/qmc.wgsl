@@ -12,9 +12,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     for (var k = 0u; k < SAMPLES; k++) {
         let at = sample_about(wo, lambent_sample_half_vector(sequence(offset, frame.first_sample + k), lobe));
         if (!at.seen) { continue; }
-        let found = incident_look_up(s.x, to_world(s, on_side(lobe, at.wi)));
-        let light = textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
-        sum += gain(lobe, at.wi, wo, at.h) * reaching(s, found.direction) * light;
+        sum += gain(lobe, at.wi, wo, at.h) * incident_ray(s, on_side(lobe, at.wi));
     }
     return sum / f32(SAMPLES);
 }

@@ -3,11 +3,10 @@
 #include "vertex.wgsl"
 #include "surface.wgsl"
 #include "dominant_direction.wgsl"
-#include "sun_record.wgsl"
+#include "part_share.wgsl"
+#include "sun_light.wgsl"
 
 @group(3) @binding(0) var light_maps: texture_2d_array<f32>;
-@group(3) @binding(1) var<uniform> sun: Sun;
-@group(3) @binding(2) var sun_seen: texture_2d<f32>; // share of its disc by pixel, of sun.wgsl
 
 const FRONT = 0u;     // irradiance on the side of the normal
 const BACK = 1u;      // on the other
@@ -16,15 +15,6 @@ const DIRECTION = 2u; // dominant direction of front light, world space; 0 where
 // Least cos_o. A lobe with alpha > 0 returns without bound towards grazing, several times what arrives below a tenth;
 // measured tables end at 84 degrees as well (GRAZING_DEG of materials/measured/protocol.py).
 const GRAZING = 0.1;
-
-const SUN_REACH = 2.5; // texels of a probe around the sun's disc, within which it is seen in the probe
-
-// Share of a probe's light from a direction (of the probe) that reaches a pixel; of the sun, what the pixel sees of it.
-fn reaching(s: Surface, w: vec3f) -> f32 {
-    let off = sun.towards.w + SUN_REACH * exp2(-object.centre.w);
-    let is_sun = (sun.irradiance.w > 0.0) & (dot(w, sun.towards.xyz) * inverseSqrt(dot(w, w)) > 1.0 - 0.5 * off * off);
-    return select(s.occlusion, textureLoad(sun_seen, vec2i(s.pixel), 0).r, is_sun);
-}
 
 // Tangent, bitangent and normal of the mesh. It may bring a zero normal, and one NaN would stay in the mean of a
 // progressive series.
@@ -51,7 +41,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0);
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, points_near(v.uv2));
 }
 
 // Layers past the last are black.
@@ -68,27 +58,29 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
 
     let mesh = mesh_frame(v);
     let facing = dot(mesh[2], sun.towards.xyz) * select(-1.0, 1.0, front);
-    let direct = sun.irradiance.rgb * textureLoad(sun_seen, vec2i(v.position.xy), 0).r;
+    let direct = sun.irradiance.rgb * sun_share(s);
     let e_front = light_map(FRONT, v.uv2);
     let e_back = light_map(BACK, v.uv2);
     var e_here = select(e_back, e_front, front);
     let e_beyond = select(e_front, e_back, front) + max(-facing, 0.0) * direct;
-    var e_bent = e_here + max(facing, 0.0) * direct;
+    var e_bent = e_here;
+    var sun_cos = max(facing, 0.0);
     if ((TEXTURES & 8u) != 0u && front) {
         let bent = normalize(mesh * vec3f(s.painted.slope, 1.0));
         e_bent = e_here * bent_share(light_map(DIRECTION, v.uv2), mesh[2], bent);
-        e_bent += select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0) * direct;
+        sun_cos = select(0.0, max(dot(bent, sun.towards.xyz), 0.0), facing > 0.0);
     }
+    s.occlusion = specular_occlusion(s.n, e_bent); // of light without the sun, as probes have it
+    e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
-    s.occlusion = specular_occlusion(s.n, e_bent);
     let specular = specular_light(wo, s);
     let light = frame.show.x * (diffuse + emitted) + frame.show.y * specular + frame.show.w * e_here;
     return clamp(light, vec3f(0.0), vec3f(HALF_MAX));
 }
 
 @fragment fn shade_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
-    return vec4f(surface_light(v, front), 1.0);
+    return vec4f(part_share(v.p_world) * surface_light(v, front), 1.0);
 }

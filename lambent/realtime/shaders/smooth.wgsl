@@ -16,8 +16,12 @@ fn luma(encoded: vec3f) -> f32 {
     return dot(encoded, vec3f(0.299, 0.587, 0.114));
 }
 
+fn pixel(at: vec2i) -> vec4f {
+    return textureLoad(shown, clamp(at, vec2i(0), vec2i(textureDimensions(shown)) - 1), 0);
+}
+
 fn pixel_luma(at: vec2i) -> f32 {
-    return luma(textureLoad(shown, clamp(at, vec2i(0), vec2i(textureDimensions(shown)) - 1), 0).rgb);
+    return luma(pixel(at).rgb);
 }
 
 fn sampled(position: vec2f) -> vec3f {
@@ -40,12 +44,18 @@ fn edge_end(start: vec2f, direction: vec2f, middle: f32, tolerance: f32) -> vec2
 
 @fragment fn smooth_main(screen: Screen) -> @location(0) vec4f {
     let at = vec2i(screen.position.xy);
-    let here = textureLoad(shown, at, 0);
+    let here = vec4f(textureLoad(shown, at, 0).rgb, 1.0);
+    let north = pixel(at + vec2i(0, -1));
+    let south = pixel(at + vec2i(0, 1));
+    let west = pixel(at + vec2i(-1, 0));
+    let east = pixel(at + vec2i(1, 0));
+    // Their shares are known (cover.wgsl); to blend again would dim thin lines.
+    if (min(min(north.a, south.a), min(min(west.a, east.a), textureLoad(shown, at, 0).a)) < 1.0) { return here; }
     let m = luma(here.rgb);
-    let n = pixel_luma(at + vec2i(0, -1));
-    let s = pixel_luma(at + vec2i(0, 1));
-    let w = pixel_luma(at + vec2i(-1, 0));
-    let e = pixel_luma(at + vec2i(1, 0));
+    let n = luma(north.rgb);
+    let s = luma(south.rgb);
+    let w = luma(west.rgb);
+    let e = luma(east.rgb);
     let high = max(m, max(max(n, s), max(w, e)));
     let range = high - min(m, min(min(n, s), min(w, e)));
     if (range < max(LEAST_STEP, LEAST_CONTRAST * high)) { return here; }

@@ -1,5 +1,6 @@
-// The share of the sun's disc that each pixel sees, by a shadow map of the scene, made once (realtime/sun.py): depth along the sun's direction in nested
-// squares, the smallest first, and the least and greatest depths of blocks of texels.
+// The share of the sun's light that each pixel gets, by a shadow map of the scene, made once (realtime/sun.py): depth along the sun's direction in nested
+// squares, the smallest first, and the least and greatest depths of blocks of texels. Layers of clear glass beside it
+// (realtime/panes.py) tint what they let through.
 //
 // Penumbras are as wide as the sun's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer
 // soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself.
@@ -11,6 +12,10 @@
 @group(1) @binding(1) var sun_depths: texture_depth_2d_array;
 @group(1) @binding(2) var sun_blocks: texture_2d_array<f32>; // (least, greatest) depth
 
+@group(1) @binding(3) var pane_depths: texture_depth_2d_array; // layer x squares + square
+@group(1) @binding(4) var pane_colours: texture_2d_array<f32>;
+
+override PANES: u32 = 0u;        // layers of clear glass
 override TRANSMITS: bool = false; // surfaces show light from behind them
 
 const SUN_BLOCK = 8.0;       // texels along the side of the smallest block: BLOCK of realtime/sun.py
@@ -20,6 +25,11 @@ const SUN_LEAST_PX = 1.5;    // texels: least radius of either
 const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface is not followed
 const SUN_BIAS_PX = 0.7;     // texels, by which what is nearer to the sun casts no shadow
 const SUN_ROUNDING = 4e-7;   // of the depths' span
+const PANE_LOOKS = 8u;       // taps that look for panes
+const PANE_TAPS = 6u;        // that are averaged
+const PANE_SEARCH_PX = 4.0;  // texels of theirs, within which panes are looked for beside the one above
+const HARDLY = 1e-3;         // weight of taps that meet what blocks the sun, where no other tells
+const PANE_LEAST_PX = 0.6;   // likewise: least radius
 
 var<private> sun_turn: vec2f; // of the pattern at this pixel: share of a ring, share of a turn
 
@@ -46,23 +56,14 @@ fn sun_depth_m(stored: f32) -> f32 {
     return sun.across.w + sun.down.w * stored;
 }
 
-// Least and greatest depth (m) within `radius` texels.
+// Least and greatest depth (m) within `radius` texels, and somewhat beyond: a block's range is that of its neighbours, too.
 fn sun_range(at: SunPlace, radius: f32) -> vec2f {
-    let reach = radius + 1.0;
     let across = i32(textureDimensions(sun_blocks).y); // blocks of the first level
-    let level = u32(clamp(ceil(log2(2.0 * reach / SUN_BLOCK)), 0.0, log2(f32(across))));
-    let size = SUN_BLOCK * exp2(f32(level));
-    let most = vec2i((across >> level) - 1);
+    let level = u32(clamp(ceil(log2((radius + 1.0) / SUN_BLOCK)), 0.0, log2(f32(across))));
     let corner = select(vec2i(across, across - (across >> (level - 1u))), vec2i(0), level == 0u);
-    let low = clamp(vec2i(floor((at.texel - reach) / size)), vec2i(0), most);
-    let high = clamp(vec2i(floor((at.texel + reach) / size)), vec2i(0), most);
-    var found = vec2f(1.0, 0.0);
-    for (var i = 0u; i < 4u; i++) {
-        let block = vec2i(select(low.x, high.x, (i & 1u) == 1u), select(low.y, high.y, i > 1u));
-        let range = textureLoad(sun_blocks, corner + block, at.square, 0).xy;
-        found = vec2f(min(found.x, range.x), max(found.y, range.y));
-    }
-    return vec2f(sun_depth_m(found.x), sun_depth_m(found.y));
+    let block = vec2i(at.texel / (SUN_BLOCK * exp2(f32(level))));
+    let range = textureLoad(sun_blocks, corner + block, at.square, 0).xy;
+    return vec2f(sun_depth_m(range.x), sun_depth_m(range.y));
 }
 
 // How far (m) the map is nearer to the sun than the surface, in the texel at `offset` from its own.
@@ -112,7 +113,8 @@ fn sun_place(p_world: vec3f, n_world: vec3f) -> SunPlace {
 
 // The share of the sun's disc that a point sees; n is the normal of the flat surface there, on either side.
 //
-// Adapters in software skip loops of no turns, but neither branches nor what follows a return.
+// Adapters in software skip loops of no turns, but neither branches nor what follows a return, and a loop within another
+// costs them more than it saves: one loop looks for blockers and then compares.
 fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     let at = sun_place(p_world, n_world);
     let bias_m = SUN_BIAS_PX * at.texel_m + SUN_ROUNDING * sun.down.w;
@@ -135,24 +137,75 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
 
     var blockers = 0.0;
     var rise_m = 0.0;
-    var tap = first_sun_tap();
-    let looks = select(SUN_SEARCH, 0u, is_shaded || is_lit);
-    for (var k = 0u; k < looks; k++) {
-        let rise = sun_rise(at, radius * sqrt(tap.order / f32(SUN_SEARCH)) * tap.across);
-        let blocks = select(0.0, 1.0, rise > bias_m);
-        blockers += blocks;
-        rise_m += blocks * rise;
-        tap = next_sun_tap(tap);
-    }
-    radius = max(px_per_m * rise_m / max(blockers, 1.0), SUN_LEAST_PX);
-    tap = first_sun_tap();
     var open = 0.0;
-    let taps = select(0u, SUN_TAPS, blockers > 0.0);
-    for (var k = 0u; k < taps; k++) {
-        open += select(0.0, 1.0, sun_rise(at, radius * sqrt(tap.order / f32(SUN_TAPS)) * tap.across) <= bias_m);
+    var spread = radius * inverseSqrt(f32(SUN_SEARCH));
+    let first = first_sun_tap();
+    var tap = first;
+    turns = select(SUN_SEARCH, 0u, is_shaded || is_lit);
+    for (var k = 0u; k < turns; k++) {
+        let rise = sun_rise(at, spread * sqrt(tap.order) * tap.across);
+        let blocks = select(0.0, 1.0, rise > bias_m);
         tap = next_sun_tap(tap);
+        if (k < SUN_SEARCH) {
+            blockers += blocks;
+            rise_m += blocks * rise;
+        } else {
+            open += 1.0 - blocks;
+        }
+        if (k == SUN_SEARCH - 1u) {
+            spread = max(px_per_m * rise_m / max(blockers, 1.0), SUN_LEAST_PX) * inverseSqrt(f32(SUN_TAPS));
+            tap = first;
+            turns = select(SUN_SEARCH, SUN_SEARCH + SUN_TAPS, blockers > 0.0);
+        }
     }
     return select(select(open / f32(SUN_TAPS), 1.0, blockers == 0.0), 0.0, is_shaded);
+}
+
+// The texel of panes `offset` of them away from a point's own.
+fn pane_texel(at: SunPlace, offset: vec2f) -> vec2i {
+    let side = vec2f(textureDimensions(pane_depths));
+    let to_pane = side / vec2f(textureDimensions(sun_depths));
+    return vec2i(clamp(floor(at.texel * to_pane + offset), vec2f(0.0), side - 1.0));
+}
+
+// How far (m) a layer of panes is nearer to the sun than the surface.
+fn pane_rise(at: SunPlace, texel: vec2i, layer: u32) -> f32 {
+    let to_sun = vec2f(textureDimensions(sun_depths)) / vec2f(textureDimensions(pane_depths));
+    let here = at.depth_m + dot(at.slope, ((vec2f(texel) + 0.5) * to_sun - at.texel) * at.texel_m);
+    return sun_depth_m(textureLoad(pane_depths, texel, layer * u32(sun.irradiance.w) + at.square, 0)) - here;
+}
+
+// What the clear glass between a point and the part of the sun that it sees lets through; edges are as wide as the sun's
+// disc makes them behind the nearest pane.
+fn sun_through_panes(p_world: vec3f, n_world: vec3f) -> vec3f {
+    let at = sun_place(p_world, n_world);
+    let to_sun = f32(textureDimensions(sun_depths).x) / f32(textureDimensions(pane_depths).x);
+    let texel_m = at.texel_m * to_sun;
+    let bias_m = SUN_BIAS_PX * texel_m + SUN_ROUNDING * sun.down.w;
+    let inside = at.square < u32(sun.irradiance.w);
+    var tap = first_sun_tap();
+    var rise_m = 0.0;
+    for (var k = 0u; k < select(0u, PANE_LOOKS, inside); k++) {
+        let reach = select(PANE_SEARCH_PX * tap.order / f32(PANE_LOOKS), 0.0, k == 0u);
+        rise_m = max(rise_m, pane_rise(at, pane_texel(at, reach * tap.across), 0u));
+        tap = next_sun_tap(tap);
+    }
+    let radius = max(sun.towards.w * rise_m / texel_m, PANE_LEAST_PX);
+    var sum = vec4f(0.0);
+    tap = first_sun_tap();
+    let taps = select(0u, PANE_TAPS, rise_m > bias_m);
+    for (var k = 0u; k < taps; k++) {
+        let offset = radius * sqrt(tap.order / f32(PANE_TAPS)) * tap.across;
+        let texel = pane_texel(at, offset);
+        var passed = vec3f(1.0);
+        for (var layer = 0u; layer < PANES; layer++) {
+            let colour = textureLoad(pane_colours, texel, layer * u32(sun.irradiance.w) + at.square, 0).rgb;
+            passed *= select(vec3f(1.0), colour, pane_rise(at, texel, layer) > bias_m);
+        }
+        sum += select(HARDLY, 1.0, sun_rise(at, offset * to_sun) <= bias_m) * vec4f(passed, 1.0);
+        tap = next_sun_tap(tap);
+    }
+    return select(vec3f(1.0), sum.rgb / sum.a, taps > 0u);
 }
 
 @fragment fn sun_main(v: Varyings, @builtin(front_facing) front: bool) -> @location(0) vec4f {
@@ -162,5 +215,7 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
     turn_sun_pattern(vec2u(v.position.xy));
     var seen = 0.0;
     for (var i = 0u; i < select(0u, 1u, TRANSMITS | (facing > 0.0)); i++) { seen = sun_visibility(v.p_world, n); }
-    return vec4f(seen);
+    var passed = vec3f(1.0);
+    for (var i = 0u; i < select(0u, 1u, PANES > 0u && seen > 0.0); i++) { passed = sun_through_panes(v.p_world, n); }
+    return vec4f(seen * passed, 1.0);
 }

@@ -1,10 +1,11 @@
 // Materials (group 1), objects and the light around them (group 2), and the light from a direction; look_up.wgsl is the
-// shader of the look-up in use, see lambent/realtime/incident.
+// shader of the look-up in use, see lambent/realtime/incident, which may bring an incident_light.wgsl of its own.
 
 #include "lobes.wgsl"
 #include "colour.wgsl"
 #include "incident.wgsl"
 #include "look_up.wgsl"
+#include "incident_light.wgsl"
 #include "material.wgsl"
 
 override SAMPLES: u32 = 7u; // n per lobe
@@ -21,6 +22,7 @@ struct Object {
     centre: vec4f, // of the probe; w: half the log2 of texels per unit area of the cube [-1, 1]^3
     emission: vec4f,
     irradiance: array<vec4f, 3>, // luminance that the probe alone would give, see probe_irradiance; 0 where it is not asked
+    borders: array<vec4f, 2>, // of a part, see ObjectRecord of store/contract.py
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
@@ -39,6 +41,7 @@ struct Surface {
     pixel: vec2u,
     painted: Painted,
     occlusion: f32, // share of the probe's light that reaches the pixel
+    points: vec4u,  // of a light field, near the pixel
 }
 
 // A lobe where the textures have changed its numbers: the samples, of slopes of the material's mx and my, grow by
@@ -81,18 +84,6 @@ fn level_of_look_up(found: LookUp, half_log2_omega: f32) -> f32 {
     let major = max_norm(found.direction);
     let stretch = found.t * found.t * length(found.direction) / (major * major * major);
     return max(half_log2_omega + 0.5 * log2(max(stretch, 1e-20)) + object.centre.w, 0.0);
-}
-
-// Light from local direction w, averaged over the solid angle omega sr.
-fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
-    let found = incident_look_up(s.x, to_world(s, w));
-    let level = level_of_look_up(found, half_log2_omega);
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
-}
-
-fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
-    let found = incident_look_up(s.x, to_world(s, w));
-    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
 }
 
 // A sample of a lobe: wi is wo mirrored about the half vector h; not `seen` where the lobe does not go.

@@ -6,8 +6,10 @@
 @group(1) @binding(0) var radiance: texture_2d<f32>;
 @group(1) @binding(1) var prior: texture_2d<f32>; // of few samples; `radiance` again where there is none
 
+override MARKED: bool = false; // alpha tells smooth.wgsl what is a mean over surfaces; it is never shown
+
 @fragment fn tonemap_main(screen: Screen) -> @location(0) vec4f {
     let at = vec2i(screen.position.xy);
-    let seen = mix(textureLoad(radiance, at, 0).rgb, textureLoad(prior, at, 0).rgb, frame.prior);
-    return vec4f(displayed(seen), 1.0);
+    let seen = mix(textureLoad(radiance, at, 0), textureLoad(prior, at, 0), frame.prior);
+    return vec4f(displayed(seen.rgb), select(1.0, seen.a, MARKED));
 }

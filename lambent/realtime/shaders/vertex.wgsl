@@ -1,4 +1,4 @@
-// The one vertex stage of depth and shade passes; @invariant, so that their depths agree to the bit.
+// The vertex stage of shade passes and, with depth.wgsl, of depth; @invariant, so that they agree to the bit.
 
 #include "frame.wgsl"
 

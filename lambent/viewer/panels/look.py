@@ -71,7 +71,8 @@ def draw_reflections(look: Look, *, planar: bool) -> None:
     look.integrator = choice("integrator", look.integrator, INTEGRATORS, "how reflections are summed in motion")
     _samples(look)
     meaning = (
-        "where a reflected ray is taken to end: at the bounding planes, at the probe's distances, or infinitely far"
+        "where a reflected ray is taken to end: at the bounding planes, at the probe's distances, or infinitely far; "
+        "light_field: by the maps over the object, where it has them"
     )
     look.lookup = choice("look-up", look.lookup, LOOKUPS, meaning)
     if planar:
@@ -102,6 +103,8 @@ def draw_quality(pace: Pace) -> None:
         "refine while nothing moves", pace.refine, "averages unbiased frames until the picture is clean"
     )
     meaning = "draws a smaller picture in motion where the adapter is too slow for the frame time"
+    covers = "keeps wires and slats whole in motion: each pixel shows five places; half as slow again in software"
+    pace.covers = check("thin things in motion", bool(pace.covers), covers)
     pace.adaptive = check("fewer pixels in motion where needed", pace.adaptive, meaning)
     imgui.begin_disabled(not pace.adaptive)
     meaning = f"time that a frame in motion is to take; {1e3 * BUDGET_S:.0f} ms are 15 frames a second"

@@ -17,6 +17,7 @@ from lambent.materials.document import Lobe, Material, load_material, material_f
 from lambent.materials.export import gltf, gonio_text, lbnl_xml, materialx, merl, mitsuba
 from lambent.materials.export.match import without_retro
 from lambent.materials.export.resampled import read_back
+from lambent.materials.export.verdict import verdict_of
 from lambent.materials.measured import load
 
 RETRO = Lobe(retro=True, mx=0.03, my=0.03, r0=(1.0,) * 3, k=(0.4, 0.3, 0.2), alpha=-1.0)
@@ -37,6 +38,20 @@ def test_tools_without_it_say_so(writer, material, tmp_path: Path):
     assert f"in place of {MaterialBSDF(material).eval(wi, wi).mean():.3g} /sr" in line
     rest = writer.write(without_retro(material), tmp_path / f"rest{writer.ENDINGS[0]}")
     assert cost.share["l2_ngan"] > 0.5 > rest.share["l2_ngan"]
+    assert cost.verdict.word == "unusable" and "f towards the light" in cost.verdict.reason
+    assert rest.towards_light == 1
+
+
+def test_a_tape_that_returns_nothing_is_unusable_however_little_light_that_is(tmp_path: Path):
+    """A peak of 5 % of the light, a hundred and more times as bright as the sheet about it."""
+    sheet = TAPE.model_copy(update={"lobes": (RETRO.model_copy(update={"k": (0.02,) * 3, "mx": 0.005, "my": 0.005}),)})
+    cost = gltf.write(sheet, tmp_path / "tape.gltf")
+    wi = direction(np.radians(30), 0.0)
+    least, most = (MaterialBSDF(one).eval(wi, wi).mean() for one in (without_retro(sheet), sheet))
+    assert cost.towards_light == pytest.approx(least / most) and least < 0.01 * most
+    assert verdict_of(cost.share, cost.light).word == "approximate" and cost.verdict.word == "unusable"
+    faint = sheet.model_copy(update={"lobes": (sheet.lobes[0].model_copy(update={"mx": 0.5, "my": 0.5}),)})
+    assert gltf.write(faint, tmp_path / "faint.gltf").verdict.word != "unusable"
 
 
 def test_exact_documents_are_kept_beside(tmp_path: Path):

@@ -12,7 +12,7 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.export import gltf
 from lambent.materials.export.contract import Cost
 from lambent.materials.export.registry import writers
-from lambent.materials.export.verdict import LIGHT_LIMITS, LIMITS, verdict_of
+from lambent.materials.export.verdict import LIGHT_LIMITS, LIMITS, RETRO_LIMITS, verdict_of
 from lambent.materials.measured.metrics import METRICS
 from tests.materials.export.export_materials import ALL
 
@@ -37,7 +37,8 @@ def test_the_page_states_the_limits() -> None:
     stated = {name.split(":")[0].strip(): (int(low) / 100, int(high) / 100) for name, low, high in rows}
     names = {"l1": "L1", "l2_ngan": "L2 (Ngan)", "cuberoot": "cube root", "log": "log"}
     assert stated == {names[name]: limits for name, limits in LIMITS.items()} | {
-        "reflected and transmitted light, each": LIGHT_LIMITS
+        "reflected and transmitted light, each": LIGHT_LIMITS,
+        "f back towards the light, where retro lobes were left out": RETRO_LIMITS,
     }
 
 

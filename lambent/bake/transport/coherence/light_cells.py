@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Indices
+from lambent.core.octahedral import texel_directions, to_square
 
 TABLE = 512  # texels of an edge of the octahedral map by which cells are looked up
 
@@ -38,17 +39,9 @@ class CellTable:
     def __init__(self, directions: Floats) -> None:
         from scipy.spatial import cKDTree
 
-        u, v = np.meshgrid(*[(np.arange(TABLE) + 0.5) / TABLE * 2 - 1] * 2)
-        z = 1 - np.abs(u) - np.abs(v)
-        fold = np.maximum(-z, 0)
-        texels = np.stack([u - np.copysign(fold, u), v - np.copysign(fold, v), z], axis=-1).reshape(-1, 3)
-        unit = texels / np.linalg.norm(texels, axis=1, keepdims=True)
-        self._cell = cKDTree(directions).query(unit)[1]
+        self._cell = cKDTree(directions).query(texel_directions(TABLE).reshape(-1, 3))[1]
 
     def at(self, w: Floats) -> Indices:
         """Lights (n,) in whose cells the directions w (n, 3), of any length, lie."""
-        x, y, z = (w / np.abs(w).sum(axis=1, keepdims=True)).T
-        fold = np.maximum(-z, 0)
-        u, v = x + np.copysign(fold, x), y + np.copysign(fold, y)
-        column, row = (np.clip(((c + 1) / 2 * TABLE).astype(np.int64), 0, TABLE - 1) for c in (u, v))
+        column, row = np.clip((to_square(w) * TABLE).astype(np.int64), 0, TABLE - 1).T
         return np.asarray(self._cell[row * TABLE + column])

@@ -18,6 +18,7 @@ from lambent.core.plain import Triple, triple
 from lambent.scenes.geometry import positions_under, transformed
 from lambent.scenes.loaders.contents import Contents, UniqueNames
 from lambent.scenes.loaders.gltf.container import Gltf, read
+from lambent.scenes.loaders.gltf.luminaires import Luminaires
 from lambent.scenes.loaders.gltf.materials import surface_of
 from lambent.scenes.loaders.gltf.schema import MaterialDocument, Node, Primitive
 from lambent.scenes.loaders.gltf.textures import Textures, main_uv_set
@@ -74,6 +75,7 @@ class _Reading:
         self._lights: list[Light] = []
         self._cameras: list[Camera] = []
         self._warnings: list[str] = []
+        self._luminaires = Luminaires(gltf, self._warnings.append)
         self._names, self._camera_names = UniqueNames(), UniqueNames()
         self._renamed: dict[str, list[str]] = {}
         self._meshes: dict[tuple[int, int, int], Mesh | None] = {}
@@ -130,7 +132,10 @@ class _Reading:
             self._add_mesh(node.mesh, node.name, world)
         if node.camera is not None:
             self._add_camera(node.camera, node.name, world)
-        if node.light is not None:
+        if node.luminaire is not None:  # what stands beside it is for programs that cannot read it
+            luminaire = self._luminaires.at(node, world)
+            self._lights += [luminaire] if luminaire is not None else []
+        elif node.light is not None:
             self._add_light(node.light, world)
 
     def _add_mesh(self, index: int, node_name: str | None, world: Floats) -> None:

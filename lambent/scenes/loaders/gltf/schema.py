@@ -94,6 +94,9 @@ class Node(_Extended):
     mesh: Index | None = None
     camera: Index | None = None
     light: Index | None = _extension("KHR_lights_punctual", "light")
+    luminaire: Index | None = _extension("EXT_lights_ies", "light")
+    luminaire_multiplier: NotNegative = _extension("EXT_lights_ies", "multiplier", default=1.0)
+    luminaire_color: Colour = _extension("EXT_lights_ies", "color", default=(1.0, 1.0, 1.0))
     matrix: Annotated[list[Finite], Field(min_length=16, max_length=16)] | None = None
     translation: Three = (0, 0, 0)
     rotation: Four = (0, 0, 0, 1)
@@ -231,6 +234,14 @@ class LightDocument(_Part):
     outer_rad: Annotated[float, Field(gt=0, le=1.5708)] = _at("spot", "outerConeAngle", default=0.7854)
 
 
+class ProfileDocument(_Part):
+    """An IES file."""
+
+    name: str = ""
+    uri: str | None = None
+    bufferView: Index | None = None
+
+
 class Variant(_Part):
     name: str
 
@@ -252,5 +263,6 @@ class GltfDocument(_Extended):
     samplers: list[Sampler] = []
     cameras: list[CameraDocument] = []
     lights: list[LightDocument] = _extension("KHR_lights_punctual", "lights", default=[])
+    profiles: list[ProfileDocument] = _extension("EXT_lights_ies", "lights", default=[])
     variants: list[Variant] = _extension("KHR_materials_variants", "variants", default=[])
     extensionsRequired: list[str] = []

@@ -38,6 +38,7 @@ from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
     Light,
+    LightFieldWish,
     Mesh,
     PointLight,
     ReflectorRule,
@@ -68,7 +69,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     described = _materials(document, path, files)
     materials = {**whole.materials, **described}
     objects, unfit = assigned(document.assign, whole.objects, materials, path)
-    objects, centres, planes = _apply(document, objects, path)
+    objects, centres, planes, light_fields = _apply(document, objects, path)
     for o in objects:
         check_material(o.material, materials, path, f"objects.{o.name}.material")
     if isinstance(environment, ImageEnvironment):
@@ -95,6 +96,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         measured=_measured(document, materials, path, files),
         probe_planes=planes,
         probe_centres=centres,
+        light_fields=light_fields,
         reflector_rules=_reflector_rules(document, objects, path),
         crease_deg=document.crease_angle,
     )
@@ -195,15 +197,19 @@ def _begins_as_json(path: Path) -> bool:
 
 def _apply(
     document: SceneDocument, objects: tuple[SceneObject, ...], path: Path
-) -> tuple[tuple[SceneObject, ...], dict[str, Triple], dict[str, Any]]:
-    """Objects with the document's settings, and the probes' centres and planes by object; later patterns win."""
+) -> tuple[tuple[SceneObject, ...], dict[str, Triple], dict[str, Any], dict[str, LightFieldWish]]:
+    """Objects with the document's settings; probes' centres and planes, and light fields, by object.
+
+    Later patterns win.
+    """
     by_name = {o.name: o for o in objects}
     centres: dict[str, Triple] = {}
     planes: dict[str, Any] = {}
+    light_fields: dict[str, LightFieldWish] = {}
     for pattern, section in document.objects.items():
         settings = section.model_dump(exclude_none=True)
         centre, own_planes = settings.pop("probe_centre", None), settings.pop("probe_planes", None)
-        for key in ("luminance", "lumens", "colour"):
+        for key in ("luminance", "lumens", "colour", "light_field"):
             settings.pop(key, None)
         for name in fitting(pattern, by_name, path, f"objects.{pattern}"):
             by_name[name] = replace(by_name[name], **settings, **_light_of(by_name[name].mesh, section))
@@ -211,7 +217,10 @@ def _apply(
                 centres[name] = centre
             if own_planes is not None:
                 planes[name] = _unit_planes(own_planes)
-    return tuple(by_name.values()), centres, planes
+            if section.light_field is not None:
+                light_fields.pop(name, None)
+                light_fields |= {name: section.light_field.wish()} if section.light_field.use else {}
+    return tuple(by_name.values()), centres, planes, light_fields
 
 
 def _reflector_rules(

@@ -47,32 +47,40 @@ class _Coloured(Section):
         return colour
 
 
-class PointSection(_Coloured):
-    """W/sr, cd, or lm in all directions."""
+class _Lamp(_Coloured):
+    """A small lamp, its light said by one of three units."""
 
-    kind: Literal["point"]
     position: Vector
     intensity: Colour | None = None
     candela: NotNegative | None = None
     lumens: NotNegative | None = None
 
     @model_validator(mode="after")
-    def _light(self) -> PointSection:
+    def _said_once(self) -> _Lamp:
         one_of(self, "intensity", "candela", "lumens")
         return self
 
+    def intensity_of(self, solid_angle_sr: float) -> Triple:
+        """W/sr; lumens are spread over `solid_angle_sr`."""
+        if self.intensity is not None:
+            return self.intensity
+        candela = self.candela if self.candela is not None else (self.lumens or 0.0) / max(solid_angle_sr, 1e-9)
+        return coloured(candela, self.colour)
+
+
+class PointSection(_Lamp):
+    """W/sr, cd, or lm in all directions."""
+
+    kind: Literal["point"]
+
     def light(self) -> PointLight:
-        return PointLight(self.position, _intensity(self, 4 * math.pi))
+        return PointLight(self.position, self.intensity_of(4 * math.pi))
 
 
-class SpotSection(_Coloured):
+class SpotSection(_Lamp):
     """W/sr or cd in its middle, or lm in its cone."""
 
     kind: Literal["spot"]
-    position: Vector
-    intensity: Colour | None = None
-    candela: NotNegative | None = None
-    lumens: NotNegative | None = None
     direction: Vector
     inner_deg: Annotated[float, Field(ge=0, le=90)] = 0.0
     outer_deg: Annotated[float, Field(gt=0, le=90)] = 45.0
@@ -83,21 +91,13 @@ class SpotSection(_Coloured):
     def _cone(self) -> SpotSection:
         if self.inner_deg > self.outer_deg:
             raise ValueError("inner_deg is larger than outer_deg")
-        one_of(self, "intensity", "candela", "lumens")
         return self
 
     def light(self) -> PointLight:
         inner, outer = math.radians(self.inner_deg), math.radians(self.outer_deg)
         edge = (math.sin(outer) - math.sin(inner)) / (outer - inner) if outer > inner else math.cos(outer)
-        intensity = _intensity(self, 2 * math.pi * (1 - edge))  # falls linearly in the angle from inner to outer
+        intensity = self.intensity_of(2 * math.pi * (1 - edge))  # falls linearly in the angle from inner to outer
         return PointLight(self.position, intensity, unit(self.direction), self.inner_deg, self.outer_deg)
-
-
-def _intensity(section: PointSection | SpotSection, solid_angle_sr: float) -> Triple:
-    if section.intensity is not None:
-        return section.intensity
-    candela = section.candela if section.candela is not None else (section.lumens or 0.0) / max(solid_angle_sr, 1e-9)
-    return coloured(candela, section.colour)
 
 
 class DirectionalSection(_Coloured):

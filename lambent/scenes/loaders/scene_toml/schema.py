@@ -8,8 +8,9 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.exposure import exposure_of
+from lambent.core.light_field import LEAST_TEXELS, MOST_POINTS, MOST_TEXELS
 from lambent.core.surroundings import Axis, Layout
-from lambent.scenes.interiors import INTERIORS
+from lambent.scenes.computed import COMPUTED
 from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
 from lambent.scenes.loaders.scene_toml.sections import (
     Colour,
@@ -30,6 +31,7 @@ from lambent.scenes.scene import (
     ComputedEnvironment,
     ConstantEnvironment,
     Ground,
+    LightFieldWish,
     SunSky,
 )
 
@@ -88,7 +90,7 @@ class ConstantSection(Section):
 
 
 class ComputedSection(Section):
-    """An interior of `scenes.interiors`."""
+    """An environment of `scenes.computed`."""
 
     kind: Literal["computed"]
     name: str
@@ -96,12 +98,25 @@ class ComputedSection(Section):
     @field_validator("name")
     @classmethod
     def _is_known(cls, name: str) -> str:
-        if name not in INTERIORS:
-            raise ValueError(f"there is no computed environment {name!r}, but {', '.join(sorted(INTERIORS))}")
+        if name not in COMPUTED:
+            raise ValueError(f"there is no computed environment {name!r}, but {', '.join(sorted(COMPUTED))}")
         return name
 
     def environment(self) -> ComputedEnvironment:
         return ComputedEnvironment(self.name)
+
+
+class LightFieldSection(Section):
+    """An offset surface light field: see `scenes.scene.LightFieldWish`. `true` and `false` stand for its `use`."""
+
+    use: bool = True
+    points: Annotated[int, Field(ge=1, le=MOST_POINTS)] | None = None
+    texels: Annotated[int, Field(ge=LEAST_TEXELS, le=MOST_TEXELS)] | None = None
+    offset_m: Annotated[float, Field(gt=0, le=1000)] | None = None
+    error: Positive | None = None
+
+    def wish(self) -> LightFieldWish:
+        return LightFieldWish(**self.model_dump(exclude={"use"}))
 
 
 class ObjectSection(Section):
@@ -115,6 +130,16 @@ class ObjectSection(Section):
     light_map_scale: Positive | None = None
     probe_centre: Vector | None = None
     probe_planes: tuple[Plane, ...] | None = None
+    light_field: LightFieldSection | None = None
+
+    @field_validator("light_field", mode="before")
+    @classmethod
+    def _table_or_flag(cls, value: Any) -> Any:
+        if isinstance(value, bool):
+            return {"use": value}
+        if not isinstance(value, dict):
+            raise ValueError("is true, false, or a table of points, texels, offset_m and error")
+        return value
 
     @model_validator(mode="after")
     def _one_light(self) -> ObjectSection:

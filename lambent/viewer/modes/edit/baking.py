@@ -18,6 +18,7 @@ from lambent.bake.interreflection.proposal import Proposal, time_said
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.editing.document import SessionDocument
+from lambent.editing.interreflection.noise import PASS
 from lambent.editing.session import Session
 from lambent.viewer.work import Work
 
@@ -27,7 +28,6 @@ ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time that transport takes where a whole vie
 LEAST_DONE = 0.02  # before it, nobody can say how long it takes
 LAST_CHARACTERS = 300  # of what a worker wrote before it died
 _NUMBER = re.compile(r"(\d+) lights$")
-PASS = re.compile(r"interreflections, (\d+) samples")
 
 
 @dataclass

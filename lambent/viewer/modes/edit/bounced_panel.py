@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from imgui_bundle import imgui
 
 from lambent.bake.interreflection.proposal import Proposal
 from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN, Bounced
-from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, wrapped
+from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, press, wrapped
 
-SHARES = ("in view", "passes on")
+SHARES, MERGE = ("in view", "passes on"), "merge"
+Merge = Callable[[str, str], None]
 MOST_ROWS = 8  # of materials, before they scroll
 
 
-def draw_interreflections(bounced: Bounced) -> None:
-    """The choice and its costs, then the bake, then what is shown."""
+def draw_interreflections(bounced: Bounced, merge: Merge) -> None:
+    """The choice and its costs, then the bake, then what is shown; `merge` makes a material one with another."""
     imgui.begin_disabled(bounced.baking is not None)
     series = SERIES if bounced.series in SERIES else (*SERIES, bounced.series)
     meaning = "bands at the first surface, the second, ...; 1 stands for a diffuse surface of the same albedo"
@@ -21,7 +24,7 @@ def draw_interreflections(bounced: Bounced) -> None:
     meaning = "paths per pixel that the bake ends with"
     bounced.wanted = int(choice("samples", str(bounced.wanted), [str(n) for n in SAMPLES], meaning))
     if bounced.proposal is not None and bounced.fixed is not None:
-        _draw_materials(bounced, bounced.proposal, bounced.fixed)
+        _draw_materials(bounced, bounced.proposal, bounced.fixed, merge)
     imgui.end_disabled()
     wanted = bounced.samples < bounced.wanted
     buttons([
@@ -41,16 +44,18 @@ def draw_interreflections(bounced: Bounced) -> None:
     wrapped([bounced.trouble] if bounced.trouble else [], AMBER)
 
 
-def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str]) -> None:
-    """A check box for each material: whether it is edited in the light that it passes on."""
+def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str], merge: Merge) -> None:
+    """A check box for each material, whether it is edited in the light that it passes on; a button if it has a twin."""
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y
     line = imgui.get_frame_height() + 2 * imgui.get_style().cell_padding.y
     height = (min(len(proposal.rows), MOST_ROWS) + 1) * line
-    if not imgui.begin_table("materials", 3, flags, (0, height)):
+    titles = (*SHARES, MERGE) if proposal.alike else SHARES
+    if not imgui.begin_table("materials", 1 + len(titles), flags, (0, height)):
         return
     imgui.table_setup_column("edited", imgui.TableColumnFlags_.width_stretch)
-    for title in SHARES:
-        imgui.table_setup_column(title, imgui.TableColumnFlags_.width_fixed, imgui.calc_text_size(title).x)
+    for title in titles:
+        framed = 2 * imgui.get_style().frame_padding.x if title == MERGE else 0
+        imgui.table_setup_column(title, imgui.TableColumnFlags_.width_fixed, imgui.calc_text_size(title).x + framed)
     imgui.table_setup_scroll_freeze(0, 1)
     imgui.table_headers_row()
     for row in proposal.rows:
@@ -62,7 +67,16 @@ def _draw_materials(bounced: Bounced, proposal: Proposal, fixed: frozenset[str])
         for share in (row.in_view, row.passed_on):
             imgui.table_next_column()
             imgui.text_unformatted(f"{share:.1%}")
+        if proposal.alike:
+            imgui.table_next_column()
+            _draw_merge(row.material, proposal.alike.get(row.material), merge)
     imgui.end_table()
+
+
+def _draw_merge(material: str, twin: str | None, merge: Merge) -> None:
+    meaning = f"looks like {twin}: becomes one material with it, which takes less; undo parts them again"
+    if twin is not None and press(f"{MERGE}##{material}", meaning):
+        merge(material, twin)
 
 
 def _draw_costs(bounced: Bounced) -> None:

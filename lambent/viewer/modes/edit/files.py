@@ -68,8 +68,7 @@ class Files:
     @property
     def unsaved(self) -> bool:
         """Whether the session has changed since it was opened or saved."""
-        now, before = self._session.document, self._saved
-        return now.materials != before.materials or now.environment != before.environment
+        return self._session.document != self._saved
 
     def poll(self) -> None:
         """Take the end of what was under way."""
@@ -104,7 +103,8 @@ class Files:
         """Say on stderr which materials were changed and not saved."""
         if self.unsaved:
             now, before = self._session.document.materials, self._saved.materials
-            names = ", ".join(name for name, one in now.items() if one != before.get(name)) or "the environment"
+            changed = [name for name in {**before, **now} if now.get(name) != before.get(name)]
+            names = ", ".join(changed) or "the environment"
             sys.stderr.write(f"lambent: note: {names} changed and not saved\n")
 
     def hand_over(self, material: str) -> None:

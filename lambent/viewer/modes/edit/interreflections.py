@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 
 from lambent.bake.bounces import Bounces
 from lambent.bake.interreflection.proposal import Proposal
 from lambent.core.errors import UserError
-from lambent.editing.interreflection.noise import light_of, noise
+from lambent.editing.interreflection.noise import light_of, noise, noted_noise
 from lambent.editing.interreflection.picture import BEYOND_DIRECT
 from lambent.editing.interreflection.stored import Interreflections, interreflections, samples_of, series_of
 from lambent.editing.interreflection.whole import ALL_HITS
@@ -50,8 +50,8 @@ class Bounced:
     samples : int
         Paths per pixel of what is shown; 0 without interreflections.
     noise : float or None
-        Of what is shown: standard error of a point's interreflections, as a share of their mean. None before a second
-        pass is there to compare with.
+        Of what is shown: standard error of a point's interreflections, as a share of their mean; as the bake noted it,
+        until passes arrive to compare. None where neither is there.
     """
 
     def __init__(self, painter: Painter, bake: Callable[..., Baking] = Baking) -> None:
@@ -106,6 +106,7 @@ class Bounced:
             self.baking = None
             self.on = self.on and self.samples < self.wanted
         self._take_proposal()
+        self._keep_to(session.document.materials)
         source = session.document.environment, folder
         if not idle or self._reading is not None or self.baking is not None:
             return
@@ -171,6 +172,13 @@ class Bounced:
         self._asked = self.bounces
         self._proposing = self._bake(session, folder, bounces=self._asked, proposing=kept)
 
+    def _keep_to(self, materials: Collection[str]) -> None:
+        """Forget materials that were merged with others, and a proposal from before."""
+        if self.fixed is not None:
+            self.fixed &= frozenset(materials)
+        if self.proposal is not None and {row.material for row in self.proposal.rows} != {*materials}:
+            self.proposal = None
+
     def _take_proposal(self) -> None:
         if self._proposing is None or self._proposing.running:
             return
@@ -203,6 +211,8 @@ class Bounced:
                 self.series = ",".join(map(str, series_of(store, copy)))
                 self.fixed = frozenset(originals) - {name for name, side in light.tails.slots if side != FIXED}
             self._see_noise(light, originals)
+            if self.noise is None:
+                self.noise = noted_noise(store, view.camera, view.size, found)
             self.samples = found
 
         self._reading = Work(run, lambda _: None, self._failed)

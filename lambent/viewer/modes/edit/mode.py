@@ -153,7 +153,11 @@ def columns(state: EditState) -> tuple[Panel, ...]:
         Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
         Panel("Compare", partial(panels.draw_compare, state), "the picture against an earlier state", opened=True),
         Panel("Save", partial(panels.draw_files, state), "the session, and the material as a document", opened=True),
-        Panel("Interreflections", partial(draw_interreflections, state.bounced), "light that met other surfaces"),
+        Panel(
+            "Interreflections",
+            partial(draw_interreflections, state.bounced, state.session.merge),
+            "light that met other surfaces",
+        ),
         Panel("Scene", partial(panels.draw_scene, state), "the view, its light, and its transport", opened=True),
         Panel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )

@@ -20,7 +20,7 @@ from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files, Tables
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
-from lambent.viewer.modes.edit.loading import Loading
+from lambent.viewer.modes.edit.loading import Loading, ViewMap
 from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
 from lambent.viewer.modes.edit.shown import Backend
 from lambent.viewer.modes.edit.subject import Subject
@@ -179,6 +179,7 @@ class EditState:
                 for name, one in document.materials.items()
             }
             self._document = document
+            self.material = document.merged.get(self.material, self.material)
         surfaces = SHOWN[self.bounced.shown]
         compared, frame = self.compared, self.painter.frame
         if frame is not None and frame.wish is self._wish and frame.settled:
@@ -211,7 +212,7 @@ class EditState:
     def _have_transport(self) -> None:
         """Where the session begins as something else than before: bake what its transport lacks."""
         document = self.session.document
-        sources = (document.environment, *(one.source for one in document.materials.values()))
+        sources = (document.environment, document.merged, *(one.source for one in document.materials.values()))
         if len(sources) == len(self._sources) and all(map(operator.is_, sources, self._sources)):
             return
         folder = self.subject.store_for(document.environment)
@@ -229,11 +230,21 @@ class EditState:
             return
         if before is not None:
             self.screen.say("this edit needs new transport: it is baked in the background")
+        if self.loading.view is not None and not self._shows_objects(self.loading.view):
+            self.loading = Loading(self.painter, folder, begins=False)
         self.bounced.begin_anew()
         self.baking = self._bake(self.session, folder, self.lights)
 
+    def _shows_objects(self, view: ViewMap) -> bool:
+        """Whether the objects of a view are of the session's materials, after all that was merged."""
+        objects = self.subject.scene.merged(self.session.document.merged).objects
+        return view.objects == tuple((o.name, o.material) for o in objects)
+
     def _is_complete(self) -> bool:
-        materials = self.materials if self.loading.view is not None else ()
+        view = self.loading.view
+        if view is None or not self._shows_objects(view):
+            return False
+        materials = self.materials
         made = {name: self.session.original(name) for name in materials}
         if not made or not all(self.loading.has(name, one, self.lights[-1]) for name, one in made.items()):
             return False
@@ -258,7 +269,7 @@ class EditState:
     def _needs(self) -> Fixed:
         document = self.session.document
         terms = tuple((name, term.fixed) for name, one in self._originals().items() for term in one.terms)
-        return (document.environment, *terms)
+        return (document.environment, *document.merged.items(), *terms)
 
 
 def same(one: Wish, other: Wish) -> bool:

@@ -17,7 +17,7 @@ from lambent.editing.document import Surroundings
 from lambent.editing.session import Factorise, Session
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
 from lambent.scenes.scene import Scene
-from lambent.store.source import SURROUNDINGS, scene_of
+from lambent.store.source import SURROUNDINGS, scene_of, worn_in_views
 from lambent.store.store import MANIFEST, Store
 from lambent.store.views import read_views
 from lambent.viewer.picture import LARGEST_PX
@@ -87,6 +87,7 @@ def opened(
     environment: Path | None = None,
     picture: tuple[int, int] | None = None,
     store: Path | None = None,
+    crease_deg: float | None = None,
     factorise: Factorise | None = None,
 ) -> Subject:
     """What is at a path.
@@ -100,6 +101,8 @@ def opened(
         An image that lights the scene instead of its own environment.
     store
         Where transport is kept. By default a store keeps its own; a scene's is made in `folder`.
+    crease_deg
+        As for `load_scene`; that of the session where it is None.
 
     Raises
     ------
@@ -114,22 +117,24 @@ def opened(
         session = Session.open(path, factorise)
         place = str(session.path(session.document.scene))
         place = place if Path(place).exists() else session.document.scene
+        crease_deg = session.document.crease_deg if crease_deg is None else crease_deg
     else:
         session, place = None, str(path)
     base = Path(place) if Path(place).is_dir() else None
-    scene = _scene_at(place)
+    scene = _scene_at(place, crease_deg)
     kept = _kept_environment(base)
     lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
     if environment is not None and not environment.is_file():
         raise UserError("no such file", file=environment, field="--environment")
     if session is None:
         where = camera_named(scene, base, camera)
-        materials = {o.material: scene.materials[o.material] for o in scene.objects}
-        session = Session.new(
-            _lasting(place), where, materials, size=picture or SIZE, environment=lit_by, factorise=factorise
-        )
+        merged = _merged_in(base, scene)
+        materials = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
+        begun = Session.new(_lasting(place), where, materials, size=picture or SIZE, environment=lit_by)
+        kept_too = {"merged": merged, "crease_deg": crease_deg}
+        session = Session(begun.document.model_copy(update=kept_too), factorise=factorise)
     else:
-        changes = _changes(session, scene, base, camera, picture)
+        changes = {**_changes(session, scene, base, camera, picture), "crease_deg": crease_deg}
         if environment is not None:
             changes["environment"] = lit_by
         session = Session(session.document.model_copy(update=changes), session.folder, factorise)
@@ -149,7 +154,9 @@ def _changes(
         changes["camera"] = camera_named(scene, base, camera)
     if picture is not None:
         changes["size"] = picture
-    worn = {o.material: scene.materials[o.material] for o in scene.objects}
+    for name in (*session.document.merged, *session.document.merged.values()):
+        known("material", name, scene.materials, field="merged")
+    worn = {o.material: scene.materials[o.material] for o in scene.merged(session.document.merged).objects}
     for name in session.document.materials:
         known("material", name, worn, field="materials")
     rest = {name: material for name, material in worn.items() if name not in session.document.materials}
@@ -194,13 +201,26 @@ def check_store(folder: Path, place: str) -> None:
 
 
 def scene_for(session: Session) -> Scene:
-    """The scene of a session."""
-    place = session.path(session.document.scene)
-    return _scene_at(str(place) if place.exists() else session.document.scene)
+    """The scene of a session, with the materials that it has merged."""
+    document, place = session.document, session.path(session.document.scene)
+    scene = _scene_at(str(place) if place.exists() else document.scene, document.crease_deg)
+    return scene.merged(document.merged)
 
 
-def _scene_at(place: str) -> Scene:
-    return scene_of(Store.open(Path(place))) if Path(place).is_dir() else load_scene(place)
+def _scene_at(place: str, crease_deg: float | None) -> Scene:
+    if not Path(place).is_dir():
+        return load_scene(place, crease_deg)
+    if crease_deg is not None:
+        hint = "give it to the command that bakes"
+        raise UserError("a store has its normals already", file=Path(place), field="--crease-angle", hint=hint)
+    return scene_of(Store.open(Path(place)))
+
+
+def _merged_in(base: Path | None, scene: Scene) -> dict[str, str]:
+    """Materials that views of a store were baked without, and those that their objects were made of."""
+    worn = worn_in_views(Store.open(base)) if base is not None else {}
+    pairs = {o.material: worn.get(o.name, o.material) for o in scene.objects}
+    return {name: other for name, other in pairs.items() if name != other and other in scene.materials}
 
 
 def _kept_environment(base: Path | None) -> Surroundings | None:

@@ -19,10 +19,13 @@ from pathlib import Path
 
 from lambent.bake.bounces import Bounces
 from lambent.core.errors import UserError
+from lambent.editing.document import EditedMaterial, OfDocument
+from lambent.editing.interreflection.noise import PASS, PassNoise
 from lambent.editing.session import Session
+from lambent.scenes.scene import Scene
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
-from lambent.viewer.modes.edit.baking import BOUNCES, PASS
+from lambent.viewer.modes.edit.baking import BOUNCES
 from lambent.viewer.modes.edit.subject import scene_for
 
 NICENESS = 10  # the window comes first
@@ -57,7 +60,7 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
 def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] | None) -> None:
     """Bake interreflections; or, where materials to edit are given, propose which others to edit."""
     from lambent.bake.bake import bake
-    from lambent.bake.interreflection.proposal import propose
+    from lambent.bake.interreflection.proposal import propose, same_materials
     from lambent.bake.view import View
 
     opened = Session.open(session)
@@ -67,12 +70,21 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
     if kept is not None:
         lit = scene if light is None else replace(scene, environment=light)
         found = propose(lit, view, bounces, editables=editables, kept=kept, progress=_progress)
-        _say(proposal=found.said())
+        alike = same_materials(scene, keep=_own(opened, scene))
+        _say(proposal=replace(found, alike=alike).said())
         return
-    bake(
-        scene, folder, quality="normal", only={"interreflection"}, progress=_progress, bounces=bounces,
+    watch = PassNoise(folder, [(document.camera, document.size)], editables, bounces.samples, _progress)
+    with bake(
+        scene, folder, quality="normal", only={"interreflection"}, progress=watch.progress, bounces=bounces,
         views=[view], editables=editables, environment=light,
-    )  # fmt: skip
+    ) as store:  # fmt: skip
+        watch.note(store)
+
+
+def _own(session: Session, scene: Scene) -> set[str]:
+    """Materials that are no longer what the scene says."""
+    materials = session.document.materials.items()
+    return {name for name, one in materials if one != EditedMaterial(source=OfDocument(material=scene.materials[name]))}
 
 
 def _note_environment(store: Store, session: Session) -> None:

@@ -31,6 +31,7 @@ Kind = Literal["difference", "FLIP"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 KINDS: tuple[Kind, ...] = get_args(Kind)
 REFERENCE = "qmc"
+AS_A = "as A"  # look-up of B
 PERCENT = Range(1.0, 100.0)  # of the map of differences
 FLOOR = 0.02  # of the mean luminance: below, a difference counts as one of this
 FLIP_PIXELS = 1 << 19  # larger pictures are halved first: the library takes seconds per million
@@ -61,6 +62,7 @@ class Comparison:
     def __init__(self) -> None:
         self.mode: Mode = "off"
         self.integrator = REFERENCE
+        self.look_up = AS_A
         self.kind: Kind = "difference"
         self.divider = Divider()
         self.figures: Figures | None = None

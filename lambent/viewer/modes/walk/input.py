@@ -103,6 +103,9 @@ class WalkInput(Input):
         camera, place = self.navigation.camera, self.screen.picture
         towards = rays_through(camera, x, y, place.width, place.height)
         found, distance_m = self._geometry.hit(camera.position, towards)
+        at_px = (x - place.x, y - place.y)
+        if self._state.fields.pick(camera, at_px, (place.width, place.height), distance_m):
+            return
         if found is None:
             self._state.selection.choose(None)
             return

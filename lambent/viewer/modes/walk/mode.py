@@ -15,7 +15,7 @@ from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
-from lambent.viewer.modes.walk.panels import compare, film, marks, material, metering, scene, view
+from lambent.viewer.modes.walk.panels import compare, film, light_field, marks, material, metering, scene, view
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.navigation import Movement
@@ -27,15 +27,15 @@ from lambent.viewer.screen import Screen
 from lambent.viewer.work import POLL_S
 
 
-def open_store(path: Path, movement: Movement, screen: Screen) -> WalkMode:
+def open_store(path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None) -> WalkMode:
     """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`."""
     store = Store.open(path)
-    baked = read_baked(store)
+    baked = read_baked(store, light_field_mb)
     state = WalkState.of(baked.record, movement, screen, store.folder)
-    state.marks.sources = baked.probes
+    state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
     state.missing = (*baked.missing, *state.missing)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
-    geometry = Geometry(baked.positions, baked.faces, baked.record.objects)
+    geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
     pictures = Pictures(Renderer(open_device(device_needs(baked)), baked), state)
     return WalkMode(state, WalkInput(state, geometry), pictures)
 
@@ -72,7 +72,8 @@ class WalkMode(Mode):
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
         overlay.over(place, textures.get("outline"))
-        marks.draw(state.marks, state.selection.name, place, textures)
+        light_field.draw_over(state.fields, place, textures)
+        marks.draw(state.marks, state.selected_parts, place, textures)
         comparison, recorder, filming = state.comparison, state.recordings.recorder, state.films.under_way
         if comparison.mode == "error map" and comparison.figures is not None:
             overlay.scale_bar(place, *error_scale(comparison.kind))
@@ -144,6 +145,11 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
         ),
         Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
         Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
+        Panel(
+            "Light field",
+            partial(light_field.draw, state),
+            "points around the selected object, and what they see",
+        ),
         Panel(
             "Light meter",
             partial(metering.draw, state.meter, state.look, state.navigation),

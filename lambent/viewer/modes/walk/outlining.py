@@ -7,6 +7,7 @@ from typing import Any
 
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.store.contract import ObjectRecord
 
 
 class Outlining:
@@ -17,7 +18,7 @@ class Outlining:
         self._drawn_for: tuple[Any, ...] = ()
         self.images: Mapping[str, Any] = {}
 
-    def update(self, frame: FrameState, selected: str | None) -> None:
+    def update(self, frame: FrameState, selected: ObjectRecord | None) -> None:
         """Outline the object `selected` in the picture that `frame` asks for; nothing with None."""
         wanted = (frame.camera, frame.size, frame.near_m, selected)
         if wanted == self._drawn_for:

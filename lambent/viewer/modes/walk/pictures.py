@@ -16,14 +16,16 @@ from lambent.core.plain import triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.mode import Divider
-from lambent.viewer.modes.walk.comparison import REFERENCE
+from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
+from lambent.viewer.modes.walk.light_fields import FieldDrawing
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
+from lambent.viewer.work import POLL_S
 
 METER_S = 0.2  # between two readings of the meter while something moves
 SHARED = 0.5  # of the frame time that each of two pictures may take
@@ -36,20 +38,22 @@ class Pictures(Pair):
         super().__init__(renderer.device)
         self._renderer, self._state = renderer, state
         self._a = Picture(renderer, state.screen)
+        renderer.waits = False  # for maps: the picture is drawn again when they are there
         self._b: Picture | None = None
         self.shown = (self._a,)
         self._film_renderer: Renderer | None = None
         self._outlining = Outlining(renderer)
+        self._fields = FieldDrawing(renderer.discs(), state.fields)
         self._read_version, self._read_s = -1, -1e9
         self._glare = GlareDrawing(state.meter.glare)
         self._glare_renderer: Renderer | None = None
 
     @property
     def images(self) -> Mapping[str, Any]:
-        """Mirror balls, the outline of what is selected, and the error map in the place of the picture."""
+        """Mirror balls, the outline of what is selected, its light field, and the error map in the picture's place."""
         error = self._state.comparison.map
         own = {} if error is None else {"picture A": error}
-        return {**self._state.marks.images, **self._outlining.images, **own}
+        return {**self._state.marks.images, **self._outlining.images, **self._fields.images, **own}
 
     @property
     def divider(self) -> Divider | None:
@@ -61,7 +65,7 @@ class Pictures(Pair):
         state = self._state
         self._film()
         wanted = self._frame(size_px(place, pixel_ratio))
-        self._outlining.update(wanted, state.selection.name)
+        self._outlining.update(wanted, state.selection.record)
         if state.comparison.on and state.films.under_way is None:
             self._compare(wanted)
         else:
@@ -72,6 +76,8 @@ class Pictures(Pair):
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
+        state.fields.follow(state.selected_parts)
+        self._fields.update(wanted, look.display_transform, exposure_ev, pixel_ratio)
         self._meter()
         if self._glare.busy:
             self._glare_renderer = self._glare_renderer or self._another_renderer()
@@ -79,12 +85,14 @@ class Pictures(Pair):
 
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
-        return state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
+        frame = state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
+        return replace(frame, maps=self._renderer.streaming.version)
 
     def wait_s(self) -> float | None:
         if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
-        return least(super().wait_s(), 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
+        loading = POLL_S if self._renderer.streaming.busy else None
+        return least(super().wait_s(), loading, 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
 
     def save(self) -> None:
         """Write the picture A, and the error map where one is shown."""
@@ -110,16 +118,24 @@ class Pictures(Pair):
     def _compare(self, wanted: FrameState) -> None:
         comparison = self._state.comparison
         if self._b is None:
-            self._b = Picture(self._another_renderer(), self._state.screen)
+            renderer = self._another_renderer()
+            renderer.waits = False
+            self._b = Picture(renderer, self._state.screen)
         a, b = self._a, self._b
         self.shown = (a, b)
         # A looks through the middle of each pixel: so does B where the difference is to be that of the integrators.
         edges = comparison.mode == "side by side"
         beside = replace(wanted, integrator=comparison.integrator, antialias=edges)
+        if comparison.look_up != AS_A:
+            beside = replace(beside, lookup=comparison.look_up, lookups={})
         b.update(beside, refine=comparison.integrator == REFERENCE, share=SHARED)
         a.update(wanted, refine=False, share=SHARED)  # last: its statistics are the window's
         comparison.divider.a_label = wanted.integrator
-        comparison.divider.b_label = comparison.integrator + (f", {b.samples} samples" if b.samples else "")
+        comparison.divider.b_label = ", ".join(
+            [comparison.integrator]
+            + ([comparison.look_up] if comparison.look_up != AS_A else [])
+            + ([f"{b.samples} samples"] if b.samples else [])
+        )
         self._measure(a, b)
 
     def _another_renderer(self) -> Renderer:
@@ -133,7 +149,9 @@ class Pictures(Pair):
         if not at_rest or a.radiance is None or b.radiance is None or a.radiance.size != b.radiance.size:
             comparison.figures = comparison.figures if at_rest else None
             comparison.forget()
-        elif comparison.due((a.version, comparison.integrator, comparison.mode), max(1, b.pacer.accumulated)):
+        elif comparison.due(
+            (a.version, comparison.integrator, comparison.look_up, comparison.mode), max(1, b.pacer.accumulated)
+        ):
             view, exposure_ev = look.display_transform, look.exposure_ev
             comparison.compare(a.read(), b.read(), view, exposure_ev, b.pacer.accumulated, b.samples)
         comparison.tick()

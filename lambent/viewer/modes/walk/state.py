@@ -10,13 +10,14 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.plain import Triple, plain_name, triple
-from lambent.store.contract import ObjectRecord, SceneRecord
+from lambent.store.contract import ObjectRecord, SceneRecord, whole_objects
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import document_file, with_account
 from lambent.viewer.edits import MaterialEdits, rescue
 from lambent.viewer.look import Look
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.filming import Films
+from lambent.viewer.modes.walk.light_fields import FieldView
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.metering import Meter
 from lambent.viewer.modes.walk.recording import Recordings
@@ -27,7 +28,10 @@ from lambent.viewer.screen import Screen
 
 @dataclass
 class Selection:
-    """The selected object, by `name`; `reveal`: the list of objects has yet to scroll to it."""
+    """The selected object, by `name`; `reveal`: the list of objects has yet to scroll to it.
+
+    Objects are whole, also those that the bake has cut.
+    """
 
     objects: tuple[ObjectRecord, ...]
     name: str | None = None
@@ -129,9 +133,17 @@ class WalkState:
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
     films: Films = field(default_factory=Films)
+    fields: FieldView = field(default_factory=FieldView)
+    store_name: str = "STORE"
     missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map
     knows_noise: bool = False  # whether the store says how exact its light map is
+
+    @property
+    def selected_parts(self) -> frozenset[str]:
+        """What the bake has cut the selected object into; or its own name where it is whole."""
+        name = self.selection.name
+        return frozenset(o.name for o in self.scene.objects if name is not None and name in (o.name, o.part_of))
 
     @classmethod
     def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
@@ -140,8 +152,9 @@ class WalkState:
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
         fault = views.load()
         return cls(
-            scene, screen, look, navigation, Selection(scene.objects),
+            scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
             Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen),
             Marks({}, scene.reflectors), meter=meter,
+            store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from imgui_bundle import imgui
 
 from lambent.viewer.mode import Textures
@@ -12,7 +14,7 @@ from lambent.viewer.screen import Rect
 LINE = (0.35, 0.8, 1.0, 1.0)
 
 
-def draw(marks: Marks, selected: str | None, picture: Rect, textures: Textures) -> None:
+def draw(marks: Marks, selected: Collection[str], picture: Rect, textures: Textures) -> None:
     """Mirror balls and outlines, behind the panels."""
     behind = imgui.get_background_draw_list()
     behind.push_clip_rect((picture.x, picture.y), (picture.x + picture.width, picture.y + picture.height), True)
@@ -26,6 +28,6 @@ def draw(marks: Marks, selected: str | None, picture: Rect, textures: Textures) 
         if texture is not None:
             behind.add_image(texture, (x - r, y - r), (x + r, y + r))
         behind.add_circle((x, y), r + 1, imgui.get_color_u32(AMBER), 0, 1.5)
-        if ball.name == selected or r > 14:
+        if ball.name in selected or r > 14:
             shadowed(behind, (x - imgui.calc_text_size(ball.name).x / 2, y + r + 4), ball.name, AMBER, 1.0)
     behind.pop_clip_rect()

@@ -5,13 +5,14 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.store.contract import SIDES, noise_name
-from lambent.viewer.look import Look
+from lambent.viewer.look import LOOKUPS, Look
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.modes.walk.panels import light_field
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.navigation import Navigation
 from lambent.viewer.panels.look import draw_exposure, draw_quality, draw_range, draw_reflections, draw_shown
-from lambent.viewer.panels.widgets import check, explain, press, slider, wrapped
+from lambent.viewer.panels.widgets import check, choice, explain, press, slider, wrapped
 
 FOV_DEG = (10.0, 120.0)
 SPEED_M_S, EYE_M = (0.1, 10.0), (0.1, 3.0)
@@ -53,7 +54,20 @@ def draw_camera(state: WalkState) -> None:
 def draw_drawing(state: WalkState) -> None:
     """How reflections are drawn, and at which pace."""
     draw_reflections(state.look, planar=bool(state.scene.reflectors))
+    if state.selection.name is not None:
+        _look_up_of(state.selection.name, state.look)
+        light_field.warn_of_look_up(state)
     draw_quality(state.screen.pace)
+
+
+def _look_up_of(name: str, look: Look) -> None:
+    """The selected object's own look-up: auto is the one of all objects."""
+    meaning = f"for {name} alone; light_field ones where the bake gave it a light field, else its probe's best"
+    chosen = choice("selected##look-up", look.lookups.get(name, LOOKUPS[0]), LOOKUPS, meaning)
+    if chosen != LOOKUPS[0]:
+        look.lookups[name] = chosen
+    else:
+        look.lookups.pop(name, None)
 
 
 def _walker(navigation: Navigation) -> None:

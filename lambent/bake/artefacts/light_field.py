@@ -1,0 +1,253 @@
+"""Offset surface light fields: what is seen from many points just above the surface of an object."""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of
+from lambent.bake.light_fields import request
+from lambent.bake.methods import ProbeMethod
+from lambent.bake.quality import QualityName
+from lambent.bake.tiles import run_tiles, seed_of
+from lambent.core.arrays import Floats
+from lambent.core.colour import halves
+from lambent.core.errors import UserError
+from lambent.core.geometry import triangle_areas
+from lambent.core.progress import Progress, part_of
+from lambent.scenes.scene import LightFieldWish
+from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
+from lambent.store.store import Array
+
+if TYPE_CHECKING:
+    from lambent.bake.light_fields.acquisition import Around
+    from lambent.bake.light_fields.choosing import Chooser
+    from lambent.bake.light_fields.placing import Placing
+
+KIND = "light_field"
+NEEDS = ("geometry", "light_map", "probe")
+REVISION = 3
+MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
+PATHS_OF_A_CHUNK = 1 << 21
+MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
+BYTES_PER_TEXEL = {False: 8.0, True: 3.0}  # of radiance, in blocks or not, and of inverse distance
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`points` on each object, with maps of `texels` a side; `strata` x `strata` rays go through each texel.
+
+    `onward` paths go on from each glossy surface that a ray meets: only there is there noise to speak of.
+    With `blocks`, radiance is stored in blocks of BC6H, which hold maps of 4 k - 2 texels best. Paths meet `levels`
+    glossy surfaces in a row. At 1, the objects that the scene gives light fields show each other and themselves their
+    diffuse light alone.
+    """
+
+    points: int
+    texels: int
+    strata: int = 2
+    onward: int = 1
+    levels: int = 6
+    blocks: bool = True
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The arrays of a light field, in the order in which they are written."""
+        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", "sample_map"
+
+
+SETTINGS = {
+    QualityName.preview: Settings(196, 94),
+    QualityName.normal: Settings(576, 158, onward=2),
+    QualityName.final: Settings(1156, 222, onward=4),
+}
+
+
+@dataclass(frozen=True)
+class Traced:
+    """The scene that points are placed in, what they see, and the unit of its light in half floats."""
+
+    placing: Placing
+    around: Around
+    unit: float
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    found = dict[str, str]()
+    for name, wish in wished(context).items():
+        how = settings_of(context, wish)
+        inputs = [context.keys("light_map")["light_map/irradiance"], name, asdict(how), wish.offset_m, wish.error]
+        inputs += [context.seed, context.methods["probes"]]
+        if not _cached(context):
+            inputs.append(context.settings("light_map").max_depth)
+        found |= dict.fromkeys((light_field_name(name, part) for part in how.parts), key_of(KIND, REVISION, *inputs))
+    return found
+
+
+def bake(context: BakeContext) -> None:
+    stale, traced, wishes = context.stale(KIND), _traced(context), wished(context)
+    left = {
+        name: how.points * how.texels**2
+        for name, how in ((name, settings_of(context, wish)) for name, wish in wishes.items())
+        if stale & {light_field_name(name, part) for part in how.parts}
+    }
+    done, total = 0, sum(left.values())
+    for name, work in left.items():
+        mine = part_of(context.progress, done / total, (done + work) / total, f"light field of {name}")
+        _light_field(context, name, wishes[name], traced, mine)
+        done += work
+
+
+def describe(context: BakeContext) -> None:
+    """Drop the light fields of objects that are to have none any more; tell of objects that need none."""
+    kept = context.keys(KIND)
+    context.store.forget([a.name for a in context.store.artefacts(KIND) if a.name not in kept])
+    for name in sorted(context.scene.light_fields.keys() - wished(context).keys()):
+        log.warning(MATTE, name)
+
+
+def wished(context: BakeContext) -> dict[str, LightFieldWish]:
+    """By object that is to have a light field, what is asked of it."""
+    scene = context.scene
+    asked = {name: scene.light_fields[name] for name in _shiny(context) if name in scene.light_fields}
+    if context.methods.get(request.FIELDS) != request.AUTO:
+        return asked
+    return {one["object"]: LightFieldWish(points=one["points"]) for one in _choice(context)} | asked
+
+
+def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
+    """This bake's settings, with what is asked of one object."""
+    asked = {name: value for name in ("points", "texels") if (value := getattr(wish, name)) is not None}
+    how: Settings = context.settings(KIND)
+    return replace(how, **asked)
+
+
+def _shiny(context: BakeContext) -> list[str]:
+    """Names of the objects that mirror what is around them."""
+    return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]
+
+
+def _cached(context: BakeContext) -> bool:
+    return context.methods["probes"] == ProbeMethod.cached
+
+
+def _choice(context: BakeContext) -> list[dict[str, Any]]:
+    """What the bake has chosen, found again only where light or probes changed; nothing before these are baked."""
+    if any(context.stale(need) for need in NEEDS):
+        return []
+    how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
+    named = sorted(context.scene.light_fields)
+    inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed]
+    key = key_of(LIGHT_FIELD_CHOICE, 1, *inputs)
+    said = context.store.documents.get(LIGHT_FIELD_CHOICE)
+    if not isinstance(said, dict) or said.get("key") != key:
+        from lambent.bake.light_fields.choice import chosen
+
+        with context.timed(LIGHT_FIELD_CHOICE):
+            others = [name for name in _shiny(context) if name not in named]
+            trials = _chooser(context, _traced(context)).trials(others, context.progress)
+            found = chosen(trials, how.texels, budget_mb, BYTES_PER_TEXEL[how.blocks])
+        said = {"key": key, "chosen": [one.said() for one in found]}
+        context.store.set_document(LIGHT_FIELD_CHOICE, said)
+    return list(said["chosen"])
+
+
+def _traced(context: BakeContext) -> Traced:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.light_fields.placing import Placing
+    from lambent.bake.light_fields.surroundings import around, unit_of
+
+    levels, traced, maps = context.settings(KIND).levels, context.traced, finished_maps(context)
+    bare = context.scene.light_fields if levels == 1 else ()
+    depth = MIRROR_DEPTH if levels == 1 else levels
+    if _cached(context):
+        seen = around(traced, maps, depth, bare)
+    else:
+        seen = around(traced, None, context.settings("light_map").max_depth, bare)
+    kind = {"diffuse": not _cached(context)}
+    placing = Placing(traced.builder(**kind), traced.whole(**kind))
+    return Traced(placing, seen, unit_of(context.scene, maps[0], traced.sun))
+
+
+def _chooser(context: BakeContext, traced: Traced) -> Chooser:
+    from lambent.bake.light_fields.choosing import Chooser
+
+    places = context.traced.places
+    return Chooser(context.scene, context.store, traced.placing, traced.around, places, context.seed)
+
+
+def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
+    from lambent.bake.light_fields.acquisition import inverse_distances, radiance_maps
+    from lambent.core.light_field_blocks import blocks_of, blocks_shape
+
+    start, how, seen = time.perf_counter(), settings_of(context, wish), traced.around
+    progress(0, 1, "points")
+    points = _points(context, name, wish, traced)
+
+    def radiance(region: tuple[slice, ...], seed: int) -> Array:
+        maps = halves(radiance_maps(seen, points[region[0]], how.texels, how.strata, seed, how.onward), traced.unit)
+        return blocks_of(maps) if how.blocks else maps
+
+    def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
+        return inverse_distances(seen.scene, points[region[0]], how.texels)
+
+    at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
+    of_light = blocks_shape(how.texels) if how.blocks else (how.texels, how.texels, 3)
+    light, distance = (light_field_name(name, how.parts[i]) for i in (2, 3))
+    kind = "uint32" if how.blocks else "float16"
+    for at, shape, dtype, tile, begin, end in (
+        (light, (len(points), *of_light), kind, radiance, 0.0, 0.9),
+        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 1.0),
+    ):
+        key, note = context.keys(KIND)[at], context.provenance(**({"unit": traced.unit} if at == light else {}))
+        chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points
+        writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
+        run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
+        writer.finish()
+    _sample_map(context, name, points, start)
+
+
+def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Floats:
+    """Points (P, 3) of an object; those of the store where it has them."""
+    names = [light_field_name(name, part) for part in ("points", "normals")]
+    if not context.stale(KIND) & set(names):
+        return context.store.read(names[0])
+    mesh, seed, count = context.scene.object(name).mesh, seed_of(context.seed, KIND, name), None
+    most = settings_of(context, wish).points
+    try:
+        if wish.error is not None:
+            chooser = _chooser(context, traced)
+            if (seen := chooser.watched(name)) is not None:
+                count = chooser.trial(name, seen, most).count_for(wish.error)
+        found = traced.placing.points(mesh, count or most, seed, wish.offset_m)
+    except UserError as error:
+        raise UserError(error.message, field=f"light_field of {name}", hint=error.hint) from error
+    for at, array in zip(names, (found.positions, found.normals), strict=True):
+        context.put(KIND, at, array.astype(np.float32), context.provenance(offset_m=found.offset_m))
+    return context.store.read(names[0])
+
+
+def _sample_map(context: BakeContext, name: str, points: Floats, start: float) -> None:
+    """Written last: a light field that has it is whole."""
+    from lambent.bake.light_fields.sample_map import sample_map
+
+    objects = context.scene.objects
+    first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
+    number = next(i for i, o in enumerate(objects) if o.name == name)
+    area_m2 = float(triangle_areas(objects[number].mesh.corners).sum())
+    size = context.atlas.width, context.atlas.height
+    faces = np.arange(first[number], first[number + 1])
+    found = sample_map(context.geometry, faces, size, points, float(np.sqrt(area_m2 / len(points))))
+    offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
+    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m}
+    seconds = round(time.perf_counter() - start, 2)
+    name_of_map = light_field_name(name, "sample_map")
+    context.put(KIND, name_of_map, found.entries, context.provenance(**note, seconds=seconds))

@@ -1,0 +1,102 @@
+"""Seams of the light map, closed: where a smooth surface is cut, both sides of the cut look up the same light.
+
+Charts of a few texels differ along their cuts whatever their texels hold, because each side interpolates its own. The
+texels that look-ups along cuts touch are moved as little as possible, relative to their light, so that the look-ups
+agree: linear least squares (Iwanicki 2013, "Lighting technology of The Last of Us", has the same for light maps).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.surfaces.texels import BEYOND
+from lambent.core.arrays import Floats, Indices
+from lambent.core.colour import luminance
+
+SMOOTH = 0.98  # least cosine between the normals on both sides of a cut: elsewhere light may change abruptly
+PER_TEXEL = 2.0  # samples along a cut
+MOST_SAMPLES = 64  # of one edge
+AGREE = 30.0  # weight of a sample's agreement, over that of a texel's own light
+FILLED = 0.05  # weight of the light of texels that hold none of their own
+DARK = 0.01  # of the mean light: differences below it do not matter
+STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Places on cuts of smooth surfaces: light map coordinates (n, 2) on one side and on the other."""
+
+    here: Floats
+    there: Floats
+
+
+def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
+    """The cuts of all surfaces on a map of such a size; `geometry` as in `atlas.merged`."""
+    faces, size = geometry["faces"].astype(np.int64), np.array([width, height])
+    _, place = np.unique(geometry["positions"], axis=0, return_inverse=True)
+    edges = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
+    ends = place.reshape(-1)[edges]
+    edges = np.where((ends[:, 0] > ends[:, 1])[:, None], edges[:, ::-1], edges)
+    ends = np.sort(ends, axis=1)
+    order = np.lexsort(ends.T)
+    twin = np.flatnonzero((ends[order][1:] == ends[order][:-1]).all(axis=1))
+    a, b = edges[order[twin]], edges[order[twin + 1]]
+    uv, normals = geometry["uv2"].astype(float), geometry["normals"].astype(float)
+    apart = (np.abs(uv[a] - uv[b]) * size).max(axis=(1, 2), initial=0) > 1e-3
+    smooth = (normals[a] * normals[b]).sum(axis=-1).min(axis=1, initial=1) > SMOOTH
+    a, b = uv[a[apart & smooth]], uv[b[apart & smooth]]
+    longest = np.maximum(*(np.linalg.norm((side[:, 1] - side[:, 0]) * size, axis=1) for side in (a, b)))
+    count = np.ceil(longest * PER_TEXEL).astype(int).clip(1, MOST_SAMPLES)
+    edge = np.repeat(np.arange(len(a)), count)
+    turn = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((turn + 0.5) / count[edge])[:, None]
+    return Cuts(*(side[edge, 0] * (1 - t) + side[edge, 1] * t for side in (a, b)))
+
+
+def stitched(irradiance: Floats, cuts: Cuts, labels: Indices) -> Floats:
+    """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay."""
+    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    height, width = irradiance.shape[:2]
+    here, there = (_footprint(uv, width, height) for uv in (cuts.here, cuts.there))
+    texel = np.concatenate([here[0], there[0]], axis=1)
+    share = np.concatenate([here[1], -there[1]], axis=1)
+    keep = ~((labels.reshape(-1)[texel] >= BEYOND) & (share != 0)).any(axis=1)
+    touched, number = np.unique(texel[keep], return_inverse=True)
+    if not len(touched):
+        return irradiance
+    values = irradiance.reshape(-1, 3)[touched].astype(float)
+    light = luminance(values)
+    relative = 1 / np.maximum(light, DARK * max(float(luminance(irradiance).mean()), 1e-12)) ** 2
+    own = np.where(labels.reshape(-1)[touched] >= 0, 1.0, FILLED) * relative
+    number = number.reshape(-1, texel.shape[1])
+    weight = np.sqrt(AGREE * relative[number].min(axis=1))[:, None] * share[keep]
+    rows = np.arange(0, weight.size + 1, weight.shape[1])
+    apart = csr_matrix((weight.ravel(), number.ravel(), rows), shape=(len(weight), len(touched)))
+    system = (apart.T @ apart + diags(own)).tocsr()
+    scale = 1 / system.diagonal()
+    first = LinearOperator(system.shape, matvec=lambda v: scale * v)
+    found = irradiance.reshape(-1, 3).astype(float)
+    for channel in range(3):
+        found[touched, channel], _ = cg(
+            system, own * values[:, channel], x0=values[:, channel], rtol=RESIDUE, maxiter=STEPS, M=first
+        )
+    return np.asarray(np.maximum(found, 0).reshape(irradiance.shape), irradiance.dtype)
+
+
+def _footprint(uv: Floats, width: int, height: int) -> tuple[NDArray[Any], Floats]:
+    """Texels (n, 4) that bilinear look-ups (n, 2) touch, and their shares."""
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    column, row = np.floor(x), np.floor(y)
+    right, down = x - column, y - row
+    texels, shares = [], []
+    for dy, dx in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        at = (row + dy).clip(0, height - 1) * width + (column + dx).clip(0, width - 1)
+        texels.append(at.astype(np.int64))
+        shares.append((down if dy else 1 - down) * (right if dx else 1 - right))
+    return np.stack(texels, axis=1), np.stack(shares, axis=1)

@@ -1,0 +1,83 @@
+"""What a bake chooses: trials of the objects whose probes show viewers most that is wrong."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection
+from contextlib import suppress
+
+import numpy as np
+
+from lambent.bake.light_fields.acquisition import Around
+from lambent.bake.light_fields.choice import worth_trying
+from lambent.bake.light_fields.placing import Placing
+from lambent.bake.light_fields.trial import ProbeLight, Trial, tried
+from lambent.bake.light_fields.watched import Watched, watched
+from lambent.bake.tiles import seed_of
+from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
+from lambent.core.geometry import triangle_areas
+from lambent.core.progress import Progress, part_of
+from lambent.scenes.scene import Scene
+from lambent.store.contract import probe_name, radiance_unit, scene_record, shared_probes
+from lambent.store.store import Store
+
+REFLECTED = 0.9  # of an object's area: then planar reflectors show it
+
+
+class Chooser:
+    """Tries light fields on objects of a scene, whose probes a store holds; viewers stand at `places` (m, 3)."""
+
+    def __init__(self, scene: Scene, store: Store, placing: Placing, around: Around, places: Floats, seed: int) -> None:
+        self._scene, self._store, self._seed = scene, store, seed
+        self._placing, self._around, self._places = placing, around, places
+
+    def trials(self, names: Collection[str], progress: Progress) -> dict[str, Trial]:
+        """Trials of those of the objects that are worth one."""
+        flat, looks = shown_by_reflectors(self._scene, self._store), dict[str, Watched]()
+        for i, name in enumerate(curved := [name for name in names if name not in flat]):
+            part_of(progress, 0.0, 0.5, "what probes show")(i, len(curved), "")
+            if (seen := self.watched(name)) is not None:
+                looks[name] = seen
+        wrong = {name: seen.size_sr * self._probe_error(name, seen) for name, seen in looks.items()}
+        found = dict[str, Trial]()
+        for i, name in enumerate(some := worth_trying(wrong)):
+            part_of(progress, 0.5, 1.0, "light fields on trial")(i, len(some), "")
+            with suppress(UserError):  # nothing of it is in the open
+                found[name] = self.trial(name, looks[name])
+        return found
+
+    def watched(self, name: str) -> Watched | None:
+        """What viewers see mirrored in an object."""
+        o = self._scene.object(name)
+        return watched(o.mesh, self._scene.materials[o.material], self._places, self._around, self._seed_of(name))
+
+    def trial(self, name: str, seen: Watched, most: int | None = None) -> Trial:
+        """Errors of the object's probe and of its light fields, up to `most` points."""
+        mesh, probe = self._scene.object(name).mesh, probe_light(self._store, name)
+        more = {} if most is None else {"most": most}
+        return tried(self._placing, mesh, seen, probe, self._around, self._seed_of(name), **more)
+
+    def _probe_error(self, name: str, seen: Watched) -> float:
+        return seen.error(probe_light(self._store, name).along(seen.origins, seen.directions).mean(axis=1))
+
+    def _seed_of(self, name: str) -> int:
+        return seed_of(self._seed, "light field", name)
+
+
+def shown_by_reflectors(scene: Scene, store: Store) -> set[str]:
+    """Names of the objects that planar reflectors show."""
+    shown: dict[str, float] = defaultdict(float)
+    for part in (part for reflector in scene_record(store).reflectors for part in reflector.parts):
+        shown[part.object] += part.area_m2
+    areas = {o.name: float(triangle_areas(o.mesh.corners).sum()) for o in scene.objects}
+    return {name for name, area_m2 in shown.items() if area_m2 > REFLECTED * areas.get(name, np.inf)}
+
+
+def probe_light(store: Store, name: str) -> ProbeLight:
+    """Look-ups of the probe that an object shows."""
+    owner = shared_probes(store).get(name, name)
+    at = probe_name(owner, "radiance")
+    radiance, distance, planes = (store.read(probe_name(owner, part)) for part in ("radiance", "distance", "planes"))
+    centre = np.array(store.artefact(at).meta["centre"], float)
+    return ProbeLight(radiance.astype(float) * radiance_unit(store, at), distance.astype(float), planes, centre)

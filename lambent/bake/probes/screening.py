@@ -1,0 +1,75 @@
+"""Which objects one probe may not do for, found for all of them at once in one scene of bare triangles.
+
+Coarser than `hidden`, and much cheaper where a scene has very many objects: few rays for each, no scene of its own
+without it (rays go through the object instead), and a centre that is not moved out of solids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.probes.hidden import SHORT, spread
+from lambent.bake.tracing.rays import OFFSET, cosine_directions, rays_from
+from lambent.core.arrays import Floats, Indices
+from lambent.core.geometry import triangle_areas
+from lambent.scenes.scene import Mesh
+
+RAYS = 512  # per object
+CROSSINGS = 8  # of an object's own surface; rays that cross it more often meet nothing
+AT_ONCE = 1 << 20
+
+
+def widths(meshes: Sequence[Mesh]) -> Floats:
+    """(N,) metres: the roots of objects' mean shadows, a quarter of their areas (Cauchy)."""
+    return np.sqrt([triangle_areas(mesh.corners).sum() / 4 for mesh in meshes])
+
+
+def median_distances(meshes: Sequence[Mesh], places: Floats) -> Floats:
+    """(N,) metres of the middles of objects from the median of the viewers at `places` (m, 3)."""
+    return np.array([np.median(np.linalg.norm(places - np.mean(m.bounds, axis=0), axis=1)) for m in meshes])
+
+
+def hidden_shares(bare: Any, owner: Indices, meshes: Sequence[Mesh], numbers: Sequence[int]) -> Floats:
+    """Share of what each object's surface sees that something hides from its middle (N,).
+
+    `bare` is a scene of all triangles, `owner` (F,) the number of the object of each; `numbers` (N,) are those of the
+    objects, and `meshes` theirs.
+    """
+    per_pass, shares = AT_ONCE // RAYS, []
+    for mine in (slice(first, first + per_pass) for first in range(0, len(meshes), per_pass)):
+        points, normals = (np.concatenate(a) for a in zip(*(spread(m, RAYS) for m in meshes[mine]), strict=True))
+        own = np.repeat(numbers[mine], RAYS)
+        middles = np.repeat([np.mean(np.array(m.bounds, float), axis=0) for m in meshes[mine]], RAYS, axis=0)
+        directions = cosine_directions(normals)
+        above = OFFSET * (1 + np.abs(points).max(axis=1, keepdims=True))
+        origins = points + normals * above
+        seen = _distances(bare, owner, origins, directions, own)
+        hit = np.isfinite(seen)
+        offset = origins + directions * np.where(hit, seen, 0.0)[:, None] - middles
+        distance = np.linalg.norm(offset, axis=1)
+        free = _distances(bare, owner, middles, offset / np.maximum(distance, 1e-9)[:, None], own)
+        hidden = hit & (free < distance * (1 - SHORT) - SHORT)
+        lost, met = (a.reshape(-1, RAYS).sum(axis=1) for a in (hidden, hit))
+        shares.append(lost / np.maximum(met, 1))
+    return np.concatenate(shares) if shares else np.zeros(0)
+
+
+def _distances(bare: Any, owner: Indices, origins: Floats, directions: Floats, own: Indices) -> Floats:
+    """Distances (n,) to the first hits of rays that pass through the objects of the numbers `own` (n,)."""
+    found, start = np.full(len(origins), np.inf), np.zeros(len(origins))
+    left = np.arange(len(origins))
+    for _ in range(CROSSINGS):
+        at = origins[left] + directions[left] * start[left, None]
+        met = bare.ray_intersect_preliminary(rays_from(at, directions[left]))
+        t, face = np.array(met.t).astype(float), np.array(met.prim_index).astype(np.int64)
+        hit = np.isfinite(t)
+        crossed = hit & (owner[np.where(hit, face, 0)] == own[left])
+        found[left[hit & ~crossed]] = (start[left] + t)[hit & ~crossed]
+        left, t = left[crossed], t[crossed]
+        if not len(left):
+            break
+        start[left] += t + OFFSET * (1 + np.abs(origins[left]).max(axis=1) + t)
+    return found

@@ -1,0 +1,90 @@
+"""Layers of a chart: no texel of one is touched by places of the surface that are far apart.
+
+Faces are projected onto a merged chart, so that what lies behind another face lands in the same texels. Parts of a
+chart by xatlas may pass each other at less than a texel. Layers are peeled off: the first has the first face in each
+texel and all that lie close to it, the next the same of those that are left.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from lambent.bake.surfaces.packing import meets, near, snapped
+from lambent.core.arrays import Flags, Floats, Indices
+
+BEHIND = 2.0  # texels between the depths of projected faces that share a texel, at most
+APART = 4.0  # texels between places of one surface that share a texel, along each axis, at most
+
+
+def layers_of(corners: Floats, depths: Floats) -> list[Indices]:
+    """Faces projected onto a chart in layers, the nearest first.
+
+    Parameters
+    ----------
+    corners : (F, 3, 2) of triangles on the chart, in texels.
+    depths : (F, 3) of the same corners along the projection, in texels.
+    """
+    left = np.argsort(depths.min(axis=1), kind="stable")
+    found = []
+    while len(left):
+        first = in_first_layer(corners[left], depths[left, :, None], BEHIND)
+        found.append(np.sort(left[first]))
+        left = left[~first]
+    return found
+
+
+def in_first_layer(corners: Floats, places: Floats, most: float = APART) -> Flags:
+    """Which faces (F,) of a chart touch no texel that one before touches from more than `most` away.
+
+    `corners` (F, 3, 2) and `places` (F, 3, D), along D axes, are in texels. The first face always does.
+    """
+    local, (columns, rows) = snapped(corners)
+    return np.asarray(_first(local, np.ascontiguousarray(places, dtype=float), columns, rows, most))
+
+
+@numba.njit(cache=True)
+def _first(corners: Floats, places: Floats, width: int, height: int, most: float) -> Flags:
+    axes = places.shape[2]
+    low, high = np.full((width * height, axes), np.inf), np.full((width * height, axes), -np.inf)
+    found = np.ones(len(corners), np.bool_)
+    for f in range(len(corners)):
+        t = corners[f]
+        rows, columns = near(t, width, height)
+        for taking in (False, True):
+            for row in range(rows[0], rows[1]):
+                for column in range(columns[0], columns[1]):
+                    if not found[f] or not meets(t, column + 0.5, row + 0.5):
+                        continue
+                    cell, weights = row * width + column, _nearest(t, column + 0.5, row + 0.5)
+                    for axis in range(axes):
+                        at = (weights * places[f, :, axis]).sum()
+                        if taking:
+                            low[cell, axis], high[cell, axis] = min(low[cell, axis], at), max(high[cell, axis], at)
+                        elif max(high[cell, axis], at) - min(low[cell, axis], at) > most:
+                            found[f] = False
+    return found
+
+
+@numba.njit(cache=True)
+def _nearest(t: Floats, x: float, y: float) -> Floats:
+    """(3,) barycentric weights of the place on a triangle (3, 2) that is nearest to (x, y)."""
+    weights = np.zeros(3)
+    for i in range(3):
+        b, c = t[(i + 1) % 3], t[(i + 2) % 3]
+        weights[i] = (c[0] - b[0]) * (y - b[1]) - (c[1] - b[1]) * (x - b[0])
+    total = weights.sum()
+    if total != 0 and (weights / total).min() >= 0:
+        return np.asarray(weights / total)
+    nearest = np.inf
+    for i in range(3):
+        a, b = t[i], t[(i + 1) % 3]
+        length = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2
+        along = (x - a[0]) * (b[0] - a[0]) + (y - a[1]) * (b[1] - a[1])
+        s = min(max(along / length, 0.0), 1.0) if length > 0 else 0.0
+        away = (a[0] + s * (b[0] - a[0]) - x) ** 2 + (a[1] + s * (b[1] - a[1]) - y) ** 2
+        if away < nearest:
+            nearest = away
+            weights[:] = 0
+            weights[i], weights[(i + 1) % 3] = 1 - s, s
+    return weights

@@ -1,0 +1,74 @@
+"""Emitters without the sun, as points of the light map sample them: its direct light is drawn elsewhere.
+
+A sky is the same picture without the sun's, with a guide of its own: samples that aimed at the sun would count nothing.
+Later surfaces on a path see the sun, and sample all emitters.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.sky.guide import guided_sky, learn
+from lambent.bake.sky.sun import FoundSun, SunPicture, is_sun
+from lambent.bake.tracing.emitters import brought_by
+from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
+
+
+class FirstLight:
+    """The emitters of a builder but the sun; `environment` as `sky_without` has it, for the scene `whole`."""
+
+    def __init__(self, builder: SceneBuilder, whole: Any, found: FoundSun, environment: Any) -> None:
+        lights = [e for e, light in zip(builder.lights, builder.scene.lights, strict=True) if not is_sun(light, found)]
+        emitters = [*lights, *([] if environment is None else [environment])]
+        meshes = [mesh for mesh in builder.meshes.values() if mesh.is_emitter()]
+        parts = {f"part_{i}": part for i, part in enumerate([*meshes, *emitters])}
+        if not parts:
+            parts["darkness"] = {"type": "point", "position": [0.0, 0.0, 0.0], "intensity": 0.0}
+        self.scene = mi.load_dict({"type": "scene", **parts}, optimize=False)
+        self._environment = environment
+        for emitter in emitters:
+            emitter.set_scene(whole)  # light from afar begins beyond the whole scene
+
+    def pdf(self, si: Any, ds: Any, active: Any) -> Any:
+        """Density (mi.Float) of `scene.sample_emitter_direction`, where `ds` says what a ray met in the whole scene."""
+        if self._environment is not None:
+            ds = dr.copy(ds)
+            ds.emitter = dr.select(ds.emitter.is_environment(), mi.EmitterPtr(self._environment), ds.emitter)
+        return self.scene.pdf_emitter_direction(si, ds, active)
+
+
+def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any) -> Any:
+    """mi.Emitter of a builder's environment without its sun, with a guide of its own; None where there is none.
+
+    The guide sees the sky through the panes that the sun passes.
+    """
+    environment = builder.environment
+    same = found.picture is None and not found.record.panes
+    if environment is None or builder.scene.environment is None or same:
+        return environment
+    description = environment_dict(builder.scene.environment)
+    picture = np.array(description["bitmap"])
+    if found.picture is not None:
+        _take_out(picture[..., :3], found.picture, float(description["scale"]))
+    sky = mi.load_dict(description | {"bitmap": mi.Bitmap(picture)})
+    guide = learn(builder.scene, whole, sky, panes=bool(found.record.panes))
+    if guide is not None:
+        sky = guided_sky(sky, guide, whole.bbox())
+    parameters, own = mi.traverse(sky), mi.traverse(environment)
+    former, rest = (brought_by(light, builder.scene, whole) for light in (environment, sky))
+    parameters["sampling_weight"] = float(own["sampling_weight"]) * max(rest / former if former > 0 else 1.0, 0.1)
+    parameters.update()
+    return sky
+
+
+def _take_out(picture: Any, sun: SunPicture, scale: float) -> None:
+    """Take the light of a sun out of a picture (H, W, 3)."""
+    (height, width), (top, left) = sun.size, sun.corner
+    row, column = np.nonzero(sun.pixels.any(axis=-1))
+    at = row + top, (column + left) % width
+    assert np.all(at[0] < height), "the rim is black"
+    picture[at] = np.maximum(picture[at] - sun.pixels[row, column] / scale, 0)

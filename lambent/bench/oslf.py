@@ -1,0 +1,174 @@
+"""Errors of reflections from an offset surface light field, by method; how often a cache of its maps misses.
+
+Every look-up of `core.light_field_lookup` against traced mirror rays of the teapot's pixels in the pavilion, as in
+tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.7. Look-ups count texels of radiance and distance.
+Pixels are means over the same places for all: what is compared is the look-up, not its sampling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from lambent.bake.quality import Quality
+from lambent.bench.light_field_view import Compared, LightFieldView
+from lambent.core import light_field_lookup as look
+from lambent.core.arrays import Floats
+from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field_lookup import March, Place
+from lambent.core.light_field_maps import radiance_along
+from lambent.core.map_cache import POLICIES, fewest_misses, misses
+from lambent.core.progress import Progress, part_of, silent
+from lambent.scenes import load_scene
+
+NAME = "oslf"
+POWERS = (1, 4, 8, 16)
+ONE, FOUR = March(candidates=1), March()
+PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
+TILE = 16  # pixels: a renderer's order of shading
+PREVIEW = Quality("preview")
+SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Scene, object, view; light fields by points and texels; strata along a texel's side, places in a pixel."""
+
+    scene: str = "builtin:pavilion"
+    object: str = "teapot"
+    camera: int = 0
+    size: tuple[int, int] = (640, 480)
+    fields: tuple[tuple[int, int], ...] = ((1156, 112), (1156, 222), (1156, 312), (289, 222))
+    strata: int = 2
+    paths: int = 4
+    capacities: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128)
+    quality: Quality = PREVIEW
+
+
+FULL = Effort()
+QUICK = Effort("builtin:box", "sphere", 0, (96, 96), ((64, 32),), 1, 4, (4, 16), SMALL)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A look-up: its texels a pixel, and the radiance (k, 3) it finds along the mirrored directions."""
+
+    name: str
+    look_ups: int
+    radiance: Callable[[], Floats]
+
+
+def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
+    """Rows method x light field, then rows of caches."""
+    count = len(effort.fields) + 1
+    rows: list[dict[str, Any]] = []
+    with TemporaryDirectory() as folder:
+        lighting = part_of(progress, 0, 1 / count, "light")
+        view = LightFieldView(
+            load_scene(effort.scene), effort.object, effort.camera, effort.size, effort.paths, Path(folder) / "store",
+            effort.quality, lighting,
+        )  # fmt: skip
+        mirror = Compared.of(view.shown.pixel, view.size, view.truth)
+        for number, (points, texels) in enumerate(effort.fields):
+            progress(number + 1, count, f"{points} points, {texels} texels")
+            field = view.field(points, texels, effort.strata)
+            place = view.place(field)
+            said = {"points": len(field.points), "texels": texels, "raw_mb": raw_mb(field)}
+            single = view.single(texels, effort.strata)
+            for method in methods(field, single, place, view):
+                found = mirror.errors(method.radiance())
+                rows.append({**said, "method": method.name, "look_ups": method.look_ups, **found})
+            rows += surface_rows(field, place, view, said)
+            if number == 0:
+                rows += list(caches(place, view, effort.capacities))
+    progress(1, 1, "done")
+    return {"rows": rows, "summary": summary(rows)}
+
+
+def methods(field: LightField, single: LightField, place: Place, view: LightFieldView) -> Iterator[Method]:
+    """Every look-up, from reflection mapping to the one that knows the true hit."""
+    w, k = view.shown.w, len(place.x)
+    middle = Place(place.x, place.n, np.stack([np.zeros(k, np.int64), *[np.full(k, NO_POINT)] * 3], axis=-1))
+    far = March(1, first=0.02, last=4.0)
+    blend = partial(look.blended, field, place, w)
+    yield Method("single map", 1, partial(radiance_along, single, middle.named(1)[:, 0], w))
+    yield Method("single map, marched", PER_POINT, partial(_marched, single, middle, w, far))
+    yield Method("nearest", 1, partial(blend, "nearest"))
+    yield Method("angle", 1, partial(blend, "angle"))
+    yield Method("average", 4, partial(blend, "average"))
+    for power in POWERS:
+        yield Method(f"B_r {power}", 4, partial(blend, "reflection", power))
+    for power in POWERS:
+        yield Method(f"B_n {power}", 4, partial(blend, "normal", power))
+    yield Method("fixed point", 28, lambda: look.fixed_point(field, place, w).radiance)
+    for name, rule in (("march 1", ONE), ("march 4", FOUR)):
+        count = rule.candidates * PER_POINT
+        yield Method(name, count, partial(_marched, field, place, w, rule))
+        yield Method(f"{name}, sky", count, partial(_marched, field, place, w, rule, view.sky))
+    yield Method("true hit", 4, partial(true_hit, field, place, w, view.distance_m))
+
+
+def _marched(field: LightField, place: Place, w: Floats, rule: March, sky: look.Sky | None = None) -> Floats:
+    return look.marched(field, place, w, rule, sky).radiance
+
+
+def true_hit(field: LightField, place: Place, w: Floats, distance_m: Floats) -> Floats:
+    """Radiance (k, 3) of the maps towards what the traced rays meet: the error that their texels leave."""
+    far = np.where(np.isfinite(distance_m), distance_m, 1e6)[:, None, None]
+    seen = radiance_along(field, place.named(), place.offsets(field) + far * w[:, None])
+    return np.asarray(np.einsum("kj,kjc->kc", look.basis_weights(field, place, w, "normal"), seen))
+
+
+def surface_rows(
+    field: LightField, place: Place, view: LightFieldView, said: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """The object itself from its light field, and the share of pixels that a point sees; none of a black one."""
+    if view.surface.any():
+        light, seen = look.surface(field, place)
+        found = Compared.of(view.shown.pixel, view.size, view.surface).errors(light)
+        yield {**said, "method": "surface", "look_ups": 5, **found, "seen": round(float(seen.mean()), 5)}
+
+
+def raw_mb(field: LightField) -> float:
+    """Half floats of radiance and inverse distance, and the sample map, uncompressed."""
+    return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
+
+
+def caches(place: Place, view: LightFieldView, capacities: tuple[int, ...]) -> Iterator[dict[str, Any]]:
+    """Misses in percent of the maps read, for the surface (the first point) and reflections (all four), pixel by pixel.
+
+    Whole maps are read, in rows of pixels as the thesis's renderer shades, or in tiles.
+    """
+    pixel, first = np.unique(view.shown.pixel, return_index=True)
+    row, column = np.divmod(pixel, view.size[0])
+    across = column // TILE
+    orders = {"rows": np.lexsort((column, row)), "tiles": np.lexsort((column, row, across, row // TILE))}
+    for what, count in (("surface", 1), ("reflection", 4)):
+        for order, pixels in orders.items():
+            wanted = place.points[first[pixels], :count]
+            reads = wanted[wanted != NO_POINT].tolist()
+            for capacity in capacities:
+                missed = {name: misses(reads, make(capacity)) for name, make in POLICIES.items()}
+                missed["known future"] = fewest_misses(reads, capacity)
+                percent = {name: round(100 * found / len(reads), 3) for name, found in missed.items()}
+                yield {"reads": what, "order": order, "maps": capacity, "count": len(reads), "miss_percent": percent}
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """By light field, FLIP and PSNR of every method; the misses of least-recent caches."""
+    found: dict[str, Any] = {}
+    for row in rows:
+        if "method" in row:
+            of = found.setdefault(f"{row['points']} x {row['texels']}", {})
+            of[row["method"]] = [row["flip"], row["psnr"]]
+    cached = [row for row in rows if "reads" in row]
+    found["miss_percent"] = {
+        f"{row['reads']}, {row['order']}, {row['maps']}": row["miss_percent"]["least-recent"] for row in cached
+    }
+    return found

@@ -1,0 +1,46 @@
+"""An offset surface light field: incident light at many points just above the surface of one object.
+
+Spec: thesis R, "Offset surface light fields", chapter 3. What a store holds of it is in `store.contract`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+NO_POINT = 0xFFFF  # in a sample map: no further point
+CANDIDATES = 4  # points that a texel of the sample map names at most
+MOST_POINTS = NO_POINT  # indices are 16 bits wide
+LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a map
+
+
+@dataclass(frozen=True, eq=False)
+class LightField:
+    """Points above an object, what each sees, and which of them are near a place on the surface.
+
+    Parameters
+    ----------
+    points : (P, 3) float32, world space, metres: where the light was taken, off the surface.
+    normals : (P, 3) float32, unit: the surface's normal below each point, along which it was moved out.
+    radiance : (P, E, E, 3) float32 or float16: octahedral maps (core.octahedral) of incident radiance in world axes, in
+        units of the scene's `unit`.
+    inverse_distance : (P, E, E) float16, 1/m, at the texels' centres along unit directions; 0 where nothing is hit.
+    sample_map : (h, w, 4) uint16: the nearest points that a place on the surface has above its horizon, nearest first,
+        then NO_POINT.
+    corner : row and column of the sample map's first texel in a grid of `grid` (rows, columns) over the light map's uv2
+        in [0, 1]: texel (row, column) has its centre at uv2 = ((column + 1/2)/columns, (row + 1/2)/rows).
+    offset_m : how far off the surface the points are.
+    blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    radiance: NDArray[np.float32] | NDArray[np.float16]
+    inverse_distance: NDArray[np.float16]
+    sample_map: NDArray[np.uint16]
+    corner: tuple[int, int]
+    grid: tuple[int, int]
+    offset_m: float
+    blocks: NDArray[np.uint32] | None = None

@@ -1,0 +1,228 @@
+"""Reflections and surfaces from an offset surface light field: every look-up of the renderer, as numpy.
+
+Thesis R, chapters 3 and 4, with a look-up that knows distances. A `Place` is what a pixel shows of the object; w is the
+unit direction whose radiance is wanted there, for a mirror 2 (n.wo) n - wo. Directions are in world space.
+
+The uncorrected methods read the maps of near points along w itself (4.3 to 4.12). They err where surroundings are near:
+the ray from x meets them elsewhere than the ray from the point. The corrected ones find in each map where the ray from
+x goes behind what the point sees, and read there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.directions import normalize
+from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.light_field_maps import nearest_points, nearness_along, radiance_along
+
+Basis = Literal["nearest", "angle", "average", "reflection", "normal"]
+Sky = Callable[[Floats], Floats]  # radiance (n, 3) of directions (n, 3) in which nothing is hit
+POWER = 4  # N of B_n and B_r
+CONES_DEG = (65.0, 75.0)  # about the normal, of points that show the surface: the first that holds one
+SURFACE_TOLERANCE = 0.15  # of the distance at which a point sees the surface
+
+
+@dataclass(frozen=True)
+class March:
+    """How rays are followed through the maps of points.
+
+    Of n `steps`, lengths grow from `first` times the distance c of x from the point, to where what lies farther off is
+    displaced by `last` texels; one more step is at infinity. What is found is a surface if its distance from the
+    point is that of the texel to `tolerance` of it, and of the ray's length: near x, texels of the object itself are
+    that far off without being met. It is the same surface for points whose rays have nearly (`alike`) the same length.
+    """
+
+    candidates: int = 4
+    steps: int = 7
+    first: float = 0.15
+    last: float = 1.0
+    secants: int = 3
+    tolerance: float = 0.15
+    alike: float = 0.15
+
+
+@dataclass(frozen=True)
+class Place:
+    """x, n (k, 3): positions and unit shading normals, float64; points (k, 4): those near, or NO_POINT."""
+
+    x: Floats
+    n: Floats
+    points: Indices
+
+    @classmethod
+    def at(cls, field: LightField, x: Floats, n: Floats, uv2: Floats) -> Place:
+        """Places (k,) of the object by their coordinates uv2 (k, 2) of the light map."""
+        return cls(np.asarray(x, float), np.asarray(n, float), nearest_points(field, uv2))
+
+    @property
+    def known(self) -> Flags:
+        """(k, 4): which of the points there are."""
+        return np.asarray(self.points != NO_POINT)
+
+    def named(self, count: int = 4) -> Indices:
+        """The first points (k, count), 0 in place of those that there are not."""
+        return np.where(self.known, self.points, 0)[:, :count]
+
+    def offsets(self, field: LightField, count: int = 4) -> Floats:
+        """(k, count, 3) x - p_j."""
+        return np.asarray(self.x[:, None] - field.points[self.named(count)])
+
+
+@dataclass(frozen=True)
+class Marched:
+    """radiance (k, 3); which places met a surface, and at which the ray ends in the sky, (k,) each."""
+
+    radiance: Floats
+    met: Flags
+    sky: Flags
+    distance_m: Floats  # (k,) along w, infinite where no surface was met
+
+
+def basis_weights(field: LightField, place: Place, w: Floats, basis: Basis, power: int = POWER) -> Floats:
+    """(k, 4) weights B_j, 1 in all, of the points near a place; all 0 where there is none (4.5, 4.9 to 4.11).
+
+    The plain average stands in where all points are below the horizon of the basis.
+    """
+    towards = normalize(-place.offsets(field))
+    known = place.known
+    if basis == "nearest":
+        weight = np.cumsum(known, axis=1) == 1
+    elif basis == "angle":
+        cosine = np.where(known, np.einsum("kjc,kc->kj", towards, w), -np.inf)
+        weight = np.arange(known.shape[1]) == cosine.argmax(axis=1)[:, None]
+    elif basis == "average":
+        weight = known
+    else:
+        axis = w if basis == "reflection" else place.n
+        cosine = np.where(known, np.maximum(np.einsum("kjc,kc->kj", towards, axis), 0), 0.0)
+        largest = cosine.max(axis=1, keepdims=True)  # of which powers of small cosines are shares: they would vanish
+        weight = np.where(largest > 0, (cosine / np.maximum(largest, 1e-30)) ** power, known)
+    weight = np.where(known, weight, 0.0)
+    return np.asarray(weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30))
+
+
+def blended(field: LightField, place: Place, w: Floats, basis: Basis = "normal", power: int = POWER) -> Floats:
+    """(k, 3) radiance sum_j B_j L(p_j, w) (4.7)."""
+    seen = radiance_along(field, place.named(), np.broadcast_to(w[:, None], (*place.points.shape, 3)))
+    return np.asarray(np.einsum("kj,kjc->kc", basis_weights(field, place, w, basis, power), seen))
+
+
+def fixed_point(field: LightField, place: Place, w: Floats, rounds: int = 4) -> Marched:
+    """As `marched`, by the iteration t = d(x + t w) instead of a search: cheaper, and blind to what stands before."""
+    offset, point, known = place.offsets(field), place.named(), place.known
+    direction = np.broadcast_to(w[:, None], offset.shape)
+    along = np.einsum("kjc,kjc->kj", offset, direction)
+    height = np.maximum(np.einsum("kjc,kjc->kj", offset, offset) - along**2, 0)
+    q = direction
+    for _ in range(rounds):
+        d = 1 / np.maximum(nearness_along(field, point, q), 1e-9)
+        t = np.sqrt(np.maximum(d**2 - height, 0)) - along  # where the ray leaves the sphere of that radius
+        q = offset + np.maximum(t, 1e-9)[..., None] * direction
+    rule = March()
+    nearness = nearness_along(field, point, q)
+    met = known & (np.abs(np.linalg.norm(q, axis=-1) * nearness - 1) < rule.tolerance) & (t > 0)
+    open_sky = known & (nearness_along(field, point, direction) == 0) & ~met
+    return _answered(field, place, w, rule, q, np.where(met, t, np.inf), open_sky, None)
+
+
+def marched(field: LightField, place: Place, w: Floats, rule: March | None = None, sky: Sky | None = None) -> Marched:
+    """Radiance of the surface that rays from x along w (k, 3) meet first, as the points near x see it.
+
+    A surface that a point verifies is there, so the nearest of all points counts, and those that agree are blended.
+    Where none verifies one, the ray ends in the sky if a point sees it there; else the answer is B_n of the maps.
+    A `sky` answers for the sky; without one, the maps do.
+    """
+    rule = rule or March()
+    q, t, open_sky = _searched(field, place, w, rule)
+    return _answered(field, place, w, rule, q, t, open_sky, sky)
+
+
+def _searched(field: LightField, place: Place, w: Floats, rule: March) -> tuple[Floats, Floats, Flags]:
+    """By point: from p_j to the surface (k, j, 3), its distance on the ray, infinite for none, and if it saw the sky.
+
+    The ray is in front of what the point sees where 1/|q| is above the map's inverse distance, and the difference is
+    linear in 1/t for planes. So the secant is taken in that.
+    """
+    count = rule.candidates
+    offset, point, known = place.offsets(field, count), place.named(count), place.known[:, :count]
+    direction = np.broadcast_to(w[:, None], offset.shape)
+
+    def behind(s: Floats) -> Floats:
+        q = s[..., None] * offset + direction  # q/t: the same direction, and finite at infinity
+        return np.asarray(nearness_along(field, point, q) - s / np.linalg.norm(q, axis=-1))
+
+    c = np.maximum(np.linalg.norm(offset, axis=-1), 1e-9)
+    texel = 4 / field.inverse_distance.shape[1]  # rad, about
+    share = np.linspace(0, 1, rule.steps)
+    inverse = [1 / (c * rule.first ** (1 - k) * (rule.last / texel) ** k) for k in share] + [np.zeros_like(c)]
+    near, far = np.zeros_like(c), np.zeros_like(c)
+    g_near, g_far, found = np.full(c.shape, -1.0), np.ones(c.shape), np.zeros(c.shape, bool)
+    before, g_before = inverse[0], behind(inverse[0])
+    for s in inverse[1:]:
+        g = behind(s)
+        last = s[0, 0] == 0
+        here = ~found & (g_before < 0) & ((g > 0) if last else (g >= 0))
+        near, far = np.where(here, before, near), np.where(here, s, far)
+        g_near, g_far = np.where(here, g_before, g_near), np.where(here, g, g_far)
+        found |= here
+        before, g_before = s, g
+    open_sky = known & ~found & (g_before <= 0)
+    middle, g = far, g_far
+    for _ in range(rule.secants):
+        part = (g_near / np.minimum(g_near - g_far, -1e-30)).clip(0.05, 0.95)
+        middle = near + part * (far - near)
+        g = behind(middle)
+        near, g_near = np.where(g < 0, middle, near), np.where(g < 0, g, g_near)
+        far, g_far = np.where(g < 0, far, middle), np.where(g < 0, g_far, g)
+    q = offset + direction / np.maximum(middle, 1e-9)[..., None]
+    t, length = 1 / np.maximum(middle, 1e-9), np.linalg.norm(q, axis=-1)
+    off = np.abs(g) * length  # |q|/d - 1, of the maps' last answer
+    met = known & found & (off * np.maximum(length / t, 1) < rule.tolerance)
+    return q, np.where(met, t, np.inf), open_sky
+
+
+def _answered(
+    field: LightField, place: Place, w: Floats, rule: March, q: Floats, t: Floats, open_sky: Flags, sky: Sky | None
+) -> Marched:
+    """The answer of all points from what each has found."""
+    count = t.shape[1]
+    known = place.known[:, :count]
+    first = t.min(axis=1)
+    met = np.isfinite(first)
+    agree = t <= first[:, None] * (1 + rule.alike)
+    weight = np.where(agree & met[:, None], np.maximum(basis_weights(field, place, w, "normal")[:, :count], 1e-6), 0.0)
+    weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
+    seen = np.einsum("kj,kjc->kc", weight, radiance_along(field, place.named(count), q))
+    in_sky = np.asarray(~met & (open_sky & known).any(axis=1))
+    radiance = np.where(met[:, None], seen, blended(field, place, w))
+    if sky is not None and in_sky.any():
+        radiance[in_sky] = sky(w[in_sky])
+    return Marched(radiance, met, in_sky, first)
+
+
+def surface(field: LightField, place: Place) -> tuple[Floats, Flags]:
+    """Radiance (k, 3) of the surface itself, and where a point sees it, (k,) (3.11).
+
+    The nearest point answers that lies within a cone about the normal and sees the surface where x is; failing that one
+    in the wider cone, any that sees it, the nearest.
+    """
+    offset, point, known = place.offsets(field), place.named(), place.known
+    distance = np.linalg.norm(offset, axis=-1)
+    cosine = -np.einsum("kjc,kc->kj", offset, place.n) / np.maximum(distance, 1e-12)
+    down = np.where(distance[..., None] > 0, offset, -place.n[:, None])
+    sees = np.asarray(known & (np.abs(distance * nearness_along(field, point, down) - 1) < SURFACE_TOLERANCE))
+    rank = np.zeros(known.shape)
+    for cone_deg in CONES_DEG:
+        rank += cosine < np.cos(np.radians(cone_deg))
+    rank = np.where(sees, rank, 3.0) + np.where(known, 0.0, 4.0)
+    best = rank.argmin(axis=1)[:, None]
+    chosen = np.take_along_axis(point, best, axis=1)[:, 0]
+    light = radiance_along(field, chosen, np.take_along_axis(down, best[..., None], axis=1)[:, 0])
+    found = np.asarray(known.any(axis=1))
+    return np.where(found[:, None], light, 0.0), np.take_along_axis(sees, best, axis=1)[:, 0]

@@ -1,0 +1,67 @@
+"""Octahedral maps: all directions in one square, for maps of which thousands fit into one texture.
+
+A direction is scaled to |x| + |y| + |z| = 1; the lower half (z < 0) is folded outwards over the edges of the square
+[-1, 1]^2 (Praun and Hoppe 2003; Engelhardt and Dachsbacher 2008). Column and u grow with x, row and v with y; texel
+(row, column) of a map of E texels a side has its centre at uv = ((column + 1/2)/E, (row + 1/2)/E).
+The square's edges are glued to themselves, mirrored about their middles, which `bordered` uses.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.directions import normalize
+
+
+def to_square(w: Floats) -> Floats:
+    """uv (..., 2) in [0, 1] of directions w (..., 3), which need not be unit but not zero."""
+    p = w / np.abs(w).sum(axis=-1, keepdims=True)
+    return np.asarray(_folded(p[..., :2], p[..., 2:]) / 2 + 0.5)
+
+
+def from_square(uv: Floats) -> Floats:
+    """Unit directions (..., 3) of uv (..., 2) in [0, 1]."""
+    p = 2 * np.asarray(uv, float) - 1
+    z = 1 - np.abs(p).sum(axis=-1, keepdims=True)
+    return normalize(np.concatenate([_folded(p, z), z], axis=-1))
+
+
+def texel_directions(n: int) -> Floats:
+    """(n, n, 3) unit directions of the texels' centres."""
+    centre = (np.arange(n) + 0.5) / n
+    return from_square(np.stack(np.meshgrid(centre, centre), axis=-1))
+
+
+def texel_solid_angles(n: int) -> Floats:
+    """(n, n) solid angles of the texels, sr, by the density at their centres: 4 pi in all to 1/n^2.
+
+    The square's area element stands for (|x| + |y| + |z|)^3 of solid angle at the unit direction.
+    """
+    return np.asarray(np.abs(texel_directions(n)).sum(axis=-1) ** 3 * (4 / (n * n)))
+
+
+def bordered(maps: Any, width: int) -> Any:
+    """Maps (..., E, E, C) with `width` texels around them, so that filters find what lies beyond an edge.
+
+    Beyond an edge lies the edge itself, mirrored about its middle.
+    """
+    n = maps.shape[-2]
+    if not 0 <= width <= n:
+        raise ValueError(f"border of {width} texels around maps of {n}")
+    at = np.arange(-width, n + width)
+    row, column = np.meshgrid(at, at, indexing="ij")
+    row_beyond, column_beyond = (row < 0) | (row >= n), (column < 0) | (column >= n)
+    inner_row = np.where(row < 0, -1 - row, np.where(row >= n, 2 * n - 1 - row, row))
+    inner_column = np.where(column < 0, -1 - column, np.where(column >= n, 2 * n - 1 - column, column))
+    # crossing one edge mirrors the other coordinate; crossing both at a corner mirrors each twice
+    found_row = np.where(column_beyond, n - 1 - inner_row, inner_row)
+    found_column = np.where(row_beyond, n - 1 - inner_column, inner_column)
+    return maps[..., found_row, found_column, :]
+
+
+def _folded(p: Floats, z: Floats) -> Floats:
+    """p (..., 2), folded over the square's diagonals where z (..., 1) is negative. Folding twice is nothing."""
+    return np.where(z >= 0, p, (1 - np.abs(p[..., ::-1])) * np.where(p >= 0, 1.0, -1.0))

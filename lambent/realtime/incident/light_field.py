@@ -1,0 +1,90 @@
+"""Offset surface light fields: light that was taken at points just above the object, the nearest of which are asked.
+
+Spec: thesis R, "Offset surface light fields"; the methods are those of `core.light_field_lookup`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from lambent.core.arrays import Floats
+from lambent.core.light_field import NO_POINT
+from lambent.core.light_field_lookup import POWER, March
+from lambent.realtime.baked import Probe
+from lambent.realtime.cube_mips import finite, mip_chain
+from lambent.realtime.resident_maps import ResidentMaps, filled
+from lambent.realtime.structs import LIGHT_FIELD_DTYPE
+from lambent.realtime.uploads import cube_texture, upload
+
+# by the shader's numbers; how the light of the points is blended, or found
+NEAREST, ANGLE, AVERAGE, TOWARDS_RAY, TOWARDS_NORMAL, MARCHED, CHOSEN = range(7)
+
+
+@dataclass(frozen=True)
+class LightFieldLookUp:
+    """One method; see `incident.LookUp` for what the names are."""
+
+    NAME: str
+    METHOD: int
+    COST: int
+    PREFERENCE: int = -1
+    RULE: March = field(default_factory=March)
+    POWER: int = POWER  # of the cosines that weight points
+    AIMS: bool = False
+    BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "exact layers", "numbers", "cube")
+    __file__: str = __file__
+
+    def serves(self, probe: Probe) -> bool:
+        return probe.light_field is not None and bool((probe.light_field.sample_map != NO_POINT).any())
+
+    def distances(self, probe: Probe, w: Floats) -> Floats:
+        return np.full(len(w), np.inf)
+
+    def constants(self, probe: Probe) -> dict[str, float]:
+        if self.METHOD < MARCHED:
+            return {"METHOD": self.METHOD, "POWER": self.POWER}
+        rule = self.RULE
+        return {
+            "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
+            "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
+            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None,
+        }  # fmt: skip
+
+    def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
+        light_field = probe.light_field
+        assert light_field is not None, "this look-up does not serve the probe"
+        maps = ResidentMaps(device, light_field, probe.most_bytes)
+        if not maps.whole:
+            streams.append(maps)
+        atlas = maps.atlas
+        sky = np.zeros((6, 1, 1, 3), np.float32) if probe.sky is None else finite(probe.sky)[0]
+        record = np.zeros((), LIGHT_FIELD_DTYPE)
+        record["side"], record["tile"], record["levels"] = atlas.tiles.side, atlas.tiles.tile, atlas.levels
+        record["columns"], record["rows"] = atlas.grid.columns, atlas.grid.rows
+        record["corner"], record["grid"] = light_field.corner[::-1], light_field.grid[::-1]
+        record["sky_texels"] = np.log2(sky.shape[1] / 2)
+        numbers = upload(device, [filled(light_field.sample_map)[None]], "rgba16uint")
+        return (
+            device.create_buffer_with_data(data=record.tobytes(), usage=wgpu.BufferUsage.UNIFORM),
+            maps.points.create_view(),
+            atlas.radiance.create_view(dimension="2d-array"),
+            atlas.inverse_distance.create_view(dimension="2d-array"),
+            numbers.create_view(),
+            cube_texture(device, mip_chain(sky)).create_view(dimension="cube"),
+        )
+
+
+LOOK_UPS = (
+    LightFieldLookUp("light_field", MARCHED, 20, PREFERENCE=3),
+    LightFieldLookUp("light_field-1", MARCHED, 19, RULE=March(candidates=1)),
+    LightFieldLookUp("light_field-nearest", NEAREST, 10),
+    LightFieldLookUp("light_field-angle", ANGLE, 11),
+    LightFieldLookUp("light_field-average", AVERAGE, 12),
+    LightFieldLookUp("light_field-br", TOWARDS_RAY, 13),
+    LightFieldLookUp("light_field-bn", TOWARDS_NORMAL, 14),
+    LightFieldLookUp("light_field-choice", CHOSEN, 21),
+)

@@ -1,0 +1,285 @@
+// Offset surface light fields: the points nearest to a pixel, by the sample map, each with its map of light and inverse
+// distance. Methods as core/light_field_lookup.py has them. Places are in world space.
+
+#include "frame.wgsl"
+#include "light_field_record.wgsl"
+
+@group(2) @binding(3) var<uniform> field: LightFieldRecord;
+@group(2) @binding(4) var points: texture_2d<f32>; // places, and where the map is in the atlas; adapters in software read textures faster than buffers
+@group(2) @binding(5) var atlas: texture_2d_array<f32>;
+@group(2) @binding(6) var inverse_atlas: texture_2d_array<f32>;
+@group(2) @binding(7) var sample_map: texture_2d<u32>;
+@group(2) @binding(8) var sky_cube: texture_cube<f32>;
+
+override METHOD: u32 = 5u;
+override POWER: f32 = 4.0;
+override MARCHES: u32 = 4u; // points whose maps are marched through; see March of light_field_lookup.py
+override STEPS: u32 = 8u;
+override SECANTS: u32 = 3u;
+override FIRST: f32 = 0.15;
+override LAST: f32 = 1.0;
+override TOLERANCE: f32 = 0.15;
+override ALIKE: f32 = 0.15;
+override HAS_SKY: bool = true; // or the maps answer for it
+
+const NEAREST = 0u;
+const ANGLE = 1u;
+const AVERAGE = 2u;
+const TOWARDS_RAY = 3u;
+const TOWARDS_NORMAL = 4u;
+const MARCHED = 5u;
+const CHOSEN = 6u;
+
+const NO_POINT = 0xffffu;
+
+fn points_near(uv2: vec2f) -> vec4u {
+    let texel = vec2i(floor(uv2 * field.grid - field.corner));
+    return textureLoad(sample_map, clamp(texel, vec2i(0), vec2i(textureDimensions(sample_map)) - 1), 0);
+}
+
+fn place_of_point(point: u32) -> vec3f {
+    return textureLoad(points, vec2u(point & 255u, point >> 8u), 0).xyz;
+}
+
+// a/b rounded down, exact for a < 2^16: in whole numbers, adapters in software divide one after the other.
+fn whole_share(a: u32, b: u32) -> u32 {
+    return u32((f32(a) + 0.5) / f32(b));
+}
+
+// First texel of a map's tile, and its layer.
+fn tile_of(point: u32) -> vec3u {
+    let place = u32(textureLoad(points, vec2u(point & 255u, point >> 8u), 0).w);
+    let row = whole_share(place, field.columns);
+    let layer = whole_share(row, field.rows);
+    return vec3u(vec2u(place - row * field.columns, row - layer * field.rows) * field.tile, layer);
+}
+
+fn map_place(w: vec3f) -> vec2f {
+    return 0.5 * octahedral(w) + 0.5;
+}
+
+fn light_on_level(tile: vec3u, place: vec2f, level: u32) -> vec3f {
+    let inner = select((field.tile >> level) - 2u, field.side, level == 0u);
+    let texel = vec2f(tile.xy >> vec2u(level)) + 1.0 + place * f32(inner);
+    let size = vec2f((vec2u(field.columns, field.rows) * field.tile) >> vec2u(level));
+    return textureSampleLevel(atlas, linear_sampler, texel / size, tile.z, f32(level)).rgb;
+}
+
+// Light of a point's map from direction w, averaged over a solid angle there: of a texel, 4 (|x| + |y| + |z|)^3/side^2 sr.
+fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
+    let spread = dot(abs(w), vec3f(1.0)) * inverseSqrt(dot(w, w));
+    let level = clamp(half_log2_omega + log2(0.5 * f32(field.side)) - 1.5 * log2(spread), 0.0, field.levels - 1.0);
+    let tile = tile_of(point);
+    let place = map_place(w);
+    let finer = u32(level);
+    var light = light_on_level(tile, place, finer);
+    let share = level - f32(finer);
+    if (share > 0.0) { light = mix(light, light_on_level(tile, place, finer + 1u), share); }
+    return light;
+}
+
+// 1/m, of the texel that a direction from a point lies in; 0 for the sky.
+fn inverse_distance(tile: vec3u, w: vec3f) -> f32 {
+    let texel = min(vec2u(map_place(w) * f32(field.side)), vec2u(field.side - 1u));
+    return textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
+}
+
+fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
+    let level = max(half_log2_omega - 1.5 * log2(max_norm(w)) + field.sky_texels, 0.0);
+    return textureSampleLevel(sky_cube, linear_sampler, w, level).rgb;
+}
+
+// Cosine between an axis and the direction from x to a point; -2 where there is none.
+fn cosine_to(point: u32, axis: vec3f, x: vec3f) -> f32 {
+    let to = place_of_point(min(point, NO_POINT - 1u)) - x;
+    return select(dot(axis, to) * inverseSqrt(max(dot(to, to), 1e-30)), -2.0, point == NO_POINT);
+}
+
+// The same for all four points. Written out, as all of four: software adapters are slow at arrays.
+fn cosines_to(axis: vec3f, s: Surface) -> vec4f {
+    let x = s.x + object.centre.xyz;
+    let p = s.points;
+    return vec4f(cosine_to(p.x, axis, x), cosine_to(p.y, axis, x), cosine_to(p.z, axis, x), cosine_to(p.w, axis, x));
+}
+
+fn largest_of(v: vec4f) -> f32 {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
+// Weights of the points by the cosines between the directions to them and an axis, relative to the largest; all alike
+// where all are behind.
+fn weights_about(axis: vec3f, s: Surface) -> vec4f {
+    let cosines = max(cosines_to(axis, s), vec4f(0.0));
+    let largest = largest_of(cosines);
+    if (largest <= 0.0) { return known_points(s); }
+    let relative = cosines / largest;
+    if (POWER == 4.0) { return relative * relative * relative * relative; } // cheaper in software
+    return pow(relative, vec4f(POWER));
+}
+
+fn known_points(s: Surface) -> vec4f {
+    return select(vec4f(1.0), vec4f(0.0), s.points == vec4u(NO_POINT));
+}
+
+// 1 for the first largest of four scores, 0 for the others.
+fn first_largest(scores: vec4f) -> vec4f {
+    let largest = vec4<bool>(scores == vec4f(largest_of(scores)));
+    let before = vec4<bool>(false, largest.x, largest.x || largest.y, largest.x || largest.y || largest.z);
+    return select(vec4f(0.0), vec4f(1.0), largest & !before);
+}
+
+fn weights_of(method: u32, s: Surface, r: vec3f) -> vec4f {
+    let known = known_points(s);
+    switch method {
+        case AVERAGE: { return known; }
+        case TOWARDS_RAY: { return weights_about(r, s); }
+        case TOWARDS_NORMAL: { return weights_about(s.n, s); }
+        case NEAREST: { return known * first_largest(known); }
+        default: { return known * first_largest(cosines_to(r, s)); }
+    }
+}
+
+// Light of the points along w[j] = r + u[j] (x - p_j), by weights; u is 0 without parallax. Rays with one weight leave the
+// loop after one turn: software adapters take both sides of a branch, but no turn that all pixels have left.
+fn weighted(s: Surface, r: vec3f, u: vec4f, weights: vec4f, half_log2_omega: f32) -> vec3f {
+    let x = s.x + object.centre.xyz;
+    var left = weights;
+    var light = vec3f(0.0);
+    loop {
+        let one = first_largest(left);
+        let point = u32(dot(select(vec4f(0.0), vec4f(s.points), one > vec4f(0.0)), vec4f(1.0)));
+        let q = r + dot(one, u) * (x - place_of_point(point));
+        // omega t^2/|q t|^2, as the point sees it
+        light += dot(one, weights) * light_of(point, q, half_log2_omega - 0.5 * log2(dot(q, q)));
+        left *= 1.0 - one;
+        if (largest_of(left) <= 0.0) { break; }
+    }
+    return light / dot(weights, vec4f(1.0));
+}
+
+// Without parallax: the light of the points in the ray's own direction.
+fn blended(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
+    return weighted(s, r, vec4f(0.0), weights_of(METHOD, s, r), half_log2_omega);
+}
+
+const SHARP = -20.0; // half the log2 of a solid angle that is smaller than any texel
+
+const SKY = 0.0;
+const MISSED = -1.0;
+
+// How far behind what a map sees a ray from o about its point along r is at the distance 1/u: 1/m, < 0 in front. Linear
+// in u for planes, and finite at infinity.
+fn behind(tile: vec3u, o: vec3f, r: vec3f, u: f32) -> f32 {
+    let q = r + u * o;
+    return inverse_distance(tile, q) - u * inverseSqrt(dot(q, q));
+}
+
+// 1/m, of where the ray meets what the map sees; SKY or MISSED. Steps grow from FIRST times the distance of the point to
+// where the parallax is LAST texels, about 4/side rad each, and end at infinity.
+fn marched(point: u32, o: vec3f, r: vec3f) -> f32 {
+    let tile = tile_of(point);
+    let texel = 4.0 / f32(field.side);
+    let growth = pow(FIRST * texel / LAST, 1.0 / f32(STEPS - 1u));
+    var near = 1.0 / (max(length(o), 1e-9) * FIRST);
+    var g_near = behind(tile, o, r, near);
+    var far = near;
+    var g_far = g_near;
+    var crossed = false;
+    for (var i = 1u; i <= STEPS && !crossed; i++) {
+        near = far;
+        g_near = g_far;
+        far = select(near * growth, 0.0, i == STEPS);
+        g_far = behind(tile, o, r, far);
+        crossed = g_near < 0.0 && (g_far > 0.0 || (g_far == 0.0 && i < STEPS));
+    }
+    if (!crossed) { return select(MISSED, SKY, g_far <= 0.0); }
+    var u = far;
+    for (var i = 0u; i < SECANTS; i++) {
+        u = mix(near, far, clamp(g_near / min(g_near - g_far, -1e-30), 0.05, 0.95));
+        let g = behind(tile, o, r, u);
+        if (g < 0.0) { near = u; g_near = g; } else { far = u; g_far = g; }
+    }
+    // the last crossing is `near` or `far`: |q|/d - 1 is g |r + u o|/u there, and |q|/t is |r + u o|
+    let g_u = select(g_far, g_near, u == near);
+    let stretch = length(r + u * o);
+    return select(MISSED, u, u > 0.0 && abs(g_u) * stretch * max(stretch, 1.0) < TOLERANCE * u);
+}
+
+// 1/m, by point, of where its map says that the ray ends; SKY or MISSED.
+fn found_by_points(s: Surface, r: vec3f) -> vec4f {
+    let x = s.x + object.centre.xyz;
+    var found = vec4f(MISSED);
+    for (var j = 0u; j < MARCHES; j++) {
+        if (s.points[j] != NO_POINT) { found[j] = marched(s.points[j], x - place_of_point(s.points[j]), r); }
+    }
+    return found;
+}
+
+// Whether rays end in the sky that no point finds a surface on: one sees it, or of wide bundles, whose edges lie beside the
+// ray, all do.
+fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
+    let asked = (vec4u(0u, 1u, 2u, 3u) < vec4u(MARCHES)) & (s.points != vec4u(NO_POINT));
+    let sharp = half_log2_omega + log2(0.5 * f32(field.side)) < 0.0;
+    return largest_of(found) == SKY && (sharp || all(!asked | (found == vec4f(SKY))));
+}
+
+// The nearest surface that a point verifies is there: those that agree on it are blended. Where none does, the ray
+// ends in the sky if a point sees it there, or the answer is B_n.
+fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
+    let found = found_by_points(s, r);
+    let nearest = largest_of(found);
+    if (HAS_SKY && is_sky(s, found, half_log2_omega)) { return light_of_sky(r, half_log2_omega); }
+    let agree = (found > vec4f(0.0)) & (found * (1.0 + ALIKE) >= vec4f(nearest));
+    var weights = weights_about(s.n, s);
+    weights = select(weights, select(vec4f(0.0), max(weights, vec4f(1e-6)), agree), nearest > 0.0);
+    return weighted(s, r, max(found, vec4f(0.0)) * select(0.0, 1.0, nearest > 0.0), weights, half_log2_omega);
+}
+
+// What is found, in colours of middle brightness: one for each point, of that which sees the nearest surface; blue for the
+// sky, and red where no point verifies a surface.
+fn chosen(s: Surface, r: vec3f) -> vec3f {
+    let found = found_by_points(s, r);
+    var colour = vec3f(1.0, 0.0, 0.0);
+    if (largest_of(found) == SKY) { colour = vec3f(0.0, 0.1, 1.0); }
+    if (largest_of(found) > 0.0) {
+        let point = dot(first_largest(found), vec4f(s.points));
+        colour = 0.2 + 0.6 * fract(point * vec3f(0.618034, 0.754878, 0.569840));
+    }
+    return 0.3 * colour / frame.exposure;
+}
+
+fn incident_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
+    if (METHOD == CHOSEN) { return chosen(s, r); }
+    if (METHOD == MARCHED) { return marched_light(s, r, half_log2_omega); }
+    return blended(s, r, half_log2_omega);
+}
+
+fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
+    return incident_along(s, to_world(s, w), half_log2_omega);
+}
+
+// The prefiltered level of a probe is of a roughness m with m^2 = level/6; a lobe of that m fills about 4 pi m^2 sr.
+fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
+    return incident(s, w, 0.5 * log2(4.0 * LAMBENT_PI) + log2(max(level / 6.0, 1e-6)) * 0.5);
+}
+
+fn incident_ray(s: Surface, w: vec3f) -> vec3f {
+    return incident(s, w, SHARP);
+}
+
+fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
+    let weights = weights_of(select(METHOD, TOWARDS_NORMAL, METHOD == MARCHED), s, mirror);
+    return weights / dot(weights, vec4f(1.0));
+}
+
+fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
+    return light_of(s.points[point], to_world(s, w), SHARP);
+}
+
+fn incident_look_up(x: vec3f, w: vec3f) -> LookUp {
+    return LookUp(w, 1.0);
+}
+
+fn incident_bound(x: vec3f, w: vec3f) -> f32 {
+    return 0.0;
+}

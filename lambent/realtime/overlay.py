@@ -1,0 +1,41 @@
+"""What is drawn over a picture: at full size whatever the frames' size is, without jitter, hidden as the scene is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+from lambent.realtime.clusters import Clusters
+from lambent.realtime.context import FrameContext
+from lambent.realtime.draws import draws_of
+from lambent.realtime.frame_state import FrameState, frame_data
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.planar_integrators import OFF
+from lambent.realtime.resources import SceneResources
+from lambent.realtime.slices import Whole
+from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.targets import PassTimer, Targets
+
+
+class Overlay:
+    """Draws beside a scene's renderer, also while that one has a frame under way."""
+
+    def __init__(self, layouts: Layouts, resources: SceneResources, clusters: Clusters) -> None:
+        self._layouts, self._resources, self._clusters = layouts, resources, clusters
+        self._depth = DepthPass(layouts)
+        self._device = layouts.device
+        self._targets, self._timer = Targets(self._device), PassTimer(self._device)
+        self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
+        self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
+
+    def _begun(self, state: FrameState, format: str) -> FrameContext:
+        """A frame of a state into a target of `format`, before its first pass."""
+        state = replace(state, accumulate=None, jitter_px=(0.0, 0.0), planar=OFF)
+        data = frame_data(state, self._resources.scene.record.bounds)
+        self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        draws = draws_of(state, self._resources) if self._resources.masked else []  # for their holes alone
+        return FrameContext(
+            Whole(self._device.create_command_encoder()), state, data, self._frame_group, self._resources,
+            self._clusters, self._targets, self._timer, self._targets.fit(state.size, format), draws, [], Counter(),
+        )  # fmt: skip

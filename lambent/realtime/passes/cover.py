@@ -1,0 +1,132 @@
+"""Edges and thin geometry in motion: pixels become means over places of theirs, see shaders/coverage.wgsl."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+from lambent.realtime.context import FrameContext
+from lambent.realtime.frame_state import frame_data
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.light import LightPass
+from lambent.realtime.pipelines import pipeline, screen_pipeline
+from lambent.realtime.shader_source import assemble
+from lambent.realtime.slices import Steps
+from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
+
+PLACES = (0.2, 0.4), (0.4, -0.2), (-0.2, -0.4), (-0.4, 0.2)  # px, as shaders/places.wgsl
+LIGHT_FORMAT, STEPS_FORMAT = "rgba16float", "r32uint"
+
+
+@dataclass(frozen=True)
+class Covering:
+    """Textures of one size."""
+
+    places: list[Any]  # depth of what is at each place
+    steps: Any  # where each place's light is, see shaders/places.wgsl
+    missed: Any  # light of places that no pixel near them shows
+    covered: Any
+
+    @staticmethod
+    def of(device: Any, size: tuple[int, int]) -> Covering:
+        formats = (*[DEPTH_FORMAT] * len(PLACES), STEPS_FORMAT, LIGHT_FORMAT, LIGHT_FORMAT)
+        *places, steps, missed, covered = (target_texture(device, size, format) for format in formats)
+        return Covering(places, steps, missed, covered)
+
+
+@dataclass(frozen=True)
+class Pipelines:
+    """What the pass draws with, and the layouts of what its shaders read."""
+
+    depths: Any
+    coverage: Any
+    steps: Any
+    known: list[Any]  # by place
+    read: Any
+    cover: Any
+
+    @staticmethod
+    def of(layouts: Layouts) -> Pipelines:
+        device = layouts.device
+        depths, steps = layouts.of(*["exact"] * (1 + len(PLACES))), layouts.of("numbers")
+        read = layouts.of("exact", "exact", "numbers")
+        module = device.create_shader_module(code=assemble("missed.wgsl"))
+        known = [
+            pipeline(
+                device, module, "missed_main", [layouts.frame, steps], (), compare="always",
+                writes_depth=True, vertex="screen_main", constants={"PLACE": place},
+            )
+            for place in range(len(PLACES))
+        ]  # fmt: skip
+        coverage = screen_pipeline(device, "coverage", [depths], [STEPS_FORMAT])
+        cover = screen_pipeline(device, "cover", [layouts.frame, read], [LIGHT_FORMAT])
+        return Pipelines(depths, coverage, steps, known, read, cover)
+
+
+class CoverPass:
+    """Gives each pixel the light of all surfaces in it, by their shares of its places.
+
+    Most are surfaces of pixels beside it, whose light is there. What is too thin for the middle of any pixel is shaded
+    here, and nothing else.
+    """
+
+    def __init__(self, layouts: Layouts, depth: DepthPass, light: LightPass) -> None:
+        self._layouts, self._depth, self._light = layouts, depth, light
+        self._covering = lru_cache(1)(lambda size: Covering.of(layouts.device, size))
+        self._uniforms = [layouts.uniform(FRAME_DTYPE.itemsize) for _ in PLACES]
+
+    @cached_property
+    def _pipelines(self) -> Pipelines:  # frames that do not ask for it never wait for its shaders
+        return Pipelines.of(self._layouts)
+
+    def encode(self, context: FrameContext) -> Steps:
+        """Draw the covered radiance, which becomes the frame's."""
+        if not context.is_covered:
+            return
+        size, group, use = context.state.size, self._layouts.group, self._pipelines
+        covering: Covering = self._covering(size)
+        places = self._places(context, covering)
+        for place in places:
+            render = place.begin("places", [], "clear", depth="clear")
+            context.counts["draw_calls"] += self._depth.draw(render, place)
+            render.end()
+            yield
+        steps = covering.steps.create_view()
+        depths = group(use.depths, *(texture.create_view() for texture in (context.target.depth, *covering.places)))
+        for band in context.slicing.bands("coverage", size):
+            context.cover("coverage", [steps], use.coverage, [depths], band)
+            yield
+        yield from self._missed_light(places, group(use.steps, steps))
+        read = group(use.read, context.radiance.create_view(), covering.missed.create_view(), steps)
+        for band in context.slicing.bands("cover", size):
+            context.cover("cover", [covering.covered.create_view()], use.cover, [context.frame_group, read], band)
+            yield
+        context.radiance = covering.covered
+
+    def _places(self, context: FrameContext, covering: Covering) -> list[FrameContext]:
+        """The frame as it is seen through each place."""
+        made = []
+        bounds = context.resources.scene.record.bounds
+        for at, uniform, depth in zip(PLACES, self._uniforms, covering.places, strict=True):
+            jitter = (context.state.jitter_px[0] + at[0], context.state.jitter_px[1] + at[1])
+            moved, data = frame_data(replace(context.state, jitter_px=jitter), bounds), context.data.copy()
+            for name in ("clip_from_world", "forward"):
+                data[name] = moved[name]
+            self._layouts.device.queue.write_buffer(uniform, 0, data.tobytes())
+            frame = self._layouts.group(self._layouts.frame, uniform, context.resources.sampler)
+            made.append(replace(context, data=data, frame_group=frame, target=Target(depth, covering.missed)))
+        return made
+
+    def _missed_light(self, places: Sequence[FrameContext], steps: Any) -> Steps:
+        for index, (place, known) in enumerate(zip(places, self._pipelines.known, strict=True)):
+            render = place.begin("missed", [], "clear")
+            render.set_pipeline(known)
+            render.set_bind_group(1, steps)
+            render.draw(3)
+            render.end()
+            yield
+            yield from self._light.missed(place, "load" if index else "clear")

@@ -1,0 +1,145 @@
+"""Maps of a light field on the GPU: all, or those that a view needs, within a budget.
+
+A point whose map is not there stands for the nearest point whose map is: the table of places that shaders read has that
+one's place and map in its stead. So every picture is of true maps, some of them taken a little farther off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
+
+from lambent.core.light_field import NO_POINT, LightField
+from lambent.core.map_cache import LeastRecent
+from lambent.realtime.light_field_atlas import Atlas, Packed
+from lambent.realtime.uploads import upload
+
+POINTS_IN_ROW = 256  # of the texture of places
+BATCH = 16  # maps that are made ready at a time, and written before one frame
+TURNED = 0.25  # of the points' extent, that points count as apart for normals that are a unit apart
+
+
+@dataclass
+class Reads:
+    """What views asked of a cache, map by map, since it was made."""
+
+    hits: int = 0
+    misses: int = 0
+
+
+class ResidentMaps:
+    """The atlas of a light field, and `points`, the table of places; `most_bytes` for both textures of the atlas.
+
+    Without a budget, and where all maps fit, they stay for good. Else `follow` keeps those that views need, and drops
+    the one that was needed longest ago.
+    """
+
+    def __init__(self, device: Any, field: LightField, most_bytes: float | None = None) -> None:
+        self.atlas, self._device, self._field = Atlas(device, field, most_bytes), device, field
+        count, room = len(field.points), self.atlas.places
+        self.whole, self.reads = room == count, Reads()
+        self._cache = LeastRecent(room)
+        first = np.arange(count) if self.whole else np.linspace(0, count - 1, room).round().astype(int)
+        self._place = {int(point): place for place, point in enumerate(first)}  # of the maps that are there, by point
+        self._ready: Future[tuple[Sequence[int], Packed]] | None = None
+        if self.whole:
+            self.atlas.fill()
+        else:
+            for point, place in self._place.items():
+                self._cache.read(point)
+                self.atlas.write(self.atlas.packed([point]), place)
+            self._thread = ThreadPoolExecutor(1, "maps")
+        self.loaded = room  # maps that were written, also those dropped since
+        self.points = upload(device, [self._table()[None]], "rgba32float")
+
+    @property
+    def maps(self) -> int:
+        """Of the light field altogether."""
+        return len(self._field.points)
+
+    @property
+    def resident(self) -> int:
+        """Maps that are there."""
+        return len(self._place)
+
+    @property
+    def resident_mb(self) -> float:
+        """Of the maps that are there."""
+        return len(self._place) * self.atlas.map_bytes / 1e6
+
+    @property
+    def busy(self) -> bool:
+        """Whether a map that was asked for is not there yet."""
+        return self._ready is not None
+
+    @property
+    def ready(self) -> bool:
+        """Whether `follow` would find maps that can be written."""
+        return self._ready is not None and self._ready.done()
+
+    def follow(self, wanted: Sequence[int], *, waits: bool) -> None:
+        """Bring what a view needs, most needed first, as far as there is room.
+
+        `waits`: until all of it is there. Else the next batch is made ready beside, and that of before is written.
+        """
+        wanted = [int(point) for point in wanted[: self.atlas.places]]
+        missing = [point for point in wanted if point not in self._place]
+        self.reads.misses += len(missing)
+        self.reads.hits += len(wanted) - len(missing)
+        for point in reversed(wanted):
+            self._cache.read(point)
+        if self._ready is not None and (waits or self._ready.done()):
+            self._write(*self._ready.result())
+            self._ready = None
+        missing = [point for point in missing if point not in self._place]
+        batches = [missing[i : i + BATCH] for i in range(0, len(missing), BATCH)]
+        for batch in batches if waits else ():
+            self._write(*self._packed(batch))
+        if batches and not waits and self._ready is None:
+            self._ready = self._thread.submit(self._packed, batches[0])
+
+    def _packed(self, batch: Sequence[int]) -> tuple[Sequence[int], Packed]:
+        return batch, self.atlas.packed(batch)
+
+    def _write(self, batch: Sequence[int], maps: Packed) -> None:
+        """Put maps in the places of such as the cache has dropped."""
+        held = self._cache.held
+        dropped = [point for point in self._place if point not in held]
+        for i, point in enumerate(batch):
+            if point not in held or not dropped:
+                continue  # another view was asked for since
+            place = self._place.pop(dropped.pop())
+            self.atlas.write(Packed(tuple(level[i : i + 1] for level in maps.levels), maps.inverse[i : i + 1]), place)
+            self._place[point] = place
+            self.loaded += 1
+        table = self._table()
+        self._device.queue.write_texture(
+            {"texture": self.points}, table, {"bytes_per_row": table.shape[1] * 16}, (table.shape[1], table.shape[0], 1)
+        )
+
+    def _table(self) -> NDArray[np.float32]:
+        """(rows, POINTS_IN_ROW, 4): place in the world of each point, or of the one that stands for it, and map."""
+        field = self._field
+        table = np.zeros((-(-len(field.points) // POINTS_IN_ROW), POINTS_IN_ROW, 4), np.float32)
+        there = np.fromiter(self._place, int)
+        apart = TURNED * float(np.ptp(field.points, axis=0).max())  # so that none stands for the far side of a sheet
+        keys = np.concatenate([field.points, apart * field.normals], axis=1)
+        nearest = there[cKDTree(keys[there]).query(keys)[1]]
+        nearest[there] = there
+        rows = table.reshape(-1, 4)[: len(field.points)]
+        rows[:, :3], rows[:, 3] = field.points[nearest], [self._place[int(point)] for point in nearest]
+        return table
+
+
+def filled(sample_map: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """(h, w, 4) with the points of the nearest texel that has any where a texel has none."""
+    bare = (sample_map == NO_POINT).all(axis=-1)
+    rows, columns = distance_transform_edt(bare, return_distances=False, return_indices=True)
+    return np.asarray(sample_map[rows, columns])

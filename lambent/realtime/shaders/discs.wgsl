@@ -1,0 +1,23 @@
+// Discs that face the eye, each with a dark rim; see realtime/discs.py for what the vertices hold.
+
+#include "frame.wgsl"
+
+struct Corner {
+    @builtin(position) position: vec4f,
+    @location(0) colour: vec3f,
+    @location(1) corner: vec2f,
+}
+
+@vertex fn vertex_main(
+    @location(0) place: vec3f, @location(1) colour: vec3f, @location(2) corner: vec3f, @location(3) half_size: vec2f,
+    @location(4) none: vec2f,
+) -> Corner {
+    let clip = frame.clip_from_world * vec4f(place, 1.0);
+    return Corner(clip + vec4f(corner.xy * half_size * clip.w, 0.0, 0.0), colour, corner.xy);
+}
+
+@fragment fn discs_main(v: Corner) -> @location(0) vec4f {
+    let r = length(v.corner);
+    if (r > 1.0) { discard; }
+    return vec4f(select(v.colour, vec3f(0.0), r > 0.75), 1.0);
+}

@@ -1,0 +1,34 @@
+// Light of a look-up in the cube map of a probe. Look-ups that bring light of their own have the same functions.
+
+// Points of a light field near a place of the light map; here none are asked.
+fn points_near(uv2: vec2f) -> vec4u {
+    return vec4u(0u);
+}
+
+// Light from local direction w, averaged over the solid angle omega sr.
+fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
+    let found = incident_look_up(s.x, to_world(s, w));
+    let level = level_of_look_up(found, half_log2_omega);
+    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+}
+
+// The same from a cube that is prefiltered by roughness.
+fn incident_at_level(s: Surface, w: vec3f, level: f32) -> vec3f {
+    let found = incident_look_up(s.x, to_world(s, w));
+    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, level).rgb;
+}
+
+// Weights of the points of a light field for a mirror direction, and light as one of them sees it; here there are none.
+fn point_weights(s: Surface, mirror: vec3f) -> vec4f {
+    return vec4f(1.0, 0.0, 0.0, 0.0);
+}
+
+fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
+    return incident_ray(s, w);
+}
+
+// Light from local direction w without a filter.
+fn incident_ray(s: Surface, w: vec3f) -> vec3f {
+    let found = incident_look_up(s.x, to_world(s, w));
+    return s.occlusion * textureSampleLevel(radiance_cube, linear_sampler, found.direction, 0.0).rgb;
+}

@@ -1,0 +1,12 @@
+// How a light field lies in its textures (realtime/light_field_atlas.py) and on the light map.
+
+struct LightFieldRecord {
+    side: u32,    // texels of a map's side
+    tile: u32,    // of a tile's, on level 0
+    columns: u32, // tiles of a layer
+    rows: u32,
+    corner: vec2f, // column and row of the sample map's first texel in its grid
+    grid: vec2f,   // columns and rows of the grid
+    levels: f32,
+    sky_texels: f32, // half the log2 of the sky's texels per unit area of the cube [-1, 1]^3
+}

@@ -1,0 +1,75 @@
+"""Light fields of a scene that do not fit their budget: before each frame, the maps that it needs are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.clusters import Clusters
+from lambent.realtime.draws import Draw
+from lambent.realtime.needed_points import NeededPoints
+from lambent.realtime.resident_maps import ResidentMaps
+from lambent.realtime.resources import ObjectResources
+from lambent.realtime.structs import Record
+
+
+class Streaming:
+    """The caches of a scene, which renderers of the same resources share."""
+
+    def __init__(self, scene: BakedScene, objects: Iterable[ObjectResources]) -> None:
+        self._scene, self._objects = scene, [item for item in objects if item.light.probe.most_bytes is not None]
+        self._needed: dict[str, NeededPoints] = {}
+
+    def follow(self, draws: Iterable[Draw], data: Record, clusters: Clusters, *, waits: bool) -> None:
+        """Ask for what the draws of a frame need; `waits`: until it is there."""
+        drawn = [draw for draw in draws if draw.item in self._objects]
+        for draw in drawn:
+            _ = draw.object_group  # makes the cache at its first use
+            if not (streams := draw.item.light.streams):
+                continue
+            record = draw.item.record
+            runs = clusters.seen(data["clip_from_world"].T).of(record.first_face, record.face_count)
+            within = [(first - record.first_face, count) for first, count in runs]
+            wanted = self._needed_of(draw.item).of_view(np.asarray(data["eye"][:3], float), within)
+            for maps in streams:
+                maps.follow(wanted.tolist(), waits=waits)
+
+    def _needed_of(self, item: ObjectResources) -> NeededPoints:
+        record, scene = item.record, self._scene
+        if record.name not in self._needed:
+            faces = scene.faces[record.first_face : record.first_face + record.face_count]
+            field = item.light.probe.light_field
+            assert field is not None, "an object without a light field has no maps"
+            self._needed[record.name] = NeededPoints(scene.positions[faces], scene.uv2[faces], field)
+        return self._needed[record.name]
+
+    def _caches(self) -> Iterator[ResidentMaps]:
+        for item in self._objects:
+            yield from item.light.streams
+
+    @property
+    def version(self) -> int:
+        """Grows with every map that has become ready: a frame drawn now is another one than before."""
+        return sum(maps.loaded + maps.ready for maps in self._caches())
+
+    @property
+    def busy(self) -> bool:
+        """Whether a map that a frame asked for is not there yet."""
+        return any(maps.busy for maps in self._caches())
+
+    @property
+    def statistics(self) -> dict[str, Any]:
+        """maps of all light fields with a budget; how many are resident, their MB; hits and misses of frames' reads."""
+        caches = list(self._caches())
+        if not caches:
+            return {}
+        return {
+            "maps": sum(one.maps for one in caches),
+            "resident": sum(one.resident for one in caches),
+            "resident_mb": round(sum(one.resident_mb for one in caches), 3),
+            "hits": sum(one.reads.hits for one in caches),
+            "misses": sum(one.reads.misses for one in caches),
+        }

@@ -1,0 +1,92 @@
+"""Where the shadow map of the sun lies: at most four squares across its light, the smallest first.
+
+The first holds what cameras see, the last the whole scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.directions import basis
+from lambent.core.geometry import points_on_triangles, triangle_areas
+
+SIDE, MOST_SQUARES, RATIO = 2048, 4, 4.0  # texels along a square; squares; times as large as the one before, at least
+POINTS = 1 << 15  # of surfaces, that tell where cameras look
+MIDDLE = 0.96  # of what they see lies in the first square, along each axis
+RIM_PX = 4  # texels around the scene
+
+
+@dataclass(frozen=True)
+class SunSquares:
+    """Where a shadow map lies: axes (3, 3) across, down and towards the sun, depths from `low_m` over `span_m`.
+
+    squares (n, 3): corner along across and down, and side, all metres.
+    """
+
+    axes: Floats
+    low_m: float
+    span_m: float
+    squares: Floats
+
+    def clip_from_world(self, square: Floats) -> Floats:
+        """(4, 4) of one square; depth 1 is nearest to the sun."""
+        across, down, towards = self.axes
+        u, v, side = square
+        found = np.zeros((4, 4))
+        found[0] = [*(2 / side * across), -2 * u / side - 1]
+        found[1] = [*(-2 / side * down), 2 * v / side + 1]
+        found[2] = [*(towards / self.span_m), -self.low_m / self.span_m]
+        found[3, 3] = 1
+        return found
+
+
+def squares_of(direction: Sequence[float], corners: Floats, eyes: Floats, side: int = SIDE) -> SunSquares:
+    """The squares for triangles (F, 3, 3) and the places of cameras (n, 3), for maps of `side` texels."""
+    towards = np.asarray(direction, float)
+    across, down = basis(towards)
+    axes = np.stack([across, down, towards])
+    places = corners.reshape(-1, 3) @ axes.T
+    low, high = places.min(axis=0), places.max(axis=0)
+    size = float(max(np.max(high[:2] - low[:2]), 1e-3)) * side / (side - 2 * RIM_PX)
+    whole = np.array([*((low + high)[:2] / 2 - size / 2), size])
+    low_seen, high_seen = _seen(corners, eyes, axes[:2])
+    about, width = (low_seen + high_seen) / 2, float(np.max(high_seen - low_seen))
+    squares = [whole]
+    if 0 < width < size / 1.5:
+        count = min(MOST_SQUARES - 1, int(np.ceil(np.log(size / width) / np.log(RATIO))))
+        sizes = width * (size / width) ** (np.arange(count) / count)
+        squares = [np.array([*(about - one / 2), one]) for one in sizes] + squares
+    rim = 1e-4 * float(high[2] - low[2]) + 1e-3
+    return SunSquares(axes, float(low[2]) - rim, float(high[2] - low[2]) + 2 * rim, np.array(squares))
+
+
+def _seen(corners: Floats, eyes: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """Low and high corner (2,), along two axes (2, 3), of cameras and the MIDDLE of the surfaces around them.
+
+    Surfaces count by area over the cube of the distance, of which far ones hold a bounded share however large they are;
+    nothing counts as nearer than 1 m. Without cameras there is no more than nothing to see.
+    """
+    area = triangle_areas(corners)
+    if not len(eyes) or not area.sum() > 0:
+        return np.zeros(2), np.zeros(2)
+    rng = np.random.default_rng(0)
+    share = np.sqrt(area) / np.sqrt(area).sum()
+    face = rng.choice(len(area), size=POINTS, p=share)
+    points = points_on_triangles(corners, face, rng)
+    nearest = np.min([np.linalg.norm(points - eye, axis=1) for eye in eyes], axis=0)
+    weight = area[face] / share[face] / np.maximum(nearest, 1) ** 3
+    bounds = np.array([_quantiles(values, weight) for values in (points @ axes.T).T])
+    own = eyes @ axes.T
+    return np.minimum(bounds[:, 0], own.min(axis=0)), np.maximum(bounds[:, 1], own.max(axis=0))
+
+
+def _quantiles(values: Floats, weight: Floats) -> tuple[float, float]:
+    """What lies between holds MIDDLE of the weight."""
+    order = np.argsort(values)
+    up_to = np.cumsum(weight[order]) / weight.sum()
+    low, high = np.searchsorted(up_to, [(1 - MIDDLE) / 2, (1 + MIDDLE) / 2])
+    return float(values[order[low]]), float(values[order[min(high, len(order) - 1)]])

@@ -1,0 +1,69 @@
+"""Luminaires of a glTF file (EXT_lights_ies): points that shine as an IES file within or beside it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from lambent.core.ceilings import IES_BYTES
+from lambent.core.directions import Floats, normalize
+from lambent.core.errors import UserError
+from lambent.core.photometry import radiometric
+from lambent.core.plain import triple
+from lambent.scenes.ies import Photometry, parse_ies
+from lambent.scenes.loaders.gltf.container import Gltf
+from lambent.scenes.loaders.gltf.schema import Node, ProfileDocument
+from lambent.scenes.scene import IesLight
+
+
+class Luminaires:
+    """The profiles of a file, each read once; those that cannot be used are left out, and `note` is told."""
+
+    def __init__(self, gltf: Gltf, note: Callable[[str], None]) -> None:
+        self._gltf, self._note = gltf, note
+        self._read: dict[int, Photometry | None] = {}
+
+    def at(self, node: Node, world: Floats) -> IesLight | None:
+        """The luminaire of a node with a transform.
+
+        It is aimed along the node's -z; horizontal angle 0 is towards its x, 90 towards its y.
+        """
+        assert node.luminaire is not None
+        photometry = self._profile(node.luminaire)
+        if photometry is None:
+            return None
+        aim, across = -normalize(world[:3, 2]), normalize(world[:3, 0])
+        unturned = IesLight(triple(world[:3, 3]), photometry, (1.0, 1.0, 1.0), triple(aim)).axes
+        rotation_deg = math.degrees(math.atan2(across @ unturned[1], across @ unturned[0]))
+        tilt_deg = math.degrees(math.acos(min(max(-float(aim[1]), -1.0), 1.0)))
+        tint = np.minimum(node.luminaire_color, 1.0) * node.luminaire_multiplier
+        scale = triple(radiometric(tint * photometry.tilted(tilt_deg)))
+        return IesLight(triple(world[:3, 3]), photometry, scale, triple(aim), rotation_deg)
+
+    def _profile(self, index: int) -> Photometry | None:
+        if index not in self._read:
+            profile = self._gltf.pick(self._gltf.document.profiles, index, "EXT_lights_ies.lights")
+            field = f"EXT_lights_ies.lights.{index}"
+            try:
+                self._read[index] = parse_ies(self._content(profile, field), self._gltf.path)
+            except UserError as error:
+                self._read[index] = None
+                why = f"{error.field}: {error.message}" if error.field and error.field != field else error.message
+                self._note(f"{profile.name or field}: luminaire left out, {why}")
+        return self._read[index]
+
+    def _content(self, profile: ProfileDocument, field: str) -> bytes:
+        if profile.uri is not None:
+            if self._gltf.is_missing(profile.uri, field):
+                raise UserError(f"{profile.uri} is not there", field=field)
+            content = self._gltf.resource(profile.uri, field)
+        elif profile.bufferView is not None:
+            buffer, start, length, _ = self._gltf.view(profile.bufferView)
+            content = buffer[start : start + length]
+        else:
+            raise UserError("it has neither a uri nor a buffer view", field=field)
+        if len(content) > IES_BYTES:
+            raise UserError(f"its file has {len(content)} bytes, more than {IES_BYTES}", field=field)
+        return content

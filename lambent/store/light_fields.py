@@ -1,0 +1,78 @@
+"""Light fields of a store: arrays light_field/OBJECT/* to `core.light_field.LightField`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.light_field import CANDIDATES, NO_POINT, LightField
+from lambent.store.consistency import numbers_of
+from lambent.store.contract import light_field_name
+from lambent.store.store import Store
+
+PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
+BLOCKS = "blocks"  # in place of radiance
+
+
+def has_light_field(store: Store, object_name: str) -> bool:
+    """Whether the whole light field of an object is in the store: its last array is complete."""
+    name = light_field_name(object_name, PARTS[-1])
+    return name in store and store.artefact(name).complete
+
+
+def read_light_field(store: Store, object_name: str) -> LightField:
+    """The light field of an object; `UserError` where its arrays do not fit together."""
+    points, normals, inverse_distance, sample_map = (
+        store.read(light_field_name(object_name, part)) for part in PARTS if part != "radiance"
+    )
+    radiance, blocks = _radiance(store, object_name, inverse_distance.shape[-1])
+    name = light_field_name(object_name, PARTS[-1])
+    corner, grid = (numbers_of(store, name, key, 2) for key in ("corner", "grid"))
+    (offset_m,) = [float(x) for x in np.atleast_1d(store.artefact(name).meta.get("offset_m", np.nan))]
+    count, side = len(points), radiance.shape[1] if radiance.ndim == 4 else 0
+    fits = (
+        points.shape == normals.shape == (count, 3)
+        and 0 < count <= NO_POINT
+        and radiance.shape == (count, side, side, 3)
+        and inverse_distance.shape == (count, side, side)
+        and sample_map.ndim == 3
+        and sample_map.shape[2] == CANDIDATES
+        and sample_map.dtype == np.uint16
+        and min(*grid, *sample_map.shape) >= 1
+        and np.isfinite([*corner, *grid, offset_m]).all()
+    )
+    if not fits:
+        shapes = {part: array.shape for part, array in zip(PARTS, (points, normals, radiance), strict=False)}
+        raise UserError("broken store", file=store.folder, field=f"light_field/{object_name}", got=str(shapes))
+    named = sample_map[sample_map != NO_POINT]
+    if named.size and int(named.max()) >= count:
+        raise UserError(
+            "broken store", file=store.folder, field=name, got=int(named.max()), expected=f"points below {count}"
+        )
+    return LightField(
+        points, normals, radiance, inverse_distance, sample_map,
+        (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
+    )  # fmt: skip
+
+
+def light_name(store: Store, object_name: str) -> str:
+    """Name of the array that holds a light field's radiance, in blocks or not."""
+    blocks = light_field_name(object_name, BLOCKS)
+    return blocks if blocks in store else light_field_name(object_name, "radiance")
+
+
+def _radiance(store: Store, object_name: str, side: int) -> tuple[NDArray[np.float16], NDArray[np.uint32] | None]:
+    """Maps, and their blocks where the store has those."""
+    name = light_name(store, object_name)
+    array = store.read(name)
+    if not name.endswith(BLOCKS):
+        return array, None
+    from lambent.core.light_field_blocks import maps_of  # which imports numba
+
+    if array.ndim != 4 or array.shape[1] != array.shape[2] or array.shape[3] != 4 or array.dtype != np.uint32:
+        raise UserError("broken store", file=store.folder, field=name, got=str(array.shape), expected="n x b x b x 4")
+    try:
+        return maps_of(array, side), array
+    except ValueError as error:
+        raise UserError("broken store", file=store.folder, field=name, got=str(error)) from error

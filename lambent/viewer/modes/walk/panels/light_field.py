@@ -1,0 +1,74 @@
+"""The Light field panel: points of the selected object's light field, and the map of one of them."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from lambent.viewer.mode import Textures
+from lambent.viewer.modes.walk.light_fields import SHOWS, FieldView, distances_m
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.panels.widgets import AMBER, check, choice, explain, rows, shadowed, wrapped
+from lambent.viewer.screen import Rect
+
+MARGIN_PX = 12
+MAP_SHARE = 0.4  # of the picture's shorter side
+
+
+def draw(state: WalkState) -> None:
+    view, name = state.fields, state.selection.name
+    view.follow(state.selected_parts)
+    light_field = view.chosen
+    if light_field is None:
+        imgui.text_wrapped(without(name, tuple(view.fields), state.store_name))
+        return
+    count, side = light_field.inverse_distance.shape[:2]
+    view.points_on = check("points", view.points_on, "a disc at each point that light was taken at; click one")
+    imgui.same_line()
+    view.map_on = check("map", view.map_on, "what the chosen point sees in all directions, over the picture")
+    changed, point = imgui.slider_int("point", view.point, 0, count - 1)
+    explain("the point whose map is shown, by its number")
+    if changed:
+        view.point = min(max(point, 0), count - 1)
+    view.shows = choice("of it", view.shows, SHOWS, "its light, or how far it sees: red near, blue far, black the sky")
+    x, y, z = light_field.points[view.point]
+    far, near = distances_m(light_field, view.point)
+    table = [
+        ("light field of", str(view.owner)),
+        ("points", str(count)),
+        ("maps", f"{side} x {side} texels"),
+        ("off the surface", f"{1e3 * light_field.offset_m:.1f} mm"),
+        ("place", f"{x:.3f}, {y:.3f}, {z:.3f} m"),
+        ("sees", f"{near:.3g} to {far:.3g} m"),
+    ]
+    rows(table, "light field")
+
+
+def without(name: str | None, others: tuple[str, ...], store: str) -> str:
+    """What to do where the selected object has no light field."""
+    has = f" These have one: {', '.join(others)}." if others else ""
+    if name is None:
+        return f"Select an object.{has}"
+    return f"{name} has no light field; `lambent bake SCENE -o {store} --light-fields {name}` makes one.{has}"
+
+
+def warn_of_look_up(state: WalkState) -> None:
+    """Under the look-up of an object that was to be drawn with a light field and has none."""
+    name, parts = state.selection.name, state.selected_parts
+    wanted = state.look.lookups.get(name or "", state.look.lookup)
+    if name is not None and wanted.startswith("light_field") and not any(part in state.fields.fields for part in parts):
+        wrapped([without(name, (), state.store_name)])
+
+
+def draw_over(view: FieldView, picture: Rect, textures: Textures) -> None:
+    """Discs over the picture, and the map in its upper left corner."""
+    behind = imgui.get_background_draw_list()
+    if (discs := textures.get("points")) is not None:
+        behind.add_image(discs, picture.point(0, 0), picture.point(1, 1))
+    if (square := textures.get("map")) is None:
+        return
+    size = MAP_SHARE * min(picture.width, picture.height)
+    (x, y), line = picture.point(0, 0), imgui.get_text_line_height()
+    x, y = x + MARGIN_PX, y + MARGIN_PX + line
+    behind.add_image(square, (x, y), (x + size, y + size))
+    behind.add_rect((x - 1, y - 1), (x + size + 1, y + size + 1), imgui.get_color_u32(AMBER))
+    shadowed(behind, (x, y - line - 2), f"point {view.point}: {view.shows}", AMBER, 1.0)

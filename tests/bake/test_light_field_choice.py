@@ -1,0 +1,120 @@
+"""Which objects get light fields where nobody says it, and how a bake is asked for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.light_fields.choice import SHARE, chosen, worth_trying
+from lambent.bake.light_fields.request import as_asked, light_fields_of, noted
+from lambent.bake.light_fields.trial import ProbeLight, Trial
+from lambent.core.camera import Camera
+from lambent.core.cubemap import face_directions
+from lambent.core.directions import normalize
+from lambent.core.errors import UserError
+from lambent.scenes.geometry import box, placed
+from lambent.scenes.scene import LightFieldWish, Scene, SceneObject
+from lambent.store.contract import light_field_name
+from tests.bake.small_scenes import MIRROR, TINY, room_with_step
+
+MB = 64**2 * 8 / 1e6  # of a point with maps of 64 texels a side
+
+
+def test_points_go_where_they_take_most_away() -> None:
+    trials = {
+        "large": Trial(0.4, {16: 0.2, 64: 0.1}, 0.02),
+        "small": Trial(0.4, {16: 0.2, 64: 0.1}, 0.01),
+        "hopeless": Trial(0.4, {16: 0.39, 64: 0.38}, 1.0),
+        "right already": Trial(0.0, {16: 0.1, 64: 0.05}, 1.0),
+    }
+
+    def counts(points: float) -> dict[str, int]:
+        return {one.object: one.points for one in chosen(trials, 64, points * MB, 8)}
+
+    assert counts(15) == {} and counts(16) == {"large": 16}
+    assert counts(33) == {"large": 16, "small": 16}
+    assert counts(85) == {"large": 64, "small": 16} and counts(1000) == {"large": 64, "small": 64}
+    one = chosen(trials, 64, 16 * MB, 8)[0]
+    assert one.megabytes == pytest.approx(16 * MB) and (one.probe_error, one.error) == (0.4, 0.2)
+    assert chosen({}, 64, 100.0, 8) == []
+
+
+def test_a_count_comes_down_to_an_error_or_is_the_best() -> None:
+    trial = Trial(0.4, {16: 0.2, 64: 0.1, 256: 0.11}, 1.0)
+    assert [trial.count_for(error) for error in (0.3, 0.15, 0.01)] == [16, 64, 64]
+
+
+def test_only_the_worst_are_tried() -> None:
+    wrong = {"a": 1.0, "b": 10.0, "c": 11 * SHARE / 2, "d": 0.0}
+    assert worth_trying(wrong) == ["b", "a"]
+    assert worth_trying({}) == [] and worth_trying({"a": 0.0}) == []
+
+
+def test_a_probe_is_looked_up_as_the_renderer_does() -> None:
+    """In a room of 4 m whose walls show the place on them; from off the centre, by planes and by distances."""
+    w = face_directions(64)
+    on_wall = 2 * w / np.abs(w).max(axis=-1, keepdims=True)
+    distance = np.linalg.norm(on_wall, axis=-1)
+    planes = np.array([[*(sign * axis), 2.0] for axis in np.eye(3) for sign in (-1, 1)])
+    centre, rng = np.array([5.0, 0, 0]), np.random.default_rng(0)
+    world = planes + np.outer(planes[:, :3] @ -centre, [0, 0, 0, 1])
+    x, direction = rng.uniform(-1, 1, (50, 4, 3)), normalize(rng.standard_normal((50, 4, 3)))
+    t = ((2 * np.sign(direction) - x) / direction).min(axis=-1, keepdims=True)
+    for given in (world, world[:0]):
+        light = ProbeLight(on_wall + 2, distance, given, centre)
+        found = light.along(x + centre, direction) - 2
+        assert np.quantile(np.abs(found - (x + t * direction)).max(axis=-1), 0.9) < 0.1
+    np.testing.assert_allclose(light.far(w), on_wall + 2, atol=0.05)
+
+
+def test_names_and_patterns_say_which() -> None:
+    ball = LightFieldWish(points=9)
+    scene = replace(room_with_step(), light_fields={"ball": ball})
+    assert as_asked(scene, "scene").light_fields == as_asked(scene, "auto").light_fields == {"ball": ball}
+    assert as_asked(scene, "none").light_fields == {}
+    assert as_asked(scene, "b*").light_fields == {"ball": ball, "block": LightFieldWish()}
+    assert as_asked(scene, "shell,lamp").light_fields.keys() == {"shell", "lamp"}
+    with pytest.raises(UserError, match=r"--light-fields: fits no object; found bal; .* did you mean 'ball'\?"):
+        as_asked(scene, "lamp,bal")
+    assert noted({}, None, None) == {"light_fields": "scene", "light_field_mb": "256.0"}
+    before = noted({}, "auto", 64.0)
+    assert noted(before, None, None) == before and noted(before, "none", None)["light_field_mb"] == "64.0"
+
+
+@pytest.fixture(scope="module")
+def beside() -> Scene:
+    """A ball and two mirrors of a corner that stand close about it: one centre does not see what the corner mirrors."""
+    scene = room_with_step()
+    corner = SceneObject("corner", placed(box((0.5, 0.5, 0.04)), (-0.8, 0.5, -0.4)), "mirror")
+    eyes = (Camera("a", (0.6, 1.2, 1.4), (-0.8, 0.4, 0)), Camera("b", (-1.5, 1.2, 1.5), (-0.8, 0.5, 0)))
+    return replace(
+        scene, objects=(*scene.objects, corner), materials={**scene.materials, "mirror": MIRROR}, cameras=eyes
+    )
+
+
+def test_a_bake_chooses_and_keeps_its_choice(beside: Scene, tmp_path: Path) -> None:
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 16, "strata": 1, "blocks": False})
+    store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
+    fields = {one["object"]: one for one in light_fields_of(store)}
+    assert "ball" in fields
+    for name, one in fields.items():
+        assert one["error"] < 0.85 * one["probe_error"] and one["seconds"] > 0
+        assert store.read(light_field_name(name, "radiance")).shape == (one["points"], 16, 16, 3)
+    keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
+    store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
+    assert {a.name: a.key for a in store.artefacts()} == keys and not steps, "chosen once, as the store says"
+    store = bake(beside, tmp_path / "s", quality=quality, light_fields="none")
+    assert not light_fields_of(store) and not store.artefacts("light_field")
+
+
+def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_path: Path) -> None:
+    quality = TINY.changed("tiny", light_field={"points": 40, "texels": 8, "strata": 1, "blocks": False})
+    counts = []
+    for error in (100.0, 1e-6):
+        asked = replace(beside, light_fields={"ball": LightFieldWish(error=error)})
+        counts.append(light_fields_of(bake(asked, tmp_path / "s", quality=quality))[0]["points"])
+    assert counts[0] == 16 and counts[0] <= counts[1] <= 40

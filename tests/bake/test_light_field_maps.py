@@ -1,0 +1,225 @@
+"""Light fields: what their points see, in scenes whose answer is known by hand, and what a store holds of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.lib.stride_tricks import sliding_window_view
+
+from lambent.bake.bake import bake
+from lambent.core.directions import normalize
+from lambent.core.light_field import NO_POINT
+from lambent.core.octahedral import from_square, texel_directions, texel_solid_angles
+from lambent.core.progress import Cancelled
+from lambent.materials.document import Material
+from lambent.scenes.geometry import patch
+from lambent.scenes.scene import ConstantEnvironment, LightFieldWish, Scene, SceneObject, SunSky
+from lambent.store.contract import light_field_name
+from lambent.store.light_fields import read_light_field
+from lambent.store.store import Store
+from tests.bake.small_scenes import BLACK, COLOURS, TINY, coloured_room, room_with_step
+
+SMALL = TINY.changed("small", light_field={"points": 24, "texels": 16, "strata": 1, "blocks": False})
+PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
+
+
+def with_field(scene: Scene, **asked: Any) -> Scene:
+    return replace(scene, light_fields={"ball": LightFieldWish(**asked)})
+
+
+def read(store: Store, part: str) -> np.ndarray:
+    return store.read(light_field_name("ball", part))
+
+
+def test_directions_are_those_of_core(mi: Any) -> None:
+    from lambent.bake.light_fields.acquisition import direction
+
+    uv = np.random.default_rng(0).random((1000, 2))
+    found = direction(mi.Point2f(mi.Float(uv[:, 0]), mi.Float(uv[:, 1])))
+    np.testing.assert_allclose(np.array(found).T, from_square(uv), atol=2e-6)
+
+
+def test_every_texel_sees_the_wall_behind_it(mi: Any) -> None:
+    """Walls 2 m from the origin; from any point within, by hand, which one a direction meets and how far it is."""
+    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    room = coloured_room()
+    scene = SceneBuilder(replace(room, objects=room.objects[:-1])).build()
+    points, n = np.array([[0.0, 0, 0], [1.5, -0.7, 0.3], [-1.9, 1.9, -1.9]]), 32
+    radiance = radiance_maps(Around(scene, None, 1), points, n, 2, 0)
+    inverse = inverse_distances(scene, points, n)
+    for p, light, nearness in zip(points, radiance, inverse, strict=True):
+        w = texel_directions(n)
+        w = np.where(np.abs(w) < 1e-12, 1e-12, w)
+        t = (2 * np.sign(w) - p) / w
+        axis, distance = t.argmin(axis=-1), t.min(axis=-1)
+        side = np.take_along_axis(w, axis[..., None], axis=-1)[..., 0] < 0
+        np.testing.assert_allclose(nearness * distance, 1, rtol=1e-3)
+        wall = np.array(COLOURS, float)[2 * axis + side]
+        alike = np.ones((n, n), bool)  # texels that lie in one wall: so do all their neighbours' centres
+        for shift in [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]:
+            alike &= (np.roll(wall, shift, axis=(0, 1)) == wall).all(axis=-1)
+        alike[[0, -1]] = alike[:, [0, -1]] = False
+        assert alike.mean() > 0.5
+        np.testing.assert_allclose(light[alike], wall[alike], atol=1e-5)
+        assert np.isin(light.round(5)[~alike] * 4, range(5)).all(), "a texel on an edge is a mean over its four strata"
+
+
+def test_what_is_open_is_at_no_distance_and_shows_the_sky(mi: Any) -> None:
+    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    floor = SceneObject("floor", patch((-50, 0, 50), (100, 0, 0), (0, 0, -100)), "black")
+    sky = ConstantEnvironment((0.25, 0.5, 1.0))
+    scene = SceneBuilder(Scene("s", (floor,), {"black": BLACK}, environment=sky)).build()
+    point, n = np.array([[0.0, 1e-4, 0.0]]), 16
+    up = texel_directions(n)[..., 1] > 0.15
+    down = texel_directions(n)[..., 1] < -0.15
+    inverse, light = inverse_distances(scene, point, n)[0], radiance_maps(Around(scene, None, 2), point, n, 1, 0)[0]
+    assert (inverse[up] == 0).all() and (inverse[down] > 1000).all()
+    np.testing.assert_allclose(light[up], np.broadcast_to(sky.radiance, light[up].shape), rtol=1e-5)
+    assert (light[down] == 0).all()
+
+
+def test_a_bake_writes_what_the_contract_says(tmp_path: Path) -> None:
+    store = bake(with_field(coloured_room()), tmp_path / "s", quality=SMALL)
+    points, normals, radiance, inverse, sample_map = (read(store, part) for part in PARTS)
+    assert points.shape == normals.shape == (24, 3) and points.dtype == np.float32
+    assert radiance.shape == (24, 16, 16, 3) and inverse.shape == (24, 16, 16)
+    meta = store.artefact(light_field_name("ball", "sample_map")).meta
+    heights = np.linalg.norm(points, axis=1) - 0.3
+    assert heights.max() < 1.05 * meta["offset_m"] and heights.min() > 0.25 * meta["offset_m"], (
+        "the ball has flat faces"
+    )
+    assert np.allclose(normalize(points), normals, atol=0.05)
+    outwards = texel_directions(16) @ normals[0] > 0.3
+    side = np.abs(texel_directions(16))[outwards]
+    assert (side.max(axis=-1) > 0).all() and (radiance[0][outwards].max(axis=-1) > 0.99).mean() > 0.8
+    assert (inverse > 0).all(), "a closed room"
+    rows, columns = meta["grid"]
+    top, left = meta["corner"]
+    faces = store.read("geometry/faces")[-len(coloured_room().objects[-1].mesh.faces) :]
+    uv2, p = store.read("geometry/uv2")[faces].mean(axis=1), store.read("geometry/positions")[faces].mean(axis=1)
+    entry = sample_map[(uv2[:, 1] * rows).astype(int) - top, (uv2[:, 0] * columns).astype(int) - left]
+    known = entry[:, 0] != NO_POINT
+    assert known.mean() > 0.9
+    p, entry = p[known], entry[known]
+    away = np.linalg.norm(points[entry[:, 0]] - p, axis=1)
+    assert (away < np.linalg.norm(points[None] - p[:, None], axis=-1).min(axis=1) + 0.1).all()
+
+
+def test_an_interrupted_bake_ends_with_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.bake.artefacts import light_field
+
+    monkeypatch.setattr(light_field, "PATHS_OF_A_CHUNK", 6 * 16 * 16)  # four chunks
+    scene = with_field(coloured_room())
+    whole = bake(scene, tmp_path / "whole", quality=SMALL)
+    seen: list[str] = []
+
+    def stop(done: float, total: float, what: str) -> None:
+        seen.append(what)
+        if what == "light field of ball" and done / total > 0.3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        bake(scene, tmp_path / "part", quality=SMALL, progress=stop)
+    part = Store.open(tmp_path / "part")
+    state, share = part.availability(light_field_name("ball", "radiance"))
+    assert state == "partial" and 0 < share < 1 and light_field_name("ball", "sample_map") not in part
+    before = part.artefact(light_field_name("ball", "radiance")).done
+    again = bake(scene, tmp_path / "part", quality=SMALL)
+    for name in PARTS:
+        assert read(again, name).tobytes() == read(whole, name).tobytes(), name
+    after = again.artefact(light_field_name("ball", "radiance")).done
+    assert before.items() <= after.items() and len(after) == 4
+
+
+def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: Path) -> None:
+    scene = coloured_room()
+    names = {light_field_name("ball", part) for part in PARTS}
+    store = bake(with_field(scene, points=5, texels=8, offset_m=0.25), tmp_path / "s", quality=SMALL)
+    assert read(store, "radiance").shape == (5, 8, 8, 3)
+    assert store.artefact(light_field_name("ball", "points")).meta["offset_m"] == 0.25
+    assert np.allclose(np.linalg.norm(read(store, "points"), axis=1), 0.55, atol=0.02)
+    kept = {a.name: a.key for a in store.artefacts() if a.name not in names}
+    own, all_levels = texel_directions(8) @ read(store, "normals").T < -0.9, read(store, "radiance")
+    bare = SMALL.changed(light_field={"levels": 1})
+    store = bake(with_field(scene, points=5, texels=8, offset_m=0.25), tmp_path / "s", quality=bare)
+    seen = np.moveaxis(own, -1, 0)
+    assert (read(store, "radiance")[seen] == 0).all() and (all_levels[seen] > 0.5).any(axis=-1).mean() > 0.8
+    assert np.array_equal(read(store, "radiance")[~all_levels.any(axis=-1)], all_levels[~all_levels.any(axis=-1)])
+    store = bake(scene, tmp_path / "s", quality=SMALL)
+    assert {a.name: a.key for a in store.artefacts()} == kept, "nothing else is baked again"
+
+
+def test_blocks_hold_the_same_light(tmp_path: Path) -> None:
+    scene = with_field(coloured_room(), texels=30)
+    plain = read(bake(scene, tmp_path / "s", quality=SMALL), "radiance").astype(float)
+    store = bake(scene, tmp_path / "s", quality=SMALL.changed(light_field={"blocks": True}))
+    blocks = read(store, "blocks")
+    assert blocks.shape == (24, 8, 8, 4) and light_field_name("ball", "radiance") not in store
+    field = read_light_field(store, "ball")
+    alike = np.ptp(sliding_window_view(plain, (7, 7), axis=(1, 2)), axis=(-2, -1)).max(axis=-1) == 0  # no edge near
+    assert alike.mean() > 0.1
+    np.testing.assert_allclose(field.radiance[:, 3:-3, 3:-3][alike], plain[:, 3:-3, 3:-3][alike], atol=1e-3)
+    assert np.array_equal(field.inverse_distance, read(store, "inverse_distance"))
+
+
+def test_traced_whole_it_is_the_same_within_noise(tmp_path: Path) -> None:
+    scene = replace(room_with_step(), light_fields={"ball": LightFieldWish(points=24, texels=16)})
+    quality = TINY.changed(light_field={"strata": 4, "blocks": False})
+    cached, traced = (
+        read(bake(scene, tmp_path / "s", quality=quality, probes=method), "radiance").astype(float)
+        for method in ("cached", "traced")
+    )
+    assert not np.array_equal(cached, traced)
+    assert traced.mean() == pytest.approx(cached.mean(), rel=0.03)
+    blocks = [a.reshape(24, 4, 4, 4, 4, 3).mean(axis=(2, 4, 5)) for a in (cached, traced)]
+    assert np.median(np.abs(blocks[1] - blocks[0]) / (blocks[0] + 0.05)) < 0.1
+
+
+def test_a_matte_object_gets_none_and_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    scene = with_field(coloured_room())
+    matte = replace(scene, materials={**scene.materials, "mirror": Material(kd=0.5)})
+    store = bake(matte, tmp_path / "s", quality=SMALL)
+    assert not store.artefacts("light_field")
+    assert "ball" in caplog.text and "light_field" in caplog.text
+
+
+def test_texels_hold_the_light_of_what_their_middle_meets(mi: Any) -> None:
+    """A black square before a white sky: no texel mixes both, though the square ends within texels."""
+    from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+
+    square = SceneObject("square", patch((-1.03, -1, 1.07), (2, 0, 0), (0, 0, -2)), "black")
+    scene = Scene("s", (square,), {"black": BLACK}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
+    built, point, n = SceneBuilder(scene).build(), np.zeros((1, 3)), 31
+    light = radiance_maps(Around(built, None, 2), point, n, 4, 0)[0]
+    met = inverse_distances(built, point, n)[0] > 0
+    assert 0.05 < met.mean() < 0.3
+    np.testing.assert_allclose(light, np.where(met[..., None], 0.0, 1.0) * np.ones(3), atol=1e-6)
+
+
+def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
+    """Pixels add it. Seen from an open place, maps with and without it differ by the irradiance that it has."""
+    from lambent.bake.light_fields.acquisition import Around, radiance_maps
+    from lambent.bake.sky.sun import sun_of
+    from lambent.bake.tracing.scene_builder import SceneBuilder
+    from lambent.bake.tracing.sun import Sun
+
+    floor = SceneObject("floor", patch((-1, -5, 1), (2, 0, 0), (0, 0, -2)), "black")
+    scene = Scene("s", (floor,), {"black": BLACK}, environment=SunSky((0.39, 0.86, -0.32)))
+    found, n, strata = sun_of(scene), 16, 128
+    assert found is not None
+    built, point = SceneBuilder(scene).build(), np.zeros((1, 3))
+    whole, rest = (radiance_maps(Around(built, None, 2, sun), point, n, strata, 0)[0] for sun in (None, Sun(found)))
+    difference = (whole - rest) * texel_solid_angles(n)[..., None]
+    near = texel_directions(n) @ np.array(found.record.direction) > 0.97
+    assert not difference[~near].any()
+    np.testing.assert_allclose(difference.sum(axis=(0, 1)), found.record.irradiance, rtol=0.1)
+    assert rest[near].max() < 0.01 * whole[near].max()

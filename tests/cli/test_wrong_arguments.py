@@ -1,0 +1,66 @@
+"""Wrong arguments of every command: one line that names what was wrong, exit code 2, and nothing written."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+WRONG = {
+    "bake builtin:box": "-o: no folder",
+    "bake builtin:box -o s --quality great": "--quality': 'great' is not one of",
+    "bake builtin:box -o s --only walls": "--only",
+    "bake builtin:box -o s --only transport": "--view",
+    "bake builtin:box -o s --only transport --view none": "--view: unknown camera",
+    "bake builtin:box -o s --only transport --view front:0x0": "front:0x0",
+    "bake builtin:box -o s --seed -1": "--seed",
+    "bake builtin:box -o s --merge": "--merge: is for interreflections",
+    "bake builtin:box -o s --crease-angle 181": "--crease-angle",
+    "bake builtin:box --propose": "--view",
+    "bake builtin:box --propose --view front --series 3,1": "3,1",
+    "bake builtin:box --propose --view front --fixed gold": "--fixed: unknown material",
+    "bake builtin:box -o s --only transport --edit bad.edits.json": "bad.edits.json: not a JSON document",
+    "bake builtin:box -o s --only transport --edit half.edits.json": "half.edits.json: scene: is missing",
+    "bake folder -o s": "folder: unknown kind of scene",
+    "bench nothing": "unknown bench",
+    "bench flicker --input nothing": "nothing: input does not exist",
+    "check folder": "folder: cannot be read",
+    "compare bad.edits.json bad.edits.json": "not a picture",
+    "convert half.edits.json thing.nope": "thing.nope: unknown ending",
+    "convert half.edits.json thing.glb": "half.edits.json",
+    "demo further": "further",
+    "doctor further": "further",
+    "edit builtin:box --picture 9x": "--picture: not a picture size; found 9x",
+    "edit builtin:box other.json": "a scene is edited by itself",
+    "edit half.json --crease-angle 40": "--crease-angle: is for scenes",
+    "fit half.edits.json -o a.json --lobes many": "--lobes",
+    "fit folder -o a.json": "folder: cannot be read",
+    "glare half.edits.json": "picture does not say what it shows",
+    "glare folder": "folder: not a store",
+    "inspect folder": "folder: not a store",
+    "relight folder": "-o",
+    "render folder -o x.gif": "x.gif: unknown kind of file",
+    "render folder -o x.png --ev100 500": "--ev100: exposure is out of range",
+    "render folder -o x.png --exposure 1e9": "--exposure: exposure is out of range",
+    "render folder -o x.png --range 5:1": "not a range of luminance; found 5:1",
+    "render folder -o x.png --range a:b": "--range: not a range",
+    "render folder -o x.png --size 5": "--size: not a picture size",
+    "render folder -o x.png --samples 0": "--samples': it has to be greater than or equal to 1",
+    "render folder -o x.png --view pretty": "--view: unknown view transform",
+    "render folder -o x.png --surfaces 2": "--surfaces",
+    "render folder -o x.png --field 500": "--field",
+    "walk folder --size 0x0": "--size: not a picture size",
+    "view folder --camera front": "No such option: --camera",
+}
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_one_line_says_what_is_wrong(refused, tmp_path, monkeypatch, line):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "bad.edits.json").write_text("not JSON")
+    (tmp_path / "half.edits.json").write_text('{"format": "lambent-edit-session"}')
+    (tmp_path / "half.json").write_text("{}")
+    said = refused(*shlex.split(line))
+    assert WRONG[line] in said and len(said) < 400
+    assert {one.name for one in tmp_path.iterdir()} == {"folder", "bad.edits.json", "half.edits.json", "half.json"}

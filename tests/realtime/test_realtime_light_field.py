@@ -1,0 +1,129 @@
+"""Light fields on the GPU, against a room whose light is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.images import read_image
+from lambent.core.light_field import LightField
+from lambent.core.light_field_tiles import Tiles
+from lambent.core.octahedral import texel_solid_angles
+from lambent.realtime import light_field_atlas
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import BLOCKS
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.light_field_atlas import MOST_TEXELS, Grid, coding
+from lambent.realtime.renderer import Renderer
+from lambent.render import Settings, still
+from lambent.store.light_fields import read_light_field
+from tests.realtime.lit_ball import CAMERA, ball_scene, light_field, mirrored, put_ball
+
+SIZE = 96
+STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular")
+
+
+@pytest.fixture(scope="module")
+def field() -> LightField:
+    return light_field()
+
+
+@pytest.fixture(scope="module")
+def renderer(device: Any, field: LightField) -> Renderer:
+    return Renderer(device, ball_scene(field=field))
+
+
+def error(image: np.ndarray) -> float:
+    """Root mean square over the ball's inner pixels: at its edge the mesh is no ball."""
+    truth, ball = mirrored(SIZE, SIZE)
+    inner = ball & np.roll(ball, 4, 0) & np.roll(ball, -4, 0) & np.roll(ball, 4, 1) & np.roll(ball, -4, 1)
+    return float(np.sqrt(np.mean((image - truth)[inner] ** 2)))
+
+
+def test_methods_rank_as_they_should(renderer: Renderer) -> None:
+    errors = {
+        name: error(renderer.image(replace(STATE, lookup=name)))
+        for name in ("plain", "light_field-nearest", "light_field-bn", "light_field-1", "light_field")
+    }
+    assert errors["light_field"] < 0.5 * errors["light_field-bn"] < 0.5 * errors["plain"]
+    assert errors["light_field-nearest"] < errors["plain"]
+    np.testing.assert_array_equal(renderer.image(STATE), renderer.image(replace(STATE, lookup="light_field")))
+
+
+def test_the_light_field_of_a_store_is_rendered(tmp_path: Path, renderer: Renderer, field: LightField) -> None:
+    """In the store's unit; by default it is what the object reflects."""
+    store = put_ball(tmp_path / "ball.store", field)
+    drawn = {}
+    for name in ("auto", "light_field-bn", "plain"):
+        picture = tmp_path / f"{name}.exr"
+        still(store.folder, picture, settings=Settings(SIZE, SIZE, samples=1, show="specular", lookup=name))
+        drawn[name] = read_image(picture)
+    expected = renderer.still_radiance(replace(STATE, lookup="light_field"))
+    np.testing.assert_allclose(drawn["auto"], expected, rtol=0.01, atol=0.01)
+    assert error(drawn["auto"]) < error(drawn["light_field-bn"]) < error(drawn["plain"])
+
+
+def test_an_unknown_look_up_is_refused(tmp_path: Path, field: LightField) -> None:
+    store = put_ball(tmp_path / "ball.store", field)
+    with pytest.raises(UserError, match="--lookup"):
+        still(store.folder, tmp_path / "a.png", settings=Settings(8, 8, lookup="light"))
+
+
+def test_blocks_in_a_store_and_on_the_adapter(
+    tmp_path: Path, device: Any, renderer: Renderer, field: LightField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A store in blocks is drawn as one in half floats, by an adapter that reads blocks and by one that does not."""
+    store = put_ball(tmp_path / "ball.store", field, in_blocks=True)
+    read = read_light_field(store, "ball")
+    assert read.blocks is not None and read.radiance.shape == field.radiance.shape
+    exact, scene = renderer.image(STATE), read_baked(store)
+    image = Renderer(device, scene).image(STATE)
+    assert psnr_db(image, exact) > 38
+    if BLOCKS not in device.features:
+        pytest.skip("the adapter has no textures in blocks")
+    monkeypatch.setattr(light_field_atlas, "is_software", lambda device: False)
+    assert coding(device, Tiles.of(126)).format == "bc6h-rgb-ufloat"
+    assert psnr_db(Renderer(device, scene).image(STATE), image) > 50
+
+
+def psnr_db(image: np.ndarray, exact: np.ndarray) -> float:
+    return float(10 * np.log10(exact.max() ** 2 / np.mean((image - exact) ** 2)))
+
+
+@pytest.mark.parametrize("part", ["radiance", "sample_map"])
+def test_a_light_field_that_contradicts_itself_is_refused(tmp_path: Path, field: LightField, part: str) -> None:
+    fewer = replace(
+        field, points=field.points[:9], normals=field.normals[:9], inverse_distance=field.inverse_distance[:9]
+    )
+    broken = fewer if part == "radiance" else replace(fewer, radiance=field.radiance[:9])
+    store = put_ball(tmp_path / "ball.store", broken)
+    with pytest.raises(UserError, match="light_field/ball"):
+        read_light_field(store, "ball")
+
+
+def test_thousands_of_maps_fit_few_layers() -> None:
+    """The thesis's 1156 in one layer without an empty place, and the most there can be within WebGPU's 256 layers."""
+    tiles = Tiles.of(222)
+    assert (tiles.tile, tiles.levels) == (224, 6) and Grid.of(1156, 224) == Grid(34, 34, 1)
+    for count, side in ((1, 6), (7, 30), (4000, 94), (65535, 222), (3, 1022)):
+        tile = Tiles.of(side).tile
+        grid = Grid.of(count, tile)
+        assert grid.columns * grid.rows * grid.layers >= count and max(grid.columns, grid.rows) * tile <= MOST_TEXELS
+        assert grid.layers <= 256 and tile <= 1.06 * (side + 2)
+
+
+def test_levels_keep_the_light_and_see_over_edges(field: LightField) -> None:
+    tiles = Tiles.of(126)
+    maps = field.radiance[:3].astype(np.float32)
+    whole = (maps * texel_solid_angles(126)[..., None]).sum(axis=(1, 2))
+    for k, level in enumerate(tiles.chain(maps)):
+        n = tiles.inner(k)
+        inner = level[:, 1 : n + 1, 1 : n + 1]
+        assert level.shape == (3, tiles.tile >> k, tiles.tile >> k, 3)
+        np.testing.assert_allclose((inner * texel_solid_angles(n)[..., None]).sum(axis=(1, 2)), whole, rtol=0.02)
+        np.testing.assert_array_equal(level[:, 0, 1 : n + 1], inner[:, 0, ::-1])  # an edge, mirrored about its middle

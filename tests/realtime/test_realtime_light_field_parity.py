@@ -1,0 +1,109 @@
+"""Every method of a light field: the shader draws what numpy's look-up says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core import light_field_lookup as numpy_twin
+from lambent.core.cubemap import sample
+from lambent.core.light_field import NO_POINT, LightField
+from lambent.materials.document import Lobe, Material
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.incident.light_field import CHOSEN, LOOK_UPS, MARCHED, filled
+from lambent.realtime.renderer import Renderer
+from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
+from tests.realtime.lit_wall import cube_of, smooth_light
+
+SIZE = 128
+STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular", integrator="rings")
+BASES: dict[str, Any] = {
+    "light_field-nearest": "nearest", "light_field-angle": "angle", "light_field-average": "average",
+    "light_field-br": "reflection", "light_field-bn": "normal",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def field() -> LightField:
+    return plate_field()
+
+
+@pytest.fixture(scope="module")
+def renderer(device: Any, field: LightField) -> Renderer:
+    return Renderer(device, plate_scene(field))
+
+
+@pytest.mark.parametrize("one", [one for one in LOOK_UPS if one.METHOD != CHOSEN], ids=lambda one: one.NAME)
+def test_shader_and_numpy_agree(renderer: Renderer, field: LightField, one: Any) -> None:
+    """But for pixels at which rounding decides between texels, points or surfaces."""
+    place, w, inside = mirrored(field, SIZE)
+    sky = cube_of(smooth_light)
+    if one.METHOD == MARCHED:
+        march = numpy_twin.marched(field, place, w, one.RULE, lambda w: sample(sky, w))
+        expected = march.radiance
+        assert march.met[inside].mean() > 0.2 and march.sky[inside].mean() > 0.02, "the scene asks for all answers"
+        assert (~march.met & ~march.sky)[inside].any()
+    else:
+        expected = numpy_twin.blended(field, place, w, BASES[one.NAME])
+    got = renderer.image(replace(STATE, lookup=one.NAME)).reshape(-1, 3)
+    error = np.abs(got - expected)[inside].max(axis=1)
+    assert inside.sum() > 4000
+    assert np.quantile(error, 0.5) < 3e-3 and np.quantile(error, 0.98) < 0.03, np.quantile(error, [0.5, 0.9, 0.98, 1])
+
+
+def test_places_without_points_take_those_of_the_nearest_that_have_some(device: Any) -> None:
+    """Here the rows below; a field without any leaves its object to the probe."""
+    field = plate_field(dropped=10)
+    assert np.all(filled(field.sample_map)[:10] == field.sample_map[10])
+    np.testing.assert_array_equal(filled(field.sample_map)[10:], field.sample_map[10:])
+    none = replace(field, sample_map=np.full_like(field.sample_map, NO_POINT))
+    pictures = [
+        Renderer(device, plate_scene(one)).image(replace(STATE, lookup=name))
+        for one, name in ((none, "light_field"), (field, "plain"))
+    ]
+    np.testing.assert_array_equal(*pictures)
+
+
+ROUGH = Material(name="rough", lobes=(Lobe(mx=0.25, my=0.4, r0=(0.9, 0.6, 0.3), alpha=0.5),))
+
+
+@pytest.fixture(scope="module")
+def rough(device: Any, field: LightField) -> Renderer:
+    return Renderer(device, plate_scene(field, ROUGH))
+
+
+def test_both_loop_orders_agree_where_weights_do_not_follow_the_samples(rough: Renderer) -> None:
+    """B_n weights points by the normal alone: sample for sample the same (5.12). B_r and the march differ."""
+    pictures = {
+        (name, order): rough.converged(replace(STATE, lookup=name, integrator=order), 64)
+        for name in ("light_field-bn", "light_field-br", "light_field")
+        for order in ("oslf", "oslf-points")
+    }
+    by = {name: [pictures[name, order] for order in ("oslf", "oslf-points")] for name, _ in pictures}
+    np.testing.assert_allclose(*by["light_field-bn"], atol=2e-3)
+    assert np.abs(by["light_field-br"][0] - by["light_field-br"][1]).max() > 0.02
+    np.testing.assert_array_equal(by["light_field"][1], by["light_field-bn"][1])  # no single point marches
+
+
+def test_filtered_samples_come_near_many(rough: Renderer, field: LightField) -> None:
+    """Levels of the maps follow the solid angles of samples, as those of a probe."""
+    many = rough.converged(replace(STATE, integrator="oslf"), 200)
+    inside = mirrored(field, SIZE)[2].reshape(SIZE, SIZE)
+    few = {n: rough.image(replace(STATE, n=n)) for n in (7, 19)}
+    errors = {n: float(np.sqrt(np.mean((image - many)[inside] ** 2)) / many[inside].mean()) for n, image in few.items()}
+    assert errors[19] < 0.1 and errors[7] < 0.15, errors
+
+
+def test_the_choice_is_shown_in_colours(renderer: Renderer, field: LightField) -> None:
+    """Red where numpy's march misses, blue where it sees the sky, one colour per point elsewhere, at any exposure."""
+    place, w, inside = mirrored(field, SIZE)
+    march = numpy_twin.marched(field, place, w)
+    got = renderer.image(replace(STATE, lookup="light_field-choice", exposure_ev=2.0)).reshape(-1, 3) * 4 / 0.3
+    sky, missed = march.sky & inside, ~march.met & ~march.sky & inside
+    assert np.mean(np.abs(got[sky] - [0, 0.1, 1]).max(axis=1) < 0.05) > 0.95
+    assert np.mean(np.abs(got[missed] - [1, 0, 0]).max(axis=1) < 0.05) > 0.8
+    colours = np.unique(np.round(got[march.met & inside], 1), axis=0)
+    assert 20 < len(colours) < 150

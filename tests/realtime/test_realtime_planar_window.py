@@ -1,0 +1,91 @@
+"""Windows of planar reflection buffers: they hold what lobes of a reflector see, and little more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lambent.realtime.planar_view
+from lambent.core.camera import Camera
+from lambent.realtime.frame_state import QMC_N, FrameState
+from lambent.realtime.planar_view import MARGIN_PX, STEP_PX, on_screen, planar_views
+from lambent.realtime.renderer import Renderer
+from lambent.store.contract import ReflectorPart, ReflectorRecord
+from tests.realtime.test_realtime_planar import CAMERA, FLOOR, frame_of, mirror, scene_of
+
+WIDTH, HEIGHT = 960, 640
+TRAY = ReflectorRecord(
+    plane=(0, 1, 0, 0),
+    outline=((-0.2, 0, -0.2), (-0.2, 0, 0.2), (0.2, 0, 0.2), (0.2, 0, -0.2)),
+    parts=(ReflectorPart(object="tray", faces=(0, 1), area_m2=0.16),),
+)
+
+
+@pytest.mark.parametrize("m", [0.01, 0.02])
+def test_a_small_reflector_has_a_small_part_of_the_whole_buffer(m: float) -> None:
+    """Its texels are those of the whole buffer, blocks of a coarse level included; a frame's pixels keep their rays."""
+    frame, lobes = frame_of(CAMERA, WIDTH, HEIGHT), {"tray": m}
+    ((part,), (whole,)) = (planar_views(frame, [TRAY], WIDTH, HEIGHT, 4, lobes, entire) for entire in (False, True))
+    assert np.prod(part.size) < 0.3 * np.prod(whole.size)
+    moved = whole.uniform["offset"] - part.uniform["offset"]
+    assert np.all(moved % STEP_PX == 0) and np.all(moved >= 0)
+    assert np.all(moved + np.array(part.size) <= whole.size)
+    shown = (on_screen(frame, np.array(TRAY.outline)) * [1, -1] + 1) / 2 * [WIDTH, HEIGHT] + part.uniform["offset"]
+    assert np.all(shown >= MARGIN_PX) and np.all(shown <= np.array(part.size) - MARGIN_PX)
+    for name in ("plane", "eye"):
+        np.testing.assert_array_equal(part.uniform[name], whole.uniform[name])
+    rays = [
+        view.frame["forward"] + x * view.frame["across"] + y * view.frame["up"]
+        for view in (part, whole)
+        for x, y in [(np.array([300.0, 200.0]) + view.uniform["offset"]) / view.size * [2, -2] + [-1, 1]]
+    ]
+    np.testing.assert_allclose(rays[0][:3], rays[1][:3], atol=1e-5)
+
+
+@pytest.mark.parametrize("m", [0.05, 0.3])
+def test_a_tray_is_as_with_the_whole_buffer(device: Any, m: float, monkeypatch: Any) -> None:
+    """Where its lobe reaches no farther than the window, to the bit; wide lobes find their tails in the probe."""
+    baked = scene_of(mirror(m))
+    narrow = baked.record.model_copy(update={"reflectors": (FLOOR.model_copy(update={"outline": TRAY.outline}),)})
+    renderer = Renderer(device, replace(baked, record=narrow))
+    state = FrameState(CAMERA, 480, 320, antialias=False, show="specular", n=5)
+    part = renderer.image(state)
+    monkeypatch.setattr(lambent.realtime.planar_view, "_window", partial(_whole, lambent.realtime.planar_view._window))
+    whole = renderer.image(state)
+    shown = (on_screen(frame_of(CAMERA, 480, 320), np.array(TRAY.outline)) * [1, -1] + 1) / 2 * [480, 320]
+    (left, top), (right, bottom) = shown.min(axis=0).astype(int) + 4, shown.max(axis=0).astype(int) - 4
+    middle = np.s_[(top + bottom) // 2 - 8 : (top + bottom) // 2 + 8, (left + right) // 2 - 8 : (left + right) // 2 + 8]
+    assert whole[middle].max() > 0.1
+    assert np.abs(part - whole)[middle].mean() < 0.03 * whole[middle].mean()
+
+
+def _whole(window: Any, frame: Any, size: Any, m: float, shown: Any) -> Any:
+    return window(frame, size, m, None)
+
+
+def test_nothing_pops_where_windows_move(device: Any) -> None:
+    """A camera that tilts by half a pixel a frame, across a step of its window."""
+    renderer = Renderer(device, scene_of(mirror(0.05)))
+    images, windows = [], set()
+    for height in np.linspace(0.94, 1.04, 16):
+        camera = Camera(name="c", position=CAMERA.position, target=(0.1, height, 0.0), fov_y_deg=50)
+        (view,) = planar_views(frame_of(camera, 240, 160), [FLOOR], 240, 160, 4, {"floor": 0.05})
+        windows.add(view.size)
+        images.append(renderer.image(FrameState(camera, 240, 160, antialias=False, show="specular", n=3)))
+    assert len(windows) == 2
+    change = [np.abs(b - a).mean() for a, b in pairwise(images)]
+    assert max(change) < 1.5 * np.median(change)
+
+
+def test_a_tile_that_shares_a_lobe_needs_fewer_samples() -> None:
+    rough, smooth = mirror(0.3), mirror(0.03)
+    shared, own = FrameState(CAMERA), FrameState(CAMERA, integrator="rings", planar="fixed")
+    assert shared.planar_samples(rough) < own.planar_samples(rough) == own.samples(rough) == shared.samples(rough)
+    assert shared.planar_samples(smooth) == shared.samples(smooth)
+    assert FrameState(CAMERA, n=19).planar_samples(rough) == 19, "what is asked for"
+    assert FrameState(CAMERA, integrator="qmc").planar_samples(rough) == QMC_N

@@ -1,0 +1,117 @@
+"""Light fields within a budget of memory: which maps are there, what stands in for others, and what a picture loses."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.core.light_field import NO_POINT, LightField
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.needed_points import NeededPoints
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resident_maps import ResidentMaps
+from lambent.render import Settings, still
+from tests.realtime.lit_ball import CAMERA, ball_scene, light_field, put_ball
+
+SIZE = 64
+STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular")
+BEHIND = replace(CAMERA, position=(-0.25, -0.3, -0.65))
+
+
+@pytest.fixture(scope="module")
+def field() -> LightField:
+    return light_field(count=64, side=30)
+
+
+@pytest.fixture(scope="module")
+def scene(field: LightField) -> BakedScene:
+    return ball_scene(field=field)
+
+
+def megabytes(device: Any, field: LightField, maps: float) -> float:
+    return maps * ResidentMaps(device, field).atlas.map_bytes / 1e6
+
+
+def budgeted(device: Any, scene: BakedScene, maps: float) -> Renderer:
+    return Renderer(device, replace(scene, light_field_mb=megabytes(device, scene.light_fields["ball"], maps)))
+
+
+def test_all_maps_within_the_budget_change_nothing(device: Any, scene: BakedScene) -> None:
+    exact, roomy = Renderer(device, scene), budgeted(device, scene, 64.5)
+    np.testing.assert_array_equal(roomy.image(STATE), exact.image(STATE))
+    assert roomy.streaming.statistics == {} and roomy.statistics["light_fields"] == {}
+
+
+def test_a_view_gets_the_maps_that_it_needs(device: Any, scene: BakedScene) -> None:
+    """Of half of the maps, those of the side that is seen: the picture is that of all maps."""
+    exact, half = Renderer(device, scene), budgeted(device, scene, 44.5)
+    np.testing.assert_allclose(half.image(STATE), exact.image(STATE), atol=1e-4)
+    found = half.streaming.statistics
+    assert (found["maps"], found["resident"]) == (64, 44) and found["misses"] > 0
+    assert 0 < found["resident_mb"] <= megabytes(device, scene.light_fields["ball"], 44.5)
+    half.image(STATE)
+    again = half.streaming.statistics
+    assert again["misses"] == found["misses"] and again["hits"] > found["hits"], "what was loaded stays"
+    turned = replace(STATE, camera=BEHIND)
+    np.testing.assert_allclose(half.image(turned), exact.image(turned), atol=1e-4)
+
+
+def test_fewer_maps_are_a_farther_picture_of_the_same_light(device: Any, scene: BakedScene) -> None:
+    """Errors grow as the room shrinks, and one map still shows the room."""
+    exact = Renderer(device, scene).image(STATE)
+    errors = [float(np.abs(budgeted(device, scene, maps + 0.5).image(STATE) - exact).mean()) for maps in (32, 8, 1)]
+    assert errors == sorted(errors) and errors[0] < 0.2 * errors[2] and np.isfinite(errors).all()
+    black = float(np.abs(exact).mean())
+    assert errors[2] < black
+
+
+def test_a_frame_that_does_not_wait_is_drawn_from_what_is_there(device: Any, scene: BakedScene) -> None:
+    """The window's way: the first frame is of maps that happened to be there, later ones of all that is needed."""
+    exact, renderer = Renderer(device, scene).image(STATE), budgeted(device, scene, 44.5)
+    renderer.waits = False
+    first = renderer.image(STATE)
+    assert renderer.streaming.busy and np.abs(first - exact).max() > 0.1
+    end, version = time.monotonic() + 30, renderer.streaming.version
+    while renderer.streaming.busy and time.monotonic() < end:
+        time.sleep(0.01)
+        last = renderer.image(STATE)
+    np.testing.assert_allclose(last, exact, atol=1e-4)
+    assert renderer.streaming.version > version
+
+
+def test_points_needed_are_those_named_where_the_object_faces_the_eye(scene: BakedScene, field: LightField) -> None:
+    triangles, uv2 = scene.positions[scene.faces], scene.uv2[scene.faces]
+    eye = np.array(CAMERA.position)
+    needed = NeededPoints(triangles, uv2, field).of_view(eye, [(0, len(triangles))])
+    facing = (field.normals @ eye) / np.linalg.norm(eye)
+    order = np.argsort(needed)  # the rank of each point
+    assert len(needed) == 64 and order[facing > 0.6].max() < order[facing < 0].min()
+    assert len(NeededPoints(triangles, uv2, field).of_view(eye, [])) == 0
+    bare = replace(field, sample_map=np.full_like(field.sample_map, NO_POINT))
+    bare.sample_map[0, 0, 0] = 7
+    np.testing.assert_array_equal(NeededPoints(triangles, uv2, bare).of_view(eye, [(0, len(triangles))]), [7])
+    wild = uv2.copy()
+    wild[::3] = np.nan
+    wild[1::3] = 1e30
+    assert set(NeededPoints(triangles, wild, field).of_view(eye, [(0, len(triangles))])) <= set(range(64))
+
+
+def test_a_budget_below_one_map_is_refused(tmp_path: Path, field: LightField) -> None:
+    store = put_ball(tmp_path / "ball.store", field)
+    with pytest.raises(UserError, match="--light-field-mb"):
+        still(store.folder, tmp_path / "a.png", settings=Settings(8, 8, light_field_mb=0.001))
+
+
+def test_a_still_says_how_its_maps_were_found(tmp_path: Path, device: Any, field: LightField) -> None:
+    store, mb = put_ball(tmp_path / "ball.store", field), megabytes(device, field, 20.5)
+    settings = Settings(32, 32, samples=1, light_field_mb=mb)
+    done = still(store.folder, tmp_path / "a.exr", settings=settings)
+    assert done.light_fields is not None and done.light_fields["resident"] == 20 and done.light_fields["hits"] > 0
+    assert still(store.folder, tmp_path / "b.exr", settings=Settings(32, 32, samples=1)).light_fields is None
