@@ -107,6 +107,16 @@ def test_enter_saves(panels, state, tmp_path):
     assert state.screen.closes and (tmp_path / "brass.json").exists()
 
 
+def test_answers_stay_where_they_are_when_a_message_goes(panels, state):
+    change(state)
+    state.screen.say("saved to " + "a/long/way/off/" * 20)
+    ask(panels)
+    before = dict(panels.rects)
+    state.screen.messages.clear()
+    panels.frame(3)
+    assert all(panels.rects[f"{answer}##closing"] == before[f"{answer}##closing"] for answer in ("save", "discard"))
+
+
 def test_it_fits_a_small_window(monkeypatch, state, geometry):
     driver = PanelDriver(monkeypatch, walk_mode(state, geometry), (320, 240))
     change(state)

@@ -6,7 +6,9 @@ python -m tests.viewer.watched_window SCENE OUT WIDTHxHEIGHT place:SIZE, the mat
 python -m tests.viewer.watched_window FILE OUT WIDTHxHEIGHT found:FOLDER, with the modes of a further folder
 """
 
+import faulthandler
 import json
+import signal
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -101,6 +103,7 @@ def editor_seen(editor):
 
 
 if __name__ == "__main__":
+    faulthandler.register(signal.SIGUSR1)  # stacks of all threads, see WindowSession.close
     file, out, size = Path(sys.argv[1]), Path(sys.argv[2]), tuple(map(int, sys.argv[3].split("x")))
     window.Window = WatchedWindow
     how, _, path = (sys.argv[4] if len(sys.argv) > 4 else "walk").partition(":")

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -141,7 +142,12 @@ class WindowSession:
             self.tool("mousedown", 1)
             self.settle()
             self.tool("mouseup", 1)
-        return self.process.wait(PATIENCE_S)
+        try:
+            return self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.send_signal(signal.SIGUSR1)
+            time.sleep(1)
+            raise AssertionError(f"the window stays open: {self.state()}\n{self.log()}") from None
 
     def kill(self):
         if self.process.poll() is None:

@@ -9,6 +9,7 @@ from lambent.viewer.panels.widgets import AMBER, buttons, wrapped
 
 TITLE = "Close the window?"
 WIDE_PX = 340.0
+HIGH = 0.4  # its top, of the window's height
 FLAGS = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 
 
@@ -20,7 +21,8 @@ def draw(mode: Mode) -> None:
     if not imgui.is_popup_open(TITLE):
         imgui.open_popup(TITLE)
     size = imgui.get_io().display_size
-    imgui.set_next_window_pos((size.x / 2, size.y / 2), imgui.Cond_.always, (0.5, 0.5))
+    # Held by its top: messages below the buttons come and go, and must not move them from under the pointer.
+    imgui.set_next_window_pos((size.x / 2, HIGH * size.y), imgui.Cond_.always, (0.5, 0.0))
     imgui.set_next_window_size((min(WIDE_PX, size.x), 0))
     if not imgui.begin_popup_modal(TITLE, None, FLAGS)[0]:
         return
