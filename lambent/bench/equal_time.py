@@ -6,8 +6,10 @@ drawing and the path tracer then share a processor; on a graphics card they are 
 scene is loaded before anything counts. The row marked `equal` has the fewest paths that take at least the frame's time,
 so that the comparison is never kinder to the frame than its time.
 
-The truth is path traced with the store's own materials in two halves. `reference_flip` is the FLIP of one half to the
-other: two independent errors, each 1.4 times that of the truth, and a part of every figure.
+The truth is path traced with the store's own materials in two halves, or the mean of finished pictures of the first
+camera (`--reference`), whose size the rows then have. `reference_flip` is the FLIP of one half to the other, of
+every second picture to the others: two independent errors, each 1.4 times that of the truth, and a part of every
+figure. One picture alone has none.
 """
 
 from __future__ import annotations
@@ -15,17 +17,19 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from lambent.bench.reference import finished
 from lambent.bench.views import first_camera, given_or_baked
 from lambent.core import metrics
 from lambent.core.arrays import Floats
 from lambent.core.colour import srgb_encode
+from lambent.core.errors import UserError
 from lambent.core.progress import Progress, part_of, silent
 from lambent.realtime.device import adapter_info, open_device
 from lambent.realtime.frame_state import FrameState
@@ -53,28 +57,43 @@ class Effort:
 FULL, QUICK = Effort(), Effort(320, 180, 64, 3, (1, 4), "builtin:box")
 
 
-def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
-    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+def run(
+    effort: Effort, inputs: Sequence[Path] = (), reference: Sequence[Path] = (), progress: Progress = silent
+) -> dict[str, Any]:
+    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`.
+
+    `reference`: finished pictures of the only input's first camera, each of equally many samples and another seed.
+    """
+    if reference and len(inputs) != 1:
+        got, expected = f"{len(inputs)} inputs", "one baked store, whose first camera it shows"
+        raise UserError("a reference is of one store", field="--reference", got=got, expected=expected)
+    pictures = finished(reference)
     with given_or_baked(inputs, effort.scene, progress) as stores:
         parts = [part_of(progress, k, k + 1, s.folder.name) for k, s in enumerate(stores)]
-        rows = [row for store, part in zip(stores, parts, strict=True) for row in rows_of(store, effort, part)]
+        rows = [
+            row for store, part in zip(stores, parts, strict=True) for row in rows_of(store, effort, part, pictures)
+        ]
     return {"rows": rows, "summary": summary(rows)}
 
 
-def rows_of(store: Store, effort: Effort, progress: Progress) -> list[dict[str, Any]]:
-    """The frame and its rivals in the first camera of a store."""
+def rows_of(
+    store: Store, effort: Effort, progress: Progress = silent, pictures: Sequence[Floats] = ()
+) -> list[dict[str, Any]]:
+    """The frame and its rivals in the first camera of a store; `pictures` (H, W, 3) are finished references of it."""
     from lambent.bake.engine import engine
 
     engine()
     from lambent.bake.reference.denoised import DenoisedView  # imports Mitsuba, whose variant `engine` has set
 
+    if pictures:
+        effort = replace(effort, width=pictures[0].shape[1], height=pictures[0].shape[0])
     camera = first_camera(store, scene_record(store))
     tracer = DenoisedView(scene_of(store), camera, effort.width, effort.height)
-    halves = []
-    for seed in (1, 2):
-        halves.append(tracer.image(effort.truth_spp // 2, seed))
+    parts = list(pictures)
+    for seed in () if pictures else (1, 2):
+        parts.append(tracer.image(effort.truth_spp // 2, seed))
         progress(seed, 3, "truth")
-    truth = (halves[0] + halves[1]) / 2
+    truth = np.mean(parts, axis=0)
     exposure_ev = metrics.display_exposure(truth)
 
     def shown(radiance: Floats) -> Floats:
@@ -95,7 +114,8 @@ def rows_of(store: Store, effort: Effort, progress: Progress) -> list[dict[str, 
         }
 
     encoded = shown(truth)
-    reference_flip = round(float(metrics.flip_error(shown(halves[0]), shown(halves[1])).mean()), 4)
+    halves = [shown(np.mean(half, axis=0)) for half in (parts[::2], parts[1::2]) if half]
+    reference_flip = round(float(metrics.flip_error(*halves).mean()), 4) if len(halves) == 2 else None
     device = open_device()
     renderer = Renderer(device, store)
     clock = time.process_time if adapter_info(device).is_software else time.perf_counter

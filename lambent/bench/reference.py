@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lambent.core import metrics
 from lambent.core.arrays import Flags, Floats
+from lambent.core.errors import UserError
+from lambent.core.images import HDR_SUFFIXES, read_image
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,29 @@ class Reference:
             "flip_shown": round(float(flip[self.shown].mean()), 5),
             "flip_worst_tile": round(float(metrics.tile_means(flip).max()), 5),
         }
+
+
+def finished(paths: Sequence[Path]) -> list[Floats]:
+    """Radiance (H, W, 3) of path traced pictures of one view.
+
+    Raises
+    ------
+    UserError
+        Where a file cannot be read, is a displayed picture, is black, or has another size than the first.
+    """
+    found: list[Floats] = []
+    for path in paths:
+        if path.suffix.lower() not in HDR_SUFFIXES:
+            hint = "lambent render STORE --integrator path -o reference.exr"
+            raise UserError("a reference holds radiance", file=path, expected=".exr or .hdr", hint=hint)
+        picture = read_image(path)
+        if found and picture.shape != found[0].shape:
+            size, first = (f"{shape[1]}x{shape[0]}" for shape in (picture.shape, found[0].shape))
+            raise UserError("references differ in size", file=path, got=size, expected=first)
+        if not picture.any():
+            raise UserError("reference is black", file=path)
+        found.append(picture)
+    return found
 
 
 def mean(digits: int) -> Callable[[list[float]], float]:

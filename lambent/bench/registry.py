@@ -2,9 +2,9 @@
 
 A bench is a module of this package with `NAME`, its efforts `FULL` and `QUICK` (instances of a frozen dataclass of its
 own), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads files, `run` also
-takes `inputs`; if it compares with published figures, `against`; if it draws settings at random, `settings`. Names,
-rows and fields are those of docs/performance.md; times are medians of at least five runs taken in turns, their spread
-beside them.
+takes `inputs`; if it compares with published figures, `against`; with finished pictures, `reference`; if it draws
+settings at random, `settings`. Names, rows and fields are those of docs/performance.md; times are medians of at least
+five runs taken in turns, their spread beside them.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ def run_bench(
     *,
     inputs: Sequence[Path] = (),
     against: Sequence[Path] = (),
+    reference: Sequence[Path] = (),
     settings: int | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -50,17 +51,20 @@ def run_bench(
     UserError
         Where there is no such bench, an input cannot be read, or an option is not one of this bench.
     """
-    files = [*inputs, *against]
+    files = [*inputs, *against, *reference]
     for path in files:
         if not path.exists():
             raise UserError("input does not exist", file=path)
     found = benches()
     module = found[known("bench", name, found)]
-    options: dict[str, Any] = {key: list(paths) for key, paths in (("inputs", inputs), ("against", against)) if paths}
+    read = {"inputs": inputs, "against": against, "reference": reference}
+    options: dict[str, Any] = {key: list(paths) for key, paths in read.items() if paths}
     options |= {"settings": settings} if settings is not None else {}
     refused = options.keys() - inspect.signature(module.run).parameters.keys()
     if "inputs" in refused:
         raise UserError("this bench reads no inputs", got=inputs[0])
+    if "reference" in refused:
+        raise UserError("this bench takes no finished reference", field="--reference", got=name)
     if "settings" in refused:
         raise UserError("this bench draws no settings at random", field="--settings", got=name)
     if refused:

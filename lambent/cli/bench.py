@@ -20,6 +20,10 @@ def command(
     settings: Annotated[
         int | None, typer.Option(help="Random settings of materials in each row (gi-edit), 20 unless --quick.")
     ] = None,
+    reference: Annotated[
+        list[Path] | None,
+        typer.Option(help="Path traced pictures (.exr) of the input's first camera, equal in samples (equal-time)."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Measure, and print the rows with the machine they were measured on.
@@ -31,8 +35,9 @@ def command(
     with progress_bar() as progress:
         effort = "quick" if quick else "full"
         report = run_bench(
-            name, effort, inputs=input_ or (), against=against or (), settings=settings, progress=progress
-        )
+            name, effort, inputs=input_ or (), against=against or (), reference=reference or (), settings=settings,
+            progress=progress,
+        )  # fmt: skip
     names = list(dict.fromkeys(key for row in report["rows"] for key in row))
     rows = [names, *([words(row.get(key, "")) for key in names] for row in report["rows"])]
     summary = [(key, words(value)) for key, value in {**report["machine"], **report["summary"]}.items()]

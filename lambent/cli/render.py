@@ -96,6 +96,7 @@ def command(
     field: Annotated[
         float | None, typer.Option(help="Degrees across a fisheye or a cylinder. [default: 180, 360]")
     ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="For path: another seed has independent noise.")] = 0,
     scene: Annotated[str | None, typer.Option(help="For path: the scene, where the store's is not found.")] = None,
     edit: Annotated[
         Path | None, typer.Option(help="Session of edits: draws its view as edited, from the store's transport.")
@@ -131,7 +132,7 @@ def command(
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
-        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb,
+        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
     )  # fmt: skip
     settings.check()
     if edit is not None:

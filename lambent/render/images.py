@@ -62,6 +62,8 @@ class Settings:
         Memory on the GPU for the maps of light fields; by default all of them.
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
+    seed : int
+        Of the path tracer, 0 or more: other seeds have independent noise.
     """
 
     width: int = 1280
@@ -78,6 +80,7 @@ class Settings:
     projection: Projection = Projection.perspective
     field_deg: float | None = None
     light_field_mb: float | None = None
+    seed: int = 0
 
     @property
     def is_false_coloured(self) -> bool:

@@ -38,4 +38,5 @@ class PathTraced(Images):
 
         settings = self.settings
         spp = settings.samples or SPP
-        return render_reference(self._scene, camera, settings.width, settings.height, spp, progress=progress)[0]
+        size = settings.width, settings.height
+        return render_reference(self._scene, camera, *size, spp, settings.seed, progress)[0]

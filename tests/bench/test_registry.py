@@ -44,7 +44,7 @@ def test_every_bench_has_the_agreed_face():
         assert type(module.FULL) is type(module.QUICK) and module.FULL != module.QUICK, name
         parameters = list(inspect.signature(module.run).parameters)
         assert parameters[0] == "effort" and parameters[-1] == "progress", name
-        assert set(parameters[1:-1]) <= {"inputs", "against", "settings"}, name
+        assert set(parameters[1:-1]) <= {"inputs", "against", "reference", "settings"}, name
 
 
 def test_report(ruler, tmp_path):
