@@ -38,7 +38,7 @@ _CHOICES: dict[str, type[StrEnum]] = {
 
 
 def chosen(before: Mapping[str, str], **wanted: str | None) -> dict[str, str]:
-    """The methods for `light_map`, `probes` and `light_groups`: those wanted, else those of `before`, else the defaults.
+    """The method for each of `_CHOICES`: the one wanted, else that of `before`, else the default.
 
     Raises
     ------

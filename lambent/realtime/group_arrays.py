@@ -14,6 +14,10 @@ from lambent.store import contract
 from lambent.store.contract import SIDES, LightGroupRecord, group_name, light_groups
 from lambent.store.store import Store
 
+NO_GROUPS = "the store holds no light by group"
+BAKE_GROUPS = "`lambent bake` of the same scene with --light-groups scene adds it"
+FIELDS_STAY = "light fields do not follow the mix: what they show stays as baked"
+
 
 @dataclass(frozen=True, eq=False)
 class GroupArrays:

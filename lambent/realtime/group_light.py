@@ -80,4 +80,3 @@ def mixed(by_group: Floats, factors: Floats) -> Floats:
         if factor.any():
             total += light * factor
     return np.asarray(total)
-

@@ -152,7 +152,7 @@ class ComputedEnvironment:
 
 @dataclass(frozen=True)
 class PointLight:
-    """Radiant intensity W/sr; `direction` and cone half-angles make it a spot. `name` may be empty, as of all lights."""
+    """Radiant intensity W/sr; `direction` and cone half-angles make it a spot. Its `name` may be empty."""
 
     position: Triple
     intensity: Triple

@@ -11,7 +11,7 @@
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before denoising; may be absent
     light_map/groups, groups_back          (n, H, W, 3) float16, irradiance by light group, in order of meta["groups"],
-                                           LightGroupRecords; irradiance and irradiance_back are their sums. May be absent
+                                           LightGroupRecords; irradiance and irradiance_back are the sums. May be absent
     light_map/direct, direct_back          (n, H, W, 3) float16, the part of it that comes straight from the group's
                                            emitters, through clear glass that the sun passes too; nowhere more than all
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
@@ -385,7 +385,9 @@ def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
         raise invalid(error, store.folder / MANIFEST) from error
     count = store.artefact(name).shape[0]
     if len(found) != count or len({group.name for group in found}) != count:
-        raise UserError("broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again")
+        raise UserError(
+            "broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again"
+        )
     return found
 
 

@@ -64,7 +64,7 @@ class BothWriters:
 
 @dataclass(frozen=True, eq=False)
 class GroupMaps:
-    """A side of the light map: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3), all float16; its notes."""
+    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3); its notes."""
 
     whole: NDArray[np.float16]
     light: NDArray[np.float16]

@@ -99,7 +99,10 @@ def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -
 def _sums(
     scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Sums over `samples` paths through each of the texels: (k, 3 + 3 n) of radiance, whole and by group, (k, 3) of squares."""
+    """Sums over `samples` paths through each of the texels, of radiance and of its squares (k, 3).
+
+    Radiance is (k, 3 + 3 n), the whole and each of n groups.
+    """
     groups = 0 if scene.tally is None else scene.tally.count
     total, squares = np.zeros((len(texels), 3 + 3 * groups)), np.zeros((len(texels), 3))
     at_once = max(1, PATHS_AT_ONCE // samples)

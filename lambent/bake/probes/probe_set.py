@@ -55,7 +55,7 @@ class ProbeSet:
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
 
     def sort_light(self, groups: Floats | None, groups_back: Floats | None) -> None:
-        """Keep probes by light group too, from the light maps (n, H, W, 3) of groups where whole paths are not traced."""
+        """Keep probes by light group too: from its light maps (n, H, W, 3), where whole paths are not traced."""
         whole_paths = self._cache is None
         cache = None if groups is None else self._traced.grouped_cache(groups, groups_back)
         self._sorting = self._traced.tally(diffuse=whole_paths, direct=False), cache

@@ -22,6 +22,7 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
+from lambent.scenes.light_groups import SKY, SUN, names_of_lights
 from lambent.scenes.loaders.contents import DAYLIGHT, Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -34,7 +35,6 @@ from lambent.scenes.loaders.scene_toml.schema import (
     SceneDocument,
     known_keys,
 )
-from lambent.scenes.light_groups import SKY, SUN, names_of_lights
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,

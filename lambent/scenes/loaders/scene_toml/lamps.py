@@ -141,9 +141,7 @@ class IesSection(_Coloured):
         scale = photometry.tilted(tilt_deg)
         if self.lumens is not None:
             scale = self.lumens / max(photometry.lumens, 1e-9)
-        return IesLight(
-            self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg, name=self.name
-        )
+        return IesLight(self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg, name=self.name)
 
 
 LightSection = PointSection | SpotSection | DirectionalSection | IesSection
