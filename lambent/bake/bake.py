@@ -22,7 +22,7 @@ from lambent.bake.context import Artefact, BakeContext
 from lambent.bake.cuts import cut_for_viewers
 from lambent.bake.light_fields import request
 from lambent.bake.memory import check_memory
-from lambent.bake.methods import METHODS, chosen
+from lambent.bake.methods import METHODS, check_groups, chosen
 from lambent.bake.probes.division import divided
 from lambent.bake.quality import Quality, quality_named
 from lambent.bake.timing import Stopwatch
@@ -51,6 +51,7 @@ def bake(
     seed: int = 0,
     light_map: str | None = None,
     probes: str | None = None,
+    light_groups: str | None = None,
     light_fields: str | None = None,
     light_field_mb: float | None = None,
     views: Sequence[View] = (),
@@ -75,6 +76,9 @@ def bake(
         The light map's integrator: path tracing and final gathering, or photons. By default as in the store.
     probes : {'cached', 'traced'}, optional
         Whether surfaces seen by probes show the light map, or all paths are traced. By default as in the store.
+    light_groups : {'none', 'scene'}, optional
+        Whether light map and probes are also kept by group of emitters (`scenes.light_groups`), so that a renderer can
+        dim and colour each. Path traced light maps alone have groups. By default as in the store.
     light_fields : str, optional
         Objects that get a light field: "scene", those that the scene names; "none"; "auto", also those that the bake
         chooses, within `light_field_mb` of memory; or names and patterns, with commas. By default as in the store.
@@ -118,7 +122,8 @@ def bake(
     if changes:
         log.warning("changed since the last bake: %s; what depends on it is baked again", ", ".join(changes))
     before = existing.documents.get(METHODS, {}) if existing else {}
-    methods = chosen(before, light_map=light_map, probes=probes)
+    methods = chosen(before, light_map=light_map, probes=probes, light_groups=light_groups)
+    check_groups(methods)
     methods |= request.noted(before, light_fields, light_field_mb)
     scene = request.as_asked(scene, methods[request.FIELDS])
     with Store.create(store_path, inputs_of(scene)) as store:

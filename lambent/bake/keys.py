@@ -15,6 +15,7 @@ from lambent.core.environment_layouts import layout_of
 from lambent.core.images import read_image
 from lambent.core.inputs import sha256_of
 from lambent.scenes.computed import lat_long_image
+from lambent.scenes.light_groups import names_of_lights
 from lambent.scenes.scene import ComputedEnvironment, Environment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.textures import digest, parts
 
@@ -75,9 +76,17 @@ def texture_inputs(scene: Scene, *channels: str) -> object:
 
 
 def light_inputs(scene: Scene) -> object:
-    """Everything that emits."""
+    """Everything that emits; names of lights only sort it."""
     emissions = [(o.name, o.emission) for o in scene.objects]
-    return [emissions, [(type(x).__name__, asdict(x)) for x in scene.lights], environment_inputs(scene.environment)]
+    lights = [(type(x).__name__, {k: v for k, v in asdict(x).items() if k != "name"}) for x in scene.lights]
+    return [emissions, lights, environment_inputs(scene.environment)]
+
+
+def group_inputs(scene: Scene) -> object:
+    """How emitters are sorted into light groups."""
+    named = [(group.name, group.members) for group in scene.light_groups]
+    shining = [scene.parts.get(o.name, o.name) for o in scene.objects if any(o.emission)]
+    return [named, names_of_lights(scene.lights), shining]
 
 
 @lru_cache(maxsize=16)

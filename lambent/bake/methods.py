@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 from lambent.core.discovery import known
+from lambent.core.errors import UserError
 
 METHODS = "ways"  # document: the methods that a store was baked with
 
@@ -24,8 +25,20 @@ class ProbeMethod(StrEnum):
     traced = "traced"
 
 
+class LightGroupMethod(StrEnum):
+    """Whether light is sorted by the group of its emitter (`scenes.light_groups`), or baked as one."""
+
+    none = "none"
+    scene = "scene"
+
+
+_CHOICES: dict[str, type[StrEnum]] = {
+    "light_map": LightMapMethod, "probes": ProbeMethod, "light_groups": LightGroupMethod,
+}  # fmt: skip
+
+
 def chosen(before: Mapping[str, str], **wanted: str | None) -> dict[str, str]:
-    """The methods for `light_map` and `probes`: those wanted, else those of `before`, else the defaults.
+    """The method for each of `_CHOICES`: the one wanted, else that of `before`, else the default.
 
     Raises
     ------
@@ -33,7 +46,19 @@ def chosen(before: Mapping[str, str], **wanted: str | None) -> dict[str, str]:
         Where there is no such method.
     """
     found = {}
-    for name, methods in {"light_map": LightMapMethod, "probes": ProbeMethod}.items():
-        method = wanted[name] or before.get(name) or next(iter(methods))
+    for name, methods in _CHOICES.items():
+        method = wanted.get(name) or before.get(name) or next(iter(methods))
         found[name] = methods(known(f"method to bake {name}", method, list(methods))).value
     return found
+
+
+def check_groups(methods: Mapping[str, str]) -> None:
+    """`UserError` where light is to be sorted by a method that cannot."""
+    if sorts_light(methods) and methods["light_map"] == LightMapMethod.photons:
+        hint = "bake with --light-map paths, or with --light-groups none"
+        raise UserError("photons are not sorted by group", field="--light-groups", got="scene", hint=hint)
+
+
+def sorts_light(methods: Mapping[str, str]) -> bool:
+    """Whether these methods keep light by group."""
+    return methods.get("light_groups") == LightGroupMethod.scene

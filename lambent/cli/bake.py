@@ -12,7 +12,7 @@ import typer
 
 from lambent.bake import artefacts
 from lambent.bake.bounces import Bounces
-from lambent.bake.methods import LightMapMethod, ProbeMethod
+from lambent.bake.methods import LightGroupMethod, LightMapMethod, ProbeMethod
 from lambent.bake.quality import QualityName
 from lambent.cli.console import CreaseAngle, Json, progress_bar, say, show, table
 from lambent.core.discovery import known, modules_in, names_in
@@ -48,6 +48,10 @@ def command(
     probes: Annotated[
         ProbeMethod | None,
         typer.Option(help="Probes from the light map, or path traced. [default: as in the store, else cached]"),
+    ] = None,
+    light_groups: Annotated[
+        LightGroupMethod | None,
+        typer.Option(help="Keep light by group of lamps, to be dimmed later. [default: as in the store, else none]"),
     ] = None,
     light_fields: Annotated[
         str | None,
@@ -147,7 +151,8 @@ def command(
         store = bake(
             what, output, quality=quality, only=only, resume=resume, seed=seed,
             progress=watch.progress if watch is not None else progress,
-            light_map=light_map, probes=probes, light_fields=light_fields, light_field_mb=light_field_mb,
+            light_map=light_map, probes=probes, light_groups=light_groups,
+            light_fields=light_fields, light_field_mb=light_field_mb,
             bounces=bounces, workers=shared, **edited,
         )  # fmt: skip
         if watch is not None:

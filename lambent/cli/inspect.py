@@ -119,6 +119,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
     """A scene: its contents, and the repairs of its loader."""
     from lambent.scenes import load_scene
     from lambent.scenes.clear_sky import daylight_in_words
+    from lambent.scenes.light_groups import groups_as_told
     from lambent.scenes.scene import SunSky
 
     scene = load_scene(file, crease_deg)
@@ -132,6 +133,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
         "environment": type(scene.environment).__name__ if scene.environment else "none",
         **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),
         "lights": len(scene.lights) + sum(any(o.emission) for o in scene.objects),
+        "light_groups": {group.name: ", ".join(group.members) for group in groups_as_told(scene)},
         "cameras": [camera.name for camera in scene.cameras],
         "paths": [path.name for path in scene.paths],
         "size_m": (high - low).round(3),
@@ -141,6 +143,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 
 def inspect_store(file: str) -> Facts:
     """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
+    from lambent.store.contract import light_groups
     from lambent.store.store import Store
 
     store = Store.open(Path(file))
@@ -148,6 +151,7 @@ def inspect_store(file: str) -> Facts:
         "is": "store",
         "arrays": {a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()},
         "documents": sorted(store.documents),
+        "light_groups": {g.name: f"{g.share:.1%} of the light: {', '.join(g.members)}" for g in light_groups(store)},
         "reflectors": _reflectors(store),
         "inputs": store.inputs,
     }

@@ -89,6 +89,13 @@ def command(
     light_field_mb: Annotated[
         float | None, typer.Option(min=0, help="GPU memory for the maps of light fields. [default: all of them]")
     ] = None,
+    light: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME=VALUE of a light group: an intensity, off, 2700K, #rrggbb, or several with commas; in a film "
+            "with @SECONDS. Repeatable. [default: as saved with the view, else as baked]"
+        ),
+    ] = None,
     projection: Annotated[
         Literal["perspective", "fisheye", "hemispherical", "cylinder"],
         typer.Option(help="How directions lie in the picture; fisheyes are square."),
@@ -115,11 +122,14 @@ def command(
 
     Example: lambent render room.store --camera entrance -o entrance.png
 
+    Example: lambent render room.store --light sun=off --light lamp=0.5,2700K -o evening.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
     from lambent.core.film import FILM, SEQUENCES, check_pictures
     from lambent.core.images import WRITABLE
+    from lambent.core.light_mix import parse_light
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
 
@@ -133,6 +143,7 @@ def command(
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
+        light=parse_light(light) if light else None,
     )  # fmt: skip
     settings.check()
     if edit is not None:

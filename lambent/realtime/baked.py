@@ -13,6 +13,7 @@ from lambent.core.arrays import Floats
 from lambent.core.light_field import LightField
 from lambent.core.plain import triple
 from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import GroupArrays, groups_in
 from lambent.scenes.scene import MaterialTextures
 from lambent.store import contract
 from lambent.store.consistency import numbers_of, read_geometry
@@ -75,6 +76,7 @@ class BakedScene:
     unit: float = 1.0
     light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
     sun: SunRecord | None = None  # whose direct light the light maps leave out
+    groups: GroupArrays | None = None  # the light by group; None where it was baked as one
 
     def probe_of(self, obj: ObjectRecord) -> Probe | None:
         """The object's own probe or the one it shares, else the nearest one, else the environment, else None.
@@ -169,6 +171,7 @@ def read_baked(store: Store, light_field_mb: float | None = None) -> BakedScene:
         unit=unit,
         light_field_mb=light_field_mb,
         sun=_in_units(contract.sun_beside(store), unit),
+        groups=groups_in(store, unit),
     )
 
 

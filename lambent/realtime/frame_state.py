@@ -12,6 +12,7 @@ from lambent.core.camera import Camera, clip_from_world, image_plane
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.false_colour import Range
+from lambent.core.light_mix import Factors
 from lambent.core.photometry import ILLUMINANCE, LUMINANCE, NOISE, Quantity
 from lambent.core.sequences import radical_inverse
 from lambent.materials.document import Material
@@ -58,6 +59,10 @@ class FrameState:
         Materials that stand in for the store's, by name.
     maps : int
         `Streaming.version` of light fields that have a budget: with more maps a picture is another one.
+    light : mapping
+        Factors of light groups, by name and channel; a group that is left out is as baked.
+    mixed : int
+        `LightMixer.version`: with more of a mix ready a picture is another one.
     lookup : str
         How a direction finds its light in a probe: auto, or a look-up of `realtime.incident`.
     lookups : mapping
@@ -94,6 +99,8 @@ class FrameState:
     near_m: float | None = None
     materials: Mapping[str, Material] = field(default_factory=dict)
     maps: int = 0
+    light: Factors = field(default_factory=dict)
+    mixed: int = 0
     lookup: str = "auto"
     lookups: Mapping[str, str] = field(default_factory=dict)
     planar: str = AUTO

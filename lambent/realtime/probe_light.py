@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
@@ -18,7 +20,7 @@ from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.prefilter import prefiltered_cube
 from lambent.realtime.resident_maps import ResidentMaps
-from lambent.realtime.uploads import cube_texture
+from lambent.realtime.uploads import upload, with_alpha
 
 
 def kind_of(cube: Cube) -> str:
@@ -48,6 +50,8 @@ class ProbeLight:
     def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
         self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
         self._texture = cache(self._new_texture)
+        self._levels: dict[Cube, list[NDArray[np.float16]]] = {}  # of cube maps that were made ready beforehand
+        self._used: set[Cube] = set()
         self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
         self.streams: list[ResidentMaps] = []  # of the light field, where not all of its maps are on the GPU
         self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
@@ -68,12 +72,32 @@ class ProbeLight:
         return float(np.log2(self.probe.radiance.shape[1] / 2) - blur)
 
     def _new_texture(self, cube: Cube) -> Any:
+        self._used.add(cube)
         if cube == "prefiltered":
             return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
+        return upload(self._layouts.device, self._levels.pop(cube, None) or self._chain(cube), "rgba16float")
+
+    def _chain(self, cube: Cube) -> list[NDArray[np.float16]]:
+        """Levels of a cube map as its texture has them."""
         if cube == "cleaned":
-            return cube_texture(self._layouts.device, self.lamps.chain())
+            return [with_alpha(level) for level in self.lamps.chain()]
         chain = smooth_chain if cube == "smooth" else mip_chain
-        return cube_texture(self._layouts.device, chain(finite(self.probe.radiance)[0]))
+        return [with_alpha(level) for level in chain(finite(self.probe.radiance)[0])]
+
+    def relit(self, radiance: Floats, irradiance: tuple[float, ...]) -> ProbeLight:
+        """The same probe with other light, its cube maps and lamps made ready as far as this one's were used.
+
+        Touches no GPU, so that another thread may call it.
+        """
+        probe = replace(self.probe, radiance=radiance, irradiance=irradiance)
+        other = ProbeLight(self._layouts, probe, self._sampler, self._look_ups)
+        other._resources, other.streams = self._resources, self.streams  # which hold no light of the cube
+        for cube in sorted(self._used | set(self._levels)):
+            if cube != "prefiltered":
+                other._levels[cube] = other._chain(cube)
+        if "lamps" in self.__dict__:
+            _ = other.lamps
+        return other
 
     @cached_property
     def aims(self) -> AimTable:

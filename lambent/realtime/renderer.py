@@ -30,6 +30,7 @@ from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
+from lambent.realtime.light_mixer import LightMixer
 from lambent.realtime.outline import Outline
 from lambent.realtime.passes.accumulate import AccumulatePass
 from lambent.realtime.passes.base import BasePass
@@ -58,8 +59,9 @@ class Renderer:
     ----------
     scene : BakedScene
     waits : bool
-        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out. Else the
-        nearest ones stand in, and `streaming.version` grows when more are ready.
+        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out, and for its
+        mix of light groups. Else the nearest maps stand in, the mix comes part by part, and `streaming.version` and
+        `mixer.version` grow when more is ready.
     missing : tuple of str
         What the store lacks, in plain words.
     """
@@ -76,6 +78,7 @@ class Renderer:
             beside._clusters if beside else Clusters(scene.positions, scene.faces, scene.record.objects)
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
+        self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)
         self.waits = True
         depth, base = DepthPass(layouts), BasePass(layouts)
         planar = PlanarPass(layouts, depth)
@@ -243,6 +246,7 @@ class Renderer:
         for factor in (data["exposure"], data["scale"][3:]):  # light is in the scene's units
             factor *= self._unit(state)
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        self.mixer.follow(state.light, waits=self.waits)
         views = self._planar_views(state, data)
         draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})
         self.streaming.follow(draws, data, self._clusters, waits=self.waits)

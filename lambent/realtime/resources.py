@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple
 from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.clusters import Ranges, merged
 from lambent.realtime.cube_mips import finite
@@ -43,14 +46,21 @@ class ObjectResources:
 
     def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges) -> None:
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
+        self.emission = record.emission
         self.group = cache(self._new_group)
+
+    def relight(self, light: ProbeLight, emission: Triple) -> None:
+        """Show the light of another probe, and emit so many W/(sr m^2)."""
+        if light is not self.light or emission != self.emission:
+            self.light, self.emission = light, emission
+            self.group.cache_clear()
 
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
         """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
-        data["emission"][0, :3] = np.array(self.record.emission) / self._unit
+        data["emission"][0, :3] = np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
@@ -72,11 +82,13 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        self._light_texture = upload(device, [layers], "rgba16float")
+        self.light_view = self._light_texture.create_view(dimension="2d-array")
         sky = scene.far_light or DARK
-        self.sky_group = self._sky_group(sky)
+        self.sky_group = self.sky_group_of(sky.radiance)
         cleaned = without_sun(sky, scene.sun)
-        self.mirrored_sky_group = self.sky_group if cleaned is sky else self._sky_group(cleaned)
+        self.mirrored_sky_group = self.sky_group if cleaned is sky else self.sky_group_of(cleaned.radiance)
         lights: dict[Probe | None, ProbeLight] = {}
         beyond = neighbouring_faces(scene)
         self.objects, known = [], look_ups()
@@ -101,8 +113,19 @@ class SceneResources:
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
 
-    def _sky_group(self, sky: Probe) -> Any:
-        cube = cube_texture(self._layouts.device, [finite(sky.radiance)[0]])
+    def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
+        """Show other light maps (H, W, 4) on the front and the back; None of a side that stays."""
+        for layer, texels in enumerate(sides):
+            if texels is not None:
+                height, width = texels.shape[:2]
+                self._layouts.device.queue.write_texture(
+                    {"texture": self._light_texture, "origin": (0, 0, layer)}, np.ascontiguousarray(texels),
+                    {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
+                )  # fmt: skip
+
+    def sky_group_of(self, radiance: Floats) -> Any:
+        """Bind group of an environment (6, N, N, 3)."""
+        cube = cube_texture(self._layouts.device, [finite(radiance)[0]])
         return self._layouts.group(self._layouts.cube, cube.create_view(dimension="cube"))
 
     @cached_property
@@ -111,12 +134,12 @@ class SceneResources:
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
         dark = SunLight(self._layouts)
-        view = light_layers(self._layouts.device, *grey)
+        view = upload(self._layouts.device, [light_layers(*grey)], "rgba16float").create_view(dimension="2d-array")
         return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
-def light_layers(device: Any, front: Floats | None, back: Floats | None, direction: Floats | None = None) -> Any:
-    """View of a texture array of maps (H, W, 3): light on the front, on the back, dominant direction.
+def light_layers(front: Floats | None, back: Floats | None, direction: Floats | None = None) -> NDArray[np.float16]:
+    """Layers (k, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction.
 
     Layers end with the last map there is, missing ones before it are black, and the shader reads all others as black.
     """
@@ -128,4 +151,4 @@ def light_layers(device: Any, front: Floats | None, back: Floats | None, directi
     for layer, values in zip(layers, maps, strict=False):
         if values is not None:
             layer[...] = with_alpha(values)
-    return upload(device, [layers], "rgba16float").create_view(dimension="2d-array")
+    return layers

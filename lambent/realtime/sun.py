@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
 from lambent.realtime.clusters import merged
 from lambent.realtime.integrators import INTEGRATORS
@@ -45,7 +46,9 @@ class SunLight:
         self.exists = squares is not None
         panes = panes or no_panes(layouts.device)
         self.pane_layers = panes.count
-        self.uniform = layouts.buffer("UNIFORM", sun_data(sun, squares))
+        self._data, self._queue = sun_data(sun, squares), layouts.device.queue
+        self.uniform = layouts.uniform(SUN_DTYPE.itemsize)
+        self.shine(sun.irradiance if sun is not None else (0.0, 0.0, 0.0))
         self.nowhere = upload(layouts.device, [np.zeros((1, 1, 1, 1), np.float16)], "r16float").create_view()
         if squares is not None:
             read = [_read(layouts.device, depths, layer) for layer in range(len(squares.squares))]
@@ -53,6 +56,12 @@ class SunLight:
             textures = (depths, blocks, panes.depths, panes.colours)
             views = (texture.create_view(dimension="2d-array") for texture in textures)
             self.group = layouts.group(layouts.of(*SHADOW_MAP), self.uniform, *views)
+
+    def shine(self, irradiance: Triple) -> None:
+        """Bring so many W/m^2 from now on, where there is a sun."""
+        if self.exists:
+            self._data["irradiance"][0, :3] = irradiance
+        self._queue.write_buffer(self.uniform, 0, self._data.tobytes())
 
 
 def sun_data(sun: SunRecord | None, squares: SunSquares | None) -> Record:

@@ -16,6 +16,7 @@ from lambent.core.errors import UserError
 from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
+from lambent.core.light_mix import MixTrack
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
@@ -60,6 +61,9 @@ class Settings:
         Perspective, or what is drawn from the faces of a cube around the eye.
     light_field_mb : float, optional
         Memory on the GPU for the maps of light fields; by default all of them.
+    light : MixTrack, optional
+        Mix of the store's light groups, over the time of a film; by default that of a saved view or walk, else as
+        baked.
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     seed : int
@@ -81,6 +85,7 @@ class Settings:
     field_deg: float | None = None
     light_field_mb: float | None = None
     seed: int = 0
+    light: MixTrack | None = None
 
     @property
     def is_false_coloured(self) -> bool:
@@ -109,6 +114,7 @@ class Images(ABC):
     """Images of a store; `quantity` is measured by their false colours."""
 
     quantity: Quantity = LUMINANCE
+    time_s: float = 0.0  # of the film whose image is drawn next
 
     def __init__(self, settings: Settings) -> None:
         self.settings, self.scale = settings, settings.scale  # None until an image in false colours was displayed

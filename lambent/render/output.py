@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,12 +17,13 @@ from lambent.core.errors import UserError, did_you_mean
 from lambent.core.exposure import ev100_of
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
+from lambent.core.light_mix import MixTrack
 from lambent.core.progress import Progress, silent, tracked
 from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
-from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.contract import SceneRecord, light_groups, scene_record
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
 
@@ -90,6 +92,8 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = _opened(store)
     view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
+    if camera is not None and settings.light is None and (mix := read_views(opened.folder).lights.get(view.name)):
+        settings = _lit(settings, opened, MixTrack.of(mix), note)
     drawn = images(opened, settings, scene=scene, note=note)
     write_still(drawn, file, view, progress)
     seconds = time.perf_counter() - began
@@ -159,13 +163,21 @@ def film(
     check_writable(file, (FILM, *SEQUENCES))
     opened, record = _opened(store)
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
+    if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
+        settings = _lit(settings, opened, track, note)
     if file.suffix.lower() == FILM:
         width, height = even_size(settings.width, settings.height)
         settings = replace(settings, width=width, height=height)
     drawn = images(opened, settings, moving=True, scene=scene, note=note)
     draw = drawn.radiance if radiance_wanted(file) else drawn.displayed
     cameras = [camera_at(chosen, index / fps) for index in range(chosen.frames(fps))]
-    write_frames(file, cameras, draw, (settings.width, settings.height), fps, progress)
+    index = count()
+
+    def draw_next(camera: Camera) -> NDArray[Any]:
+        drawn.time_s = next(index) / fps
+        return draw(camera)
+
+    write_frames(file, cameras, draw_next, (settings.width, settings.height), fps, progress)
     seconds = time.perf_counter() - began
     width, height, said = settings.width, settings.height, displayed_as(file, drawn)
     return Rendered(file, width, height, settings.integrator, len(cameras), seconds, **said)
@@ -199,6 +211,18 @@ def images(
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)
+
+
+def _lit(settings: Settings, store: Store, light: MixTrack, note: Note) -> Settings:
+    """Settings with the light of a saved view or walk, where the store can show it and the integrator does."""
+    if settings.integrator == PATH_TRACER:
+        note("the path tracer traces the light of the scene, not the mix that was saved with the view")
+        return settings
+    missing = sorted(set(light.groups) - {group.name for group in light_groups(store)})
+    if missing:
+        note(f"the mix saved with the view is left out: the store has no light group {', '.join(missing)}")
+        return settings
+    return replace(settings, light=light)
 
 
 def exposed(settings: Settings, store: Store) -> Settings:

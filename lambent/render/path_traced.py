@@ -23,6 +23,9 @@ class PathTraced(Images):
         super().__init__(settings)
         if settings.show != "full":
             raise UserError("the path tracer shows all light", field="--show", got=settings.show, expected="full")
+        if settings.light is not None:
+            hint = "leave it out, or choose another integrator"
+            raise UserError("the path tracer traces the light of the scene", field="--light", hint=hint)
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")

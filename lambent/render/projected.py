@@ -29,7 +29,7 @@ class Projected(Images):
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         around = Around(self.settings.view_of(camera), self.settings.width, self.settings.height)
-        count = len(around.cameras)
+        count, self._faces.time_s = len(around.cameras), self.time_s
         for index, face in enumerate(around.cameras):
             part = part_of(progress, index / count, (index + 1) / count, "faces around the eye")
             around.fill(index, self._faces.radiance(face, part))

@@ -13,10 +13,12 @@ from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
+from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
 from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
@@ -54,6 +56,22 @@ class RealTime(Images):
         self._renderer = Renderer(open_device(), read_baked(store, settings.light_field_mb))
         for text in self._renderer.missing:
             note(text)
+        self._check_light(settings.light, note)
+
+    def _check_light(self, light: MixTrack | None, note: Callable[[str], None]) -> None:
+        """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
+        scene = self._renderer.scene
+        if light is None or not light.groups:
+            return
+        if scene.groups is None:
+            raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
+        scene.groups.factors(dict.fromkeys(light.groups, WHITE))
+        if scene.light_fields:
+            note(FIELDS_STAY)
+
+    def _state(self, camera: Camera) -> FrameState:
+        light = self.settings.light
+        return self._frame(camera, light={} if light is None else light.factors_at(self.time_s))
 
     @property
     def light_fields(self) -> dict[str, float]:
@@ -62,15 +80,15 @@ class RealTime(Images):
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         if self._progressive:
             return self._renderer.converged(
-                self._frame(camera), self.settings.samples or integrator(self.settings.integrator).spp, progress
+                self._state(camera), self.settings.samples or integrator(self.settings.integrator).spp, progress
             )
-        return self._renderer.still_radiance(self._frame(camera), FILM_SUPERSAMPLES if self._moving else SUPERSAMPLES)
+        return self._renderer.still_radiance(self._state(camera), FILM_SUPERSAMPLES if self._moving else SUPERSAMPLES)
 
     def displayed(self, camera: Camera, progress: Progress = silent) -> NDArray[np.uint8]:
         if self._progressive or self.settings.is_false_coloured:
             return super().displayed(camera, progress)
         draw = self._renderer.display_image if self._moving else self._renderer.still
-        frame = self._frame(camera)
+        frame = self._state(camera)
         exposure_ev = self.exposure_ev
         if exposure_ev is None:
             share = min(1.0, METERED_PX / max(frame.size))

@@ -152,13 +152,14 @@ class ComputedEnvironment:
 
 @dataclass(frozen=True)
 class PointLight:
-    """Radiant intensity W/sr; `direction` and cone half-angles make it a spot."""
+    """Radiant intensity W/sr; `direction` and cone half-angles make it a spot. Its `name` may be empty."""
 
     position: Triple
     intensity: Triple
     direction: Triple | None = None
     inner_deg: float = 0.0
     outer_deg: float = 180.0
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,6 +168,7 @@ class DirectionalLight:
 
     direction: Triple
     irradiance: Triple
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,7 @@ class IesLight:
     scale: Triple
     aim: Triple = (0.0, -1.0, 0.0)
     rotation_deg: float = 0.0
+    name: str = ""
 
     @property
     def axes(self) -> Array:
@@ -217,6 +220,17 @@ class ReflectorRule:
 
 
 @dataclass(frozen=True)
+class LightGroup:
+    """Emitters that are dimmed and coloured together: see `scenes.light_groups`.
+
+    `members` are "sun", "sky", and names of lights and of objects that emit, or patterns with * and ?.
+    """
+
+    name: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class LightFieldWish:
     """What is asked of an object's offset surface light field (`core.light_field`); None leaves it to the bake.
 
@@ -249,6 +263,7 @@ class Scene:
     probe_centres: Mapping[str, Triple] = field(default_factory=dict)  # object -> centre of its probe, set by the user
     light_fields: Mapping[str, LightFieldWish] = field(default_factory=dict)  # by the object that is to have one
     reflector_rules: tuple[ReflectorRule, ...] = ()  # the last that fits an object counts
+    light_groups: tuple[LightGroup, ...] = ()  # that the user has named; other emitters are in groups by default
     parts: Mapping[str, str] = field(default_factory=dict)  # object that is a part -> name of the whole
     borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as store.contract has them
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table it scatters by in bakes

@@ -10,6 +10,10 @@
     light_map/irradiance_back              same, on the other side; zero but for two-sided objects; may be absent
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before denoising; may be absent
+    light_map/groups, groups_back          (n, H, W, 3) float16, irradiance by light group, in order of meta["groups"],
+                                           LightGroupRecords; irradiance and irradiance_back are the sums. May be absent
+    light_map/direct, direct_back          (n, H, W, 3) float16, the part of it that comes straight from the group's
+                                           emitters, through clear glass that the sun passes too; nowhere more than all
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
                                            the incident light, weighted by its irradiance; 0 without a normal map
     environment/radiance                   (6, N, N, 3) float16, cube map (core.cubemap) of radiance, sun disc included,
@@ -21,6 +25,8 @@
                                            the light map's share of that, at most 1
                                            An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
+    probe/OBJECT/groups                    (n, 6, N, N, 3) float16, its radiance by light group, units as above; absent
+                                           where light_map/groups is
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
     light_field/OBJECT/points, normals     (P, 3) float32, see core.light_field
     light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
@@ -194,6 +200,17 @@ class SunRecord(_Record):
     panes: tuple[str, ...] = Field(default=(), exclude_if=lambda panes: not panes)
 
 
+class LightGroupRecord(_Record):
+    """Emitters that are dimmed together: see scenes.light_groups.
+
+    `share` is that of their luminous irradiance, the sun's direct light included, on the surfaces of the scene.
+    """
+
+    name: str = Field(min_length=1)
+    members: tuple[str, ...]
+    share: float = Field(ge=0, le=1, allow_inf_nan=False)
+
+
 class TexturesRecord(_Record):
     """See scenes.scene.MaterialTextures: PART -> its uv transform; the texels are arrays."""
 
@@ -302,7 +319,7 @@ def forget_lights(store: Store, camera: Camera, width: int, height: int, lights:
 
 
 def probe_name(object_name: str, part: str) -> str:
-    """Name of a probe's array; `part` is radiance, distance or planes."""
+    """Name of a probe's array; `part` is radiance, groups, distance or planes."""
     return f"probe/{object_name}/{part}"
 
 
@@ -348,6 +365,29 @@ def shared_probes(store: Store) -> dict[str, str]:
     found = said.get("owners", {}) if isinstance(said, dict) else None
     if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):
         raise UserError("broken store", file=store.folder, field=SHARED_PROBES, got=str(said)[:80], hint="bake again")
+    return found
+
+
+def group_name(side: str, *, direct: bool = False) -> str:
+    """Name of the array of a side of the light map by light group, of all light or of what is direct."""
+    return f"light_map/{side.replace('irradiance', 'direct' if direct else 'groups')}"
+
+
+def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
+    """The light groups of a store, in the order of its arrays by group; none where it was baked without."""
+    name = group_name(SIDES[0])
+    if name not in store:
+        return ()
+    said = store.artefact(name).meta.get("groups")
+    try:
+        found = tuple(map(LightGroupRecord.model_validate, said if isinstance(said, list) else ()))
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    count = store.artefact(name).shape[0]
+    if len(found) != count or len({group.name for group in found}) != count:
+        raise UserError(
+            "broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again"
+        )
     return found
 
 

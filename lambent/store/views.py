@@ -15,13 +15,14 @@ from itertools import count, pairwise
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.ceilings import VIEWS_BYTES
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.inputs import parse_json, read_bytes
+from lambent.core.light_mix import LightMix, MixTrack
 from lambent.store.consistency import is_usable
 from lambent.store.contract import SceneRecord
 from lambent.store.lock import lock
@@ -39,6 +40,8 @@ class Views(BaseModel):
     version: Literal[1] = 1
     cameras: tuple[Camera, ...] = ()
     paths: tuple[CameraPath, ...] = ()
+    lights: dict[str, LightMix] = Field(default={}, exclude_if=lambda one: not one)  # mix of light groups, by camera
+    tracks: dict[str, MixTrack] = Field(default={}, exclude_if=lambda one: not one)  # the same over time, by path
 
 
 def read_views(folder: Path) -> Views:
@@ -52,12 +55,15 @@ def read_views(folder: Path) -> Views:
     path = Path(folder) / FILE
     if not path.exists():
         return Views()
+    said = parse_json(read_bytes(path, VIEWS_BYTES), path)
     try:
-        views = Views.model_validate(parse_json(read_bytes(path, VIEWS_BYTES), path))
+        views = Views.model_validate(said)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UserError(f"saved views cannot be used ({first['msg']})", file=path, field=where or None) from error
+    except UserError as error:  # a mix that no light can have
+        raise UserError(f"saved views cannot be used ({error.message})", file=path, field=error.field) from error
     _check(views, path)
     return views
 

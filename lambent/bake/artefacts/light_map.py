@@ -14,22 +14,24 @@ import numpy as np
 
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
-from lambent.bake.keys import key_of, light_inputs, material_inputs
-from lambent.bake.methods import LightMapMethod
+from lambent.bake.keys import group_inputs, key_of, light_inputs, material_inputs
+from lambent.bake.methods import LightMapMethod, sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
-from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, group_name, noise_name
+from lambent.store.store import Writer
 
 if TYPE_CHECKING:
+    from lambent.bake.light.groups import GroupMaps
     from lambent.bake.light.sampling import Sampling
     from lambent.bake.photons.maps import PhotonMap
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES = 4, 2, 3, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 4, 2, 3, 1, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -76,12 +78,18 @@ def keys(context: BakeContext) -> dict[str, str]:
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
             effort.append(["nor the sun through panes", REVISION_OF_PANES])
+    grouped = sorts_light(context.methods)
+    if grouped:
+        effort.append(["by group", REVISION_OF_GROUPS, group_inputs(context.scene)])
     geometry = context.keys("geometry")["geometry/positions"]
     samples = key_of(KIND, REVISION, geometry, material_inputs(context.scene), light_inputs(context.scene), effort)
     filtered = key_of("irradiance", REVISION_OF_IRRADIANCE, samples)
     count = _sides(context)
     names = [*IRRADIANCE[:count], *NOISE[:count]]
     raw = [PHOTONS] if _by_photons(context) else [_of_side(stage, i) for stage in _stages(how) for i in range(count)]
+    if grouped:
+        names += [name for side in SIDES[:count] for name in (group_name(side), group_name(side, direct=True))]
+        raw += [_parts(_of_side(stage, side)) for stage in _stages(how) for side in range(count)]
     if _bumpy_faces(context).any():
         names.append(DOMINANT_DIRECTION)
         raw.append(MOMENTS)
@@ -92,7 +100,10 @@ def bake(context: BakeContext) -> None:
     engine()  # before Mitsuba is imported
     stale = context.stale(KIND)
     if stale - {DOMINANT_DIRECTION, MOMENTS, *NOISE}:
-        maps = _photon_maps(context) if _by_photons(context) else _sampled_maps(context)
+        if sorts_light(context.methods):
+            maps = _sorted_maps(context)
+        else:
+            maps = _photon_maps(context) if _by_photons(context) else _sampled_maps(context)
         sun = context.traced.sun
         left_out = {} if sun is None else {"sun": sun.record.model_dump(mode="json")}
         for name, (irradiance, meta) in zip(IRRADIANCE, maps, strict=False):
@@ -107,6 +118,12 @@ def bake(context: BakeContext) -> None:
 def finished_maps(context: BakeContext) -> tuple[Floats, Floats | None]:
     """The light map (H, W, 3) of both sides in the store; None where no surface is two-sided."""
     front, *back = (context.store.read(name) for name in IRRADIANCE[: _sides(context)])
+    return front, back[0] if back else None
+
+
+def finished_groups(context: BakeContext) -> tuple[Floats, Floats | None]:
+    """The same by light group, (n, H, W, 3)."""
+    front, *back = (context.store.read(group_name(side)) for side in SIDES[: _sides(context)])
     return front, back[0] if back else None
 
 
@@ -131,6 +148,11 @@ def _stages(how: Settings) -> tuple[str, ...]:
 
 def _of_side(stage: str, side: int) -> str:
     return f"{stage}_back" if side else stage
+
+
+def _parts(stage: str) -> str:
+    """Name of the samples of parts that belong to samples."""
+    return f"{stage}_by_group"
 
 
 def _bumpy_faces(context: BakeContext) -> Flags:
@@ -160,14 +182,55 @@ def _sampled_maps(context: BakeContext) -> Maps:
     return maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, cache))
 
 
+def _sorted_maps(context: BakeContext) -> Maps:
+    """The same as sums of the maps of light groups, which are put into the store beside."""
+    from lambent.bake.light.groups import finished_groups, group_notes
+    from lambent.bake.light.sampling import gathered, path_traced
+
+    how: Settings = context.settings(KIND)
+    traced, count = context.traced, len(context.traced.sorted_lights.groups)
+
+    def maps(stage: str, sampling: Sampling, *, diffuse: bool, direct: bool) -> list[GroupMaps]:
+        parts = count * (1 + direct)
+        sampling = replace(sampling, tally=traced.tally(diffuse=diffuse, direct=direct), parts=parts)
+        found = []
+        for side in range(_sides(context)):
+            raw, labels = _samples(context, stage, side, sampling)
+            by_group = context.store.read(_parts(_of_side(stage, side)))[0]
+            found.append(finished_groups(raw, by_group, count, traced.texels, labels, traced.cuts, context.progress))
+        return found
+
+    last = how.gather_samples == 0
+    found = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth), diffuse=True, direct=last)
+    if not last:
+        cache = traced.grouped_cache(found[0].light, found[1].light if len(found) > 1 else None)
+        sampling = gathered(how.gather_samples, how.gather_noise, how.max_depth, cache)
+        found = maps(GATHERED, sampling, diffuse=False, direct=True)
+    notes = context.provenance(groups=group_notes(traced, found[0].light))
+    for side, one in zip(SIDES, found, strict=False):
+        assert one.direct is not None, "the last stage has it"
+        context.put(KIND, group_name(side), one.light, notes)
+        context.put(KIND, group_name(side, direct=True), one.direct, notes)
+    return [(one.whole, one.notes) for one in found]
+
+
 def _samples(
     context: BakeContext, stage: str, side: int, how: Sampling, faces: Flags | None = None
 ) -> tuple[Floats, Indices]:
-    """The samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W)."""
+    """The samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W).
+
+    Samples of parts, (1, H, W, 3 parts), the means of both halves, are in the store beside.
+    """
+    from lambent.bake.light.groups import BothWriters
     from lambent.bake.light.sampling import tile_samples
 
-    tile, texels = context.settings(KIND).tile_texels, context.traced.texels
-    writer = context.samples(KIND, _of_side(stage, side), (2, texels.height, texels.width, 4), (2, tile, tile, 4))
+    tile, texels, name = context.settings(KIND).tile_texels, context.traced.texels, _of_side(stage, side)
+    whole = context.samples(KIND, name, (2, texels.height, texels.width, 4), (2, tile, tile, 4))
+    writer: Writer | BothWriters = whole
+    if how.parts:
+        channels = 3 * how.parts
+        shape, chunk = (1, texels.height, texels.width, channels), (1, tile, tile, channels)
+        writer = BothWriters(whole, context.samples(KIND, _parts(name), shape, chunk))
     diffuse = how.cache is None
     scene = context.traced.whole(diffuse=diffuse)
     sides, labels = context.traced.in_view(SIGNS[side])
@@ -187,7 +250,7 @@ def _samples(
             cost=lambda region: 1 + float(of_map[region[1], region[2]].sum()),
         )
     writer.finish()
-    return context.store.read(writer.artefact.name), labels
+    return context.store.read(name), labels
 
 
 def _photon_maps(context: BakeContext) -> Maps:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lambent.bake.artefacts.light_map import finished_maps
+from lambent.bake.artefacts.light_map import finished_groups, finished_maps
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
-from lambent.bake.methods import ProbeMethod
+from lambent.bake.methods import ProbeMethod, sorts_light
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import seed_of
@@ -23,6 +23,7 @@ NEEDS = ("geometry", "light_map")
 REVISION = 4
 SHARING = "sharing"  # the step that finds whose probe each object shows
 PARTS = ("radiance", "distance", "planes")
+GROUPS = "groups"  # a further part, where light is sorted
 TOO_FEW = "%s: its probe has not seen %.0f %% of what it mirrors; a tenth is looked up %.0f degrees or more off"
 log = logging.getLogger(__name__)
 
@@ -60,29 +61,35 @@ def keys(context: BakeContext) -> dict[str, str]:
         key = key_of(KIND, REVISION, *inputs)
         given = scene.probe_planes.get(name)
         of_planes = key_of(KIND, REVISION, key, None if given is None else np.asarray(given, float))
-        found |= {probe_name(name, part): of_planes if part == "planes" else key for part in PARTS}
+        found |= {probe_name(name, part): of_planes if part == "planes" else key for part in _parts(context)}
     return found
 
 
 def bake(context: BakeContext) -> None:
-    stale, how, owners = context.stale(KIND), context.settings(KIND), _owners(context)
-    missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in PARTS}]
-    context.store.forget(probe_name(name, part) for name in owners for part in PARTS)
+    stale, how, owners, parts = context.stale(KIND), context.settings(KIND), _owners(context), _parts(context)
+    missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in parts}]
+    context.store.forget(probe_name(name, part) for name in owners for part in (*PARTS, GROUPS))
     engine()  # before Mitsuba is imported
     from lambent.bake.probes.probe_set import ProbeSet
 
     front, back = finished_maps(context)
     front_or_none = front if _cached(context) else None
     probes = ProbeSet(context.traced, front_or_none, back, context.settings("light_map").max_depth)
+    if sorts_light(context.methods):
+        probes.sort_light(*(finished_groups(context) if _cached(context) else (None, None)))
     for i, name in enumerate(missing):
         context.progress(i, len(missing), f"probe of {name}")
         seed = seed_of(context.seed, "probe", name)
         result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed, sharing(owners, name))
         if meta["hidden_share"] > HIDDEN:
             log.warning(TOO_FEW, name, 100 * meta["hidden_share"], meta["parallax_deg"])
-        for part in PARTS:
+        for part in parts:
             context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
     context.progress(1, 1, "probes")
+
+
+def _parts(context: BakeContext) -> tuple[str, ...]:
+    return (*PARTS, GROUPS) if sorts_light(context.methods) else PARTS
 
 
 def sharing(owners: Mapping[str, str], name: str) -> tuple[str, ...]:

@@ -39,26 +39,62 @@ class LightMapCache:
         self._back = _texture(irradiance_back) if irradiance_back is not None else None
 
     def __call__(self, si: Any, active: Any) -> Any:
-        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
         uv2 = light_map_uv(si, active)
         front = mi.Color3f(self._front.eval(uv2, active))
         back = mi.Color3f(self._back.eval(uv2, active)) if self._back is not None else mi.Color3f(0.0)
         if self._sun is not None:
             sun = self._sun(si, active)
             front, back = front + dr.maximum(sun, 0), back + dr.maximum(-sun, 0)
+        return self._shown(si, active, [(front, back)])[0]
+
+    def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
+        """Diffuse radiance (mi.Color3f) of surfaces by each irradiance on the normal's side and the other."""
+        number = dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, si.shape), active)
         outside = mi.Frame3f.cos_theta(si.wi) > 0
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
         transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)
         coupled = dr.gather(mi.Bool, self._coupled, number, active)
         reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
-        this_side, other_side = dr.select(outside, front, back), dr.select(outside, back, front)
-        light = reflected * this_side + transmitted * other_side
-        return light * si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active) if self._textured else light
+        if self._textured:
+            texture = si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active)
+            reflected, transmitted = reflected * texture, transmitted * texture
+        by_front, by_back = dr.select(outside, reflected, transmitted), dr.select(outside, transmitted, reflected)
+        return [by_front * front + by_back * back for front, back in irradiance]
 
     def irradiance(self, si: Any, active: Any) -> Any:
         """Irradiance on the normal's side."""
         found = mi.Color3f(self._front.eval(light_map_uv(si, active), active))
         return found if self._sun is None else found + dr.maximum(self._sun(si, active), 0)
+
+
+class GroupedCache(LightMapCache):
+    """The same by group of emitters: light maps (n, H, W, 3) of n groups, the sun's shadow rays in the group `of_sun`.
+
+    `groups` is called as a cache is, and returns a list.
+    """
+
+    def __init__(
+        self, builder: SceneBuilder, irradiance: Floats, irradiance_back: Floats | None, sun: SunRays | None,
+        of_sun: int | None,
+    ) -> None:  # fmt: skip
+        super().__init__(builder, _side_by_side(irradiance), _side_by_side(irradiance_back), sun)
+        self._count, self._of_sun = len(irradiance), of_sun
+
+    def groups(self, si: Any, active: Any) -> list[Any]:
+        """Diffuse radiance (mi.Color3f) by group."""
+        uv2 = light_map_uv(si, active)
+        front = self._front.eval(uv2, active)
+        back = [mi.Float(0.0)] * len(front) if self._back is None else self._back.eval(uv2, active)
+        sides = [tuple(mi.Color3f(*light[3 * g : 3 * g + 3]) for light in (front, back)) for g in range(self._count)]
+        if self._sun is not None and self._of_sun is not None:
+            sun, (one, other) = self._sun(si, active), sides[self._of_sun]
+            sides[self._of_sun] = one + dr.maximum(sun, 0), other + dr.maximum(-sun, 0)
+        return self._shown(si, active, sides)
+
+
+def _side_by_side(maps: Floats | None) -> Any:
+    """(H, W, 3 n) of maps (n, H, W, 3)."""
+    return None if maps is None else np.concatenate(list(maps), axis=-1)
 
 
 def _texture(image: Floats) -> Any:

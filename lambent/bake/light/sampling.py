@@ -38,16 +38,19 @@ class Sampling:
     """How texels are sampled: `samples` (at least, at most) times, until the relative noise is reached.
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must be without diffuse terms.
-    Direct light of the sun `unseen` is left out.
+    Direct light of the sun `unseen` is left out. A `tally` sorts light by group, of which `parts` are kept beside the
+    whole; the cache is then one that it takes.
     """
 
     samples: tuple[int, int]
     noise: float
     max_depth: int
     per_pass: int
-    cache: path_tracer.Cache | None = None
+    cache: Any = None
     estimate: Estimate = path_tracer.irradiance
     unseen: Sun | None = None
+    tally: path_tracer.Tally | None = None
+    parts: int = 0
 
 
 def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
@@ -55,36 +58,40 @@ def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampl
     return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
 
 
-def gathered(samples: int, noise: float, max_depth: int, cache: path_tracer.Cache) -> Sampling:
+def gathered(samples: int, noise: float, max_depth: int, cache: Any) -> Sampling:
     """One diffuse bounce onto cached light, mirrors in between followed (final gathering, Reichert 1992)."""
     per_pass = max(1, min(GATHER_PASS, samples // 2))
     return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
 
 
 def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
-    """Raw content of one tile: (2, h, w, 4) float32, the two halves' sums of irradiance and their sample counts."""
+    """Raw content of one tile: (2, h, w, 4 + 3 parts) float32, the two halves' sums, of each part too.
+
+    The fourth channel has the sample counts.
+    """
     rows, columns = region[1], region[2]
     height, width = rows.stop - rows.start, columns.stop - columns.start
     row, column = np.divmod(sides.texels.index, sides.texels.width)
     inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
     mine = np.flatnonzero(inside & sides.valid.any(axis=1))
-    raw = np.zeros((2, height * width, 4), np.float32)
+    channels = 4 + 3 * how.parts
+    raw = np.zeros((2, height * width, channels), np.float32)
     if not len(mine):
-        return raw.reshape(2, height, width, 4)
+        return raw.reshape(2, height, width, channels)
     points = _points(sides, mine)
-    sums = np.zeros((2, len(mine), 3))
+    sums = np.zeros((2, len(mine), 3 + 3 * how.parts))
     fewest, most = how.samples
     passes = 0
     while passes * how.per_pass < most:
         sums += _sums_of_pass(scene, points, len(mine), (seed, passes), how)
         passes += 2
         samples = passes * how.per_pass
-        if samples >= fewest and relative_noise(sums * 2 / samples) <= how.noise:
+        if samples >= fewest and relative_noise(sums[..., :3] * 2 / samples) <= how.noise:
             break
     place = (row[mine] - rows.start) * width + column[mine] - columns.start
-    raw[:, place, :3] = sums
+    raw[:, place, :3], raw[:, place, 4:] = sums[..., :3], sums[..., 3:]
     raw[:, place, 3] = passes * how.per_pass / 2
-    return raw.reshape(2, height, width, 4)
+    return raw.reshape(2, height, width, channels)
 
 
 def relative_noise(halves: Floats, share: Floats | None = None) -> float:
@@ -117,7 +124,7 @@ def _points(sides: Sides, mine: Indices) -> path_tracer.Points:
 
 
 def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tuple[int, int], how: Sampling) -> Floats:
-    """Sums (2, n, 3) of the irradiance samples of a pair of passes per texel.
+    """Sums (2, n, 3 + 3 parts) of the irradiance samples of a pair of passes per texel, and of each part of them.
 
     In both, every texel takes the same two stratified point sets, shifted by random offsets of its own (Cranley &
     Patterson 1976).
@@ -134,10 +141,23 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = independent(int(rng.integers(1 << 32)), n * samples)
-    e = how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)
-    e = dr.select(dr.all(dr.isfinite(e)), e, 0.0)
-    dr.eval(e)
-    return block_sums(e, samples).reshape(2, count, 3)
+    found = _estimates(scene, sampler, at, u_bsdf, u_emitter, how)
+    usable = dr.all(dr.isfinite(found[0]))
+    found = [dr.select(usable, e, 0.0) for e in found]
+    dr.eval(found)
+    return np.concatenate([block_sums(e, samples).reshape(2, count, 3) for e in found], axis=-1)
+
+
+def _estimates(
+    scene: Any, sampler: Any, at: path_tracer.Points, u_bsdf: Any, u_emitter: Any, how: Sampling
+) -> list[Any]:
+    """A sample (mi.Color3f) of each point: the whole, then its parts. Direct light is the second half of a tally's."""
+    if how.tally is None:
+        return [how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)]
+    sums = path_tracer.irradiance_sums(
+        scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.tally, how.unseen
+    )
+    return [mi.Color3f(sum(sums[: how.tally.count])), *sums]
 
 
 def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:

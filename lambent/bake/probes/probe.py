@@ -36,12 +36,13 @@ MIRROR_DEPTH = 6  # glossy surfaces in a row
 class Probe:
     """radiance (6, N, N, 3) float32, distance (6, N, N) float32, normals (6, N, N, 3) float32 on the probe's side.
 
-    Radiance is rounded as `in_halves` stores it.
+    Radiance is rounded as `in_halves` stores it. `groups` (n, 6, N, N, 3) float32 has it by light group, not rounded.
     """
 
     radiance: NDArray[np.float32]
     distance: NDArray[np.float32]
     normals: NDArray[np.float32]
+    groups: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,14 @@ class Surroundings:
 
     `first` is the scene that the probe sees itself, mostly without its object; `whole` is the scene that lights and is
     mirrored by the surfaces seen. With a `cache` both are without diffuse terms; without, paths are traced whole. A
-    path meets at most `depth` surfaces.
+    path meets at most `depth` surfaces. A `tally` sorts light by group, with a cache that it takes.
     """
 
     first: Any
     whole: Any
     cache: LightMapCache | None = None
     depth: int = MIRROR_DEPTH
+    tally: path_tracer.Tally | None = None
 
 
 def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: int, noise: float = NOISE) -> Probe:
@@ -70,15 +72,17 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
     base = -(-samples // block)
     texels = np.arange(6 * n * n)
     total, squares = _sums(scene, centre, n, np.repeat(texels, base), block, rng)
-    first = total.reshape(-1, base, 3).sum(axis=1)
-    needed = _blocks_needed(first, squares.reshape(-1, base, 3).sum(axis=1), base * block, noise) * base
+    first = total.reshape(len(texels), base, -1).sum(axis=1)
+    needed = _blocks_needed(first[:, :3], squares.reshape(-1, base, 3).sum(axis=1), base * block, noise) * base
     more = np.repeat(texels, np.ceil(needed).astype(int) - base)
     extra = _sums(scene, centre, n, more, block, rng)[0]
-    for channel in range(3):
+    for channel in range(first.shape[1]):
         first[:, channel] += np.bincount(more, extra[:, channel], minlength=len(texels))
     count = (base + np.bincount(more, minlength=len(texels))) * block
-    rounded, unit = in_halves((first / count[:, None]).reshape(6, n, n, 3))
-    return Probe(rounded.astype(np.float32) * np.float32(unit), *_geometry(scene.first, centre, n))
+    means = (first / count[:, None]).reshape(6, n, n, -1, 3)
+    rounded, unit = in_halves(means[..., 0, :])
+    groups = None if scene.tally is None else np.moveaxis(means[..., 1:, :], -2, 0).astype(np.float32)
+    return Probe(rounded.astype(np.float32) * np.float32(unit), *_geometry(scene.first, centre, n), groups)
 
 
 def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -> Floats:
@@ -95,8 +99,12 @@ def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -
 def _sums(
     scene: Surroundings, centre: Floats, n: int, texels: Indices, samples: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Sums (k, 3) of radiance and of its squares over `samples` paths through each of the texels."""
-    total, squares = np.zeros((2, len(texels), 3))
+    """Sums over `samples` paths through each of the texels, of radiance and of its squares (k, 3).
+
+    Radiance is (k, 3 + 3 n), the whole and each of n groups.
+    """
+    groups = 0 if scene.tally is None else scene.tally.count
+    total, squares = np.zeros((len(texels), 3 + 3 * groups)), np.zeros((len(texels), 3))
     at_once = max(1, PATHS_AT_ONCE // samples)
     for mine in slices(len(texels), at_once):
         total[mine], squares[mine] = _pass(scene, centre, n, texels[mine], samples, int(rng.integers(1 << 32)))
@@ -117,11 +125,14 @@ def _pass(
     ray = mi.Ray3f(_origin(centre) + dr.zeros(mi.Point3f, width), dr.normalize(_direction(face, s, t)))
     reach = _distance(scene.first, ray)[0]  # paths begin just before the surface that the probe itself sees
     near = mi.Ray3f(ray(dr.maximum(reach * (1 - rays.APPROACH) - rays.APPROACH, 0.0)), ray.d)
-    value = path_tracer.radiance(scene.whole, sampler, path_tracer.camera_start(near), scene.depth, scene.cache)
-    value = dr.select(dr.all(dr.isfinite(value)), value, 0.0)
-    square = value * value
-    dr.eval(value, square)
-    return block_sums(value, samples), block_sums(square, samples)
+    tally, start = scene.tally or path_tracer.AllLight(), path_tracer.camera_start(near)
+    sums = path_tracer.radiance_sums(scene.whole, sampler, start, scene.depth, scene.cache, tally)
+    value = mi.Color3f(sum(sums))
+    usable = dr.all(dr.isfinite(value))
+    values = [dr.select(usable, one, 0.0) for one in (value, *(sums if scene.tally else ()))]
+    square = values[0] * values[0]
+    dr.eval(values, square)
+    return np.concatenate([block_sums(one, samples) for one in values], axis=-1), block_sums(square, samples)
 
 
 def _origin(centre: Floats) -> Any:

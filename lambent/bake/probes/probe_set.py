@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.light.cache import GroupedCache
 from lambent.bake.probes.centre import encloses, flat_axis, places_above, probe_centre
 from lambent.bake.probes.division import HIDDEN, family
 from lambent.bake.probes.hidden import RAYS as HIDDEN_RAYS
@@ -25,10 +27,11 @@ from lambent.bake.probes.selection import (
     mirrored,
     together,
 )
+from lambent.bake.tracing.path_tracer import Tally
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
-from lambent.core.colour import in_halves
+from lambent.core.colour import halves, in_halves
 
 LEAST_POINTS = 512  # on each of the objects that share a probe, from which rays are mirrored
 
@@ -49,6 +52,13 @@ class ProbeSet:
         self._scene = self._builder.scene
         self._left_out: tuple[frozenset[str], Any] | None = None
         self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
+        self._sorting: tuple[Tally, GroupedCache | None] | None = None
+
+    def sort_light(self, groups: Floats | None, groups_back: Floats | None) -> None:
+        """Keep probes by light group too: from its light maps (n, H, W, 3), where whole paths are not traced."""
+        whole_paths = self._cache is None
+        cache = None if groups is None else self._traced.grouped_cache(groups, groups_back)
+        self._sorting = self._traced.tally(diffuse=whole_paths, direct=False), cache
 
     @cached_property
     def _solids(self) -> SolidTest:
@@ -125,6 +135,9 @@ class ProbeSet:
             left_out = held >= WORTH * alone
         seen = without if left_out else self._whole
         around = Surroundings(seen, self._whole, self._cache, self._depth)
+        if self._sorting is not None:
+            tally, cache = self._sorting
+            around = replace(around, cache=cache, tally=tally)
         probe = bake_probe(around, centre, texels, samples, seed, noise)
         given = self._scene.probe_planes.get(name)
         if given is None:
@@ -135,6 +148,8 @@ class ProbeSet:
         about = planes + np.outer(planes[:, :3] @ centre, [0, 0, 0, 1])
         radiance, unit = in_halves(probe.radiance)
         arrays: dict[str, NDArray[Any]] = {"radiance": radiance, "distance": probe.distance, "planes": planes}
+        if probe.groups is not None:
+            arrays["groups"] = halves(probe.groups, unit)
         meta: dict[str, Any] = {"centre": [float(x) for x in centre], "object_left_out": left_out, "unit": unit}
         meta["traced"] = self._cache is None
         if rays is not None:

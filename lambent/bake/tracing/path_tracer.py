@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -20,6 +20,46 @@ from lambent.bake.tracing.sun import Sun
 
 ROULETTE_DEPTH = 2
 Cache = Callable[[Any, Any], Any]  # (surface interaction, active) -> diffuse radiance towards the ray's origin
+
+
+class Tally(Protocol):
+    """Sums (mi.Color3f) of the light that paths bring: one of all, or one for each group of emitters.
+
+    The first `count` add up to all light; others are parts of these.
+    """
+
+    count: int
+
+    def begin(self, width: int) -> list[Any]:
+        """Sums of no light."""
+        ...
+
+    def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
+        """With `light` of emitters (mi.EmitterPtr), straight from them where `first`.
+
+        It is the radiance that they send from the unit directions w, times `factor`, unless their sun is left out:
+        then `factor` is 0.
+        """
+        ...
+
+    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
+        """With the light of a cache at surfaces."""
+        ...
+
+
+class AllLight:
+    """One sum of all light; a cache is a `Cache`, or None."""
+
+    count = 1
+
+    def begin(self, width: int) -> list[Any]:
+        return [dr.zeros(mi.Color3f, width)]
+
+    def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
+        return [sums[0] + light]
+
+    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
+        return sums if cache is None else [sums[0] + dr.select(active, throughput * cache(si, active), 0.0)]
 
 
 @dataclass
@@ -53,11 +93,16 @@ def radiance(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Cach
     cache : callable, optional
         Diffuse radiance at a surface from baked light; the scene's materials must then be without diffuse terms.
     """
-    return _trace(
+    return radiance_sums(scene, sampler, start, max_depth, cache, AllLight())[0]
+
+
+def radiance_sums(scene: Any, sampler: Any, start: Start, max_depth: int, cache: Any, tally: Tally) -> list[Any]:
+    """The same as the sums of a tally; the cache is one that the tally takes."""
+    found: list[Any] = _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
-        mi.Bool(start.direct), max_depth, cache or (lambda si, active: mi.Color3f(0.0)), rays.has_holes(scene),
-        start.unseen,
+        mi.Bool(start.direct), max_depth, cache, rays.has_holes(scene), start.unseen, tally,
     )  # fmt: skip
+    return found
 
 
 def sample_emitter(
@@ -78,9 +123,9 @@ def sample_emitter(
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen, tally):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
-    result = dr.zeros(mi.Color3f, width)
+    sums = tally.begin(width)
     throughput = dr.ones(mi.Color3f, width)
     straight = dr.full(mi.Bool, unseen is not None, width)  # from the start, through clear glass alone
     depth = dr.zeros(mi.UInt32, width)
@@ -97,9 +142,13 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         light = emitter.eval(si, active)
         if unseen is not None:
             light -= dr.select(straight & ~si.is_valid(), unseen.radiance(ray.d), 0.0)
-        result += dr.select(active, throughput * light * weight, 0.0)
+        factor = throughput * weight
+        brought = dr.select(active, factor * light, 0.0)
+        shows_sun = active if unseen is None else active & ~(straight & ~si.is_valid())
+        factor = dr.select(shows_sun, factor, 0.0)
+        sums = tally.emitted(sums, brought, emitter, ray.d, factor, straight | (depth == 0))
         active &= si.is_valid() & (depth < max_depth)
-        result += dr.select(active, throughput * cache(si, active), 0.0)
+        sums = tally.cached(sums, throughput, cache, si, active)
 
         at = mi.SurfaceInteraction3f(si)  # with the normal on the ray's side, by which a guided sky is sampled
         at.n = dr.select(dr.dot(si.n, ray.d) > 0, -si.n, si.n)
@@ -117,7 +166,9 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         brought = throughput * f * value * weight
         lit &= dr.max(brought) > 0  # a narrow lobe sees few emitters; the others need no shadow rays
         lit &= ~rays.hidden(scene, si.p, si.n, ds.p, lit, holes)
-        result += dr.select(lit, brought, 0.0)
+        brought = dr.select(lit, brought, 0.0)
+        factor = dr.select(lit, throughput * f * weight * dr.rcp(ds.pdf), 0.0)
+        sums = tally.emitted(sums, brought, ds.emitter, ds.d, factor, mi.Bool(False))
 
         straight &= mi.Bool(False) if unseen is None else unseen.goes_on(si, sample.wo, active & straight)
         throughput *= f_sample
@@ -131,7 +182,7 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         survive = dr.select(depth >= ROULETTE_DEPTH, dr.minimum(brightest, 0.95), 1.0)
         active &= sampler.next_1d(active) < survive
         throughput *= dr.rcp(dr.maximum(survive, 1e-6))
-    return result
+    return sums
 
 
 def _balance(a: Any, b: Any) -> Any:
@@ -162,8 +213,18 @@ def irradiance(
     unseen : Sun, optional
         Whose direct light is left out, straight through clear glass as well.
     """
-    found = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
-    return mi.Color3f(sum(light for light, _ in found))
+    return irradiance_sums(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen)[0]
+
+
+def irradiance_sums(
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
+    unseen: Sun | None = None,
+) -> list[Any]:  # fmt: skip
+    """The same as the sums of a tally; the cache is one that the tally takes."""
+    arriving, _, direct, _ = _contributions(
+        scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen
+    )  # fmt: skip
+    return [mi.Color3f(dr.pi * one + other) for one, other in zip(arriving, direct, strict=True)]
 
 
 def moment(
@@ -171,24 +232,31 @@ def moment(
     unseen: Sun | None = None,
 ) -> Any:  # fmt: skip
     """One sample of the sum of directions (as mi.Color3f), each times the luminance that it adds to `irradiance`."""
-    found = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, unseen)
-    return mi.Color3f(sum(mi.luminance(light) * mi.Vector3f(direction) for light, direction in found))
+    (arriving,), w, (direct,), w_direct = _contributions(
+        scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, AllLight(), unseen
+    )  # fmt: skip
+    return mi.Color3f(mi.luminance(dr.pi * arriving) * mi.Vector3f(w) + mi.luminance(direct) * mi.Vector3f(w_direct))
 
 
 def _contributions(
-    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Cache | None,
+    scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
     unseen: Sun | None,
-) -> list[tuple[Any, Any]]:  # fmt: skip
-    """Contributions to the irradiance from BSDF and emitter sampling, each with its direction."""
+) -> tuple[list[Any], Any, list[Any], Any]:  # fmt: skip
+    """Sums of radiance from BSDF sampling, times pi irradiance, and of irradiance from emitters, with directions."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
     si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
-    arriving = radiance(scene, sampler, Start(ray, si, local.z / dr.pi, False, unseen), max_depth, cache)
+    start = Start(ray, si, local.z / dr.pi, False, unseen)
+    arriving = radiance_sums(scene, sampler, start, max_depth, cache, tally)
     first = None if unseen is None else unseen.first
     lights = scene if first is None else first.scene
     ds, value = sample_emitter(scene, lights, si, u_emitter, mi.Bool(True), rays.has_holes(scene), unseen)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
-    direct = dr.select(ds.pdf > 0, value * cosine * weight, 0.0)
-    return [(dr.pi * arriving, ray.d), (direct, ds.d)]
+    brought = dr.select(ds.pdf > 0, cosine * weight, 0.0)
+    shows_sun = mi.Bool(unseen is None) & (ds.pdf > 0)
+    factor = mi.Color3f(dr.select(shows_sun, brought * dr.rcp(ds.pdf), 0.0))
+    sums = tally.begin(dr.width(points.position))
+    direct = tally.emitted(sums, brought * value, ds.emitter, ds.d, factor, mi.Bool(True))
+    return arriving, ray.d, direct, ds.d

@@ -36,6 +36,11 @@ class Sun:
             self._texels = mi.Texture2f(pixels, wrap_mode=dr.WrapMode.Clamp)
             self._turn = [[float(x) for x in axis] for axis in found.picture.turn.T]
 
+    @property
+    def is_in_sky(self) -> bool:
+        """Whether it is a part of the environment's picture."""
+        return self._picture is not None
+
     def radiance(self, w: Any) -> Any:
         """What the sun adds to the environment's radiance (mi.Color3f) in unit directions w (mi.Vector3f)."""
         if self._picture is None:

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.light.cache import LightMapCache
+from lambent.bake.light.cache import GroupedCache, LightMapCache
 from lambent.bake.light.stitching import Cuts, cuts_of
-from lambent.bake.sky.sun import FoundSun, sun_of
+from lambent.bake.sky.sun import FoundSun, is_sun, sun_of
 from lambent.bake.surfaces.atlas import Atlas
 from lambent.bake.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
 from lambent.bake.tracing.emitters import balance_emitters
 from lambent.bake.tracing.first_light import FirstLight, sky_without
+from lambent.bake.tracing.group_tally import GroupTally
 from lambent.bake.tracing.scene_builder import EmitterSampling, SceneBuilder
 from lambent.bake.tracing.solids import SolidTest
 from lambent.bake.tracing.sun import Sun, SunRays
@@ -29,6 +30,7 @@ from lambent.core.inputs import sha256_of
 from lambent.core.progress import Progress, silent
 from lambent.materials.measured.patch_sheet import Lookup, lookup_of
 from lambent.materials.measured.registry import load
+from lambent.scenes.light_groups import SortedLights, sorted_lights
 
 
 class TracedScene:
@@ -108,6 +110,23 @@ class TracedScene:
         builder = self.builder(diffuse=False)
         sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
         return LightMapCache(builder, irradiance, irradiance_back, sun)
+
+    @cached_property
+    def sorted_lights(self) -> SortedLights:
+        """The light groups of the scene, its sun found."""
+        found, lights = self._found_sun, enumerate(self.scene.lights)
+        suns = [] if found is None else [number for number, light in lights if is_sun(light, found)]
+        return sorted_lights(self.scene, suns, sun_in_sky=found is not None and found.picture is not None)
+
+    def tally(self, *, diffuse: bool, direct: bool) -> GroupTally:
+        """Sorts the light of paths in `whole(diffuse=diffuse)` by group; `direct` light apart as well."""
+        return GroupTally(self.sorted_lights, self.builder(diffuse=diffuse), self.sun, direct=direct)
+
+    def grouped_cache(self, irradiance: Floats, irradiance_back: Floats | None) -> GroupedCache:
+        """`cache` of the light maps (n, H, W, 3) of groups."""
+        sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False))
+        of_sun = self.sorted_lights.sun
+        return GroupedCache(self.builder(diffuse=False), irradiance, irradiance_back, sun, of_sun)
 
     @cached_property
     def texels(self) -> Texels:

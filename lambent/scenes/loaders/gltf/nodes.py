@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -134,9 +135,9 @@ class _Reading:
             self._add_camera(node.camera, node.name, world)
         if node.luminaire is not None:  # what stands beside it is for programs that cannot read it
             luminaire = self._luminaires.at(node, world)
-            self._lights += [luminaire] if luminaire is not None else []
+            self._lights += [replace(luminaire, name=node.name or "")] if luminaire is not None else []
         elif node.light is not None:
-            self._add_light(node.light, world)
+            self._add_light(node.light, node.name, world)
 
     def _add_mesh(self, index: int, node_name: str | None, world: Floats) -> None:
         gltf = self._gltf
@@ -198,17 +199,18 @@ class _Reading:
         target, fov_y_deg = triple(position + forward), math.degrees(camera.yfov)
         self._cameras.append(Camera(name, triple(position), target, triple(up), fov_y_deg))
 
-    def _add_light(self, index: int, world: Floats) -> None:
+    def _add_light(self, index: int, node_name: str | None, world: Floats) -> None:
         light = self._gltf.pick(self._gltf.document.lights, index, "lights")
         power = triple(radiometric(np.asarray(light.color) * light.intensity))
         position, direction = triple(world[:3, 3]), triple(-normalize(world[:3, 2]))
+        name = node_name or light.name or ""
         if light.type == "directional":
-            self._lights.append(DirectionalLight(direction, power))
+            self._lights.append(DirectionalLight(direction, power, name))
         elif light.type == "point":
-            self._lights.append(PointLight(position, power))
+            self._lights.append(PointLight(position, power, name=name))
         else:
             inner, outer = math.degrees(light.inner_rad), math.degrees(light.outer_rad)
-            self._lights.append(PointLight(position, power, direction, min(inner, outer), outer))
+            self._lights.append(PointLight(position, power, direction, min(inner, outer), outer, name))
 
 
 def _local(node: Node) -> Floats:

@@ -227,6 +227,7 @@ class SceneNodes(_Part):
 
 
 class LightDocument(_Part):
+    name: str = ""
     type: Literal["directional", "point", "spot"]
     color: Colour = (1, 1, 1)
     intensity: NotNegative = 1

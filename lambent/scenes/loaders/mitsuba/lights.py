@@ -107,23 +107,23 @@ def _sun_radius_deg(plugin: Plugin) -> float:
 
 def light_of(plugin: Plugin, world: Floats) -> PointLight | DirectionalLight | None:
     """A light without extent; None, and a warning, if its kind is unknown."""
-    matrix = world @ plugin.transform()
+    matrix, name = world @ plugin.transform(), plugin.element.id or ""
     made: PointLight | DirectionalLight
     if plugin.type == "point":
         position = plugin.vector("position")
         at = matrix[:3, 3] if position is None else matrix[:3, :3] @ position + matrix[:3, 3]
-        made = PointLight(triple(at), _emitted(plugin, "intensity"))
+        made = PointLight(triple(at), _emitted(plugin, "intensity"), name=name)
     elif plugin.type == "spot":
         outer = min(max(plugin.number("cutoff_angle", 20.0), 0.01), 90.0)
         inner = min(max(plugin.number("beam_width", outer * 0.75), 0.0), outer)
         direction = triple(normalize(matrix[:3, 2]))
-        made = PointLight(triple(matrix[:3, 3]), _emitted(plugin, "intensity"), direction, inner, outer)
+        made = PointLight(triple(matrix[:3, 3]), _emitted(plugin, "intensity"), direction, inner, outer, name)
     elif plugin.type == "directional":
         given = plugin.vector("direction")
         direction_world = matrix[:3, 2] if given is None else matrix[:3, :3] @ given
         if not direction_world.any():
             raise plugin.element.error("direction is zero")
-        made = DirectionalLight(triple(normalize(direction_world)), _emitted(plugin, "irradiance"))
+        made = DirectionalLight(triple(normalize(direction_world)), _emitted(plugin, "irradiance"), name)
     else:
         plugin.note("left out, an emitter of an unknown kind")
         return None

@@ -22,6 +22,7 @@ from lambent.core.plain import Triple
 from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
+from lambent.scenes.light_groups import SKY, SUN, names_of_lights
 from lambent.scenes.loaders.contents import DAYLIGHT, Contents
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
@@ -39,6 +40,7 @@ from lambent.scenes.scene import (
     ImageEnvironment,
     Light,
     LightFieldWish,
+    LightGroup,
     Mesh,
     PointLight,
     ReflectorRule,
@@ -99,6 +101,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         light_fields=light_fields,
         reflector_rules=_reflector_rules(document, objects, path),
         crease_deg=document.crease_angle,
+        light_groups=_light_groups(document, objects, lights, path),
     )
 
 
@@ -229,6 +232,18 @@ def _reflector_rules(
     for section in document.reflectors:
         fitting(section.objects, [o.name for o in objects], path, "reflectors.objects", got=section.objects)
     return tuple(ReflectorRule(r.objects, r.use, r.plane) for r in document.reflectors)
+
+
+def _light_groups(
+    document: SceneDocument, objects: tuple[SceneObject, ...], lights: tuple[Light, ...], path: Path
+) -> tuple[LightGroup, ...]:
+    """The groups that the document names, each member of which fits something."""
+    names = [SUN, SKY, *(o.name for o in objects if any(o.emission)), *names_of_lights(lights)]
+    for section in document.light_groups:
+        for member in section.members:
+            fitting(member, names, path, "light_groups.members", got=member)
+    _check_names([section.name for section in document.light_groups], path, "light_groups")
+    return tuple(section.group() for section in document.light_groups)
 
 
 def _unit_planes(planes: Any) -> Any:

@@ -37,6 +37,7 @@ def coloured(value: float, colour: Colour | None) -> Triple:
 
 
 class _Coloured(Section):
+    name: str = ""
     colour: Colour | None = None
 
     @field_validator("colour")
@@ -74,7 +75,7 @@ class PointSection(_Lamp):
     kind: Literal["point"]
 
     def light(self) -> PointLight:
-        return PointLight(self.position, self.intensity_of(4 * math.pi))
+        return PointLight(self.position, self.intensity_of(4 * math.pi), name=self.name)
 
 
 class SpotSection(_Lamp):
@@ -97,7 +98,9 @@ class SpotSection(_Lamp):
         inner, outer = math.radians(self.inner_deg), math.radians(self.outer_deg)
         edge = (math.sin(outer) - math.sin(inner)) / (outer - inner) if outer > inner else math.cos(outer)
         intensity = self.intensity_of(2 * math.pi * (1 - edge))  # falls linearly in the angle from inner to outer
-        return PointLight(self.position, intensity, unit(self.direction), self.inner_deg, self.outer_deg)
+        return PointLight(
+            self.position, intensity, unit(self.direction), self.inner_deg, self.outer_deg, name=self.name
+        )
 
 
 class DirectionalSection(_Coloured):
@@ -117,7 +120,7 @@ class DirectionalSection(_Coloured):
 
     def light(self) -> DirectionalLight:
         irradiance = self.irradiance if self.irradiance is not None else coloured(self.lux or 0.0, self.colour)
-        return DirectionalLight(unit(self.direction), irradiance)
+        return DirectionalLight(unit(self.direction), irradiance, self.name)
 
 
 class IesSection(_Coloured):
@@ -138,7 +141,7 @@ class IesSection(_Coloured):
         scale = photometry.tilted(tilt_deg)
         if self.lumens is not None:
             scale = self.lumens / max(photometry.lumens, 1e-9)
-        return IesLight(self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg)
+        return IesLight(self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg, name=self.name)
 
 
 LightSection = PointSection | SpotSection | DirectionalSection | IesSection

@@ -11,6 +11,7 @@ from lambent.core.exposure import exposure_of
 from lambent.core.light_field import LEAST_TEXELS, MOST_POINTS, MOST_TEXELS
 from lambent.core.surroundings import Axis, Layout
 from lambent.scenes.computed import COMPUTED
+from lambent.scenes.light_groups import MOST_GROUPS
 from lambent.scenes.loaders.scene_toml.lamps import LightSection, one_of
 from lambent.scenes.loaders.scene_toml.sections import (
     Colour,
@@ -32,6 +33,7 @@ from lambent.scenes.scene import (
     ConstantEnvironment,
     Ground,
     LightFieldWish,
+    LightGroup,
     SunSky,
 )
 
@@ -200,6 +202,16 @@ class ReflectorSection(Section):
         return plane
 
 
+class LightGroupSection(Section):
+    """Emitters that are dimmed together; see `scenes.light_groups`."""
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+    members: Annotated[tuple[str, ...], Field(min_length=1)]
+
+    def group(self) -> LightGroup:
+        return LightGroup(self.name, self.members)
+
+
 EnvironmentSection = SunSkySection | ImageSection | ConstantSection | ComputedSection
 
 
@@ -220,6 +232,7 @@ class SceneDocument(Section):
     assign: dict[str, str] = Field(default_factory=dict)  # pattern over objects and materials -> material
     objects: dict[str, ObjectSection] = Field(default_factory=dict)
     lights: tuple[Annotated[LightSection, Field(discriminator="kind")], ...] = ()
+    light_groups: Annotated[tuple[LightGroupSection, ...], Field(max_length=MOST_GROUPS - 1)] = ()
     cameras: tuple[CameraSection, ...] = ()
     reflectors: tuple[ReflectorSection, ...] = ()
     paths: tuple[PathSection, ...] = ()

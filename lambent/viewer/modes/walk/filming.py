@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from lambent.core.film import (
     radiance_wanted,
     sequence_file,
 )
+from lambent.core.light_mix import Factors
 from lambent.core.outputs import is_marked
 from lambent.realtime.frame_state import QMC_N, FrameState
 from lambent.realtime.renderer import Renderer
@@ -63,19 +64,20 @@ class Filming:
     """One film under way, of frames like `frame` along `path`. `error` says why it ended early.
 
     The window draws with another renderer. `quality` is in samples of `qmc` per pixel, lobe and frame; with 0 the
-    integrator is that of `frame`.
+    integrator is that of `frame`. `light` is the mix of light groups by time in seconds; without it that of `frame`.
     """
 
     def __init__(
-        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0
-    ) -> None:
+        self, renderer: Renderer, file: Path, path: CameraPath, frame: FrameState, fps: int, quality: int = 0,
+        light: Callable[[float], Factors] | None = None,
+    ) -> None:  # fmt: skip
         width, height = even_size(frame.width, frame.height)
         self.file, self.total, self.done = file, path.frames(fps), 0
         if self.total > LONGEST_FRAMES:
             raise UserError("the film is too long", got=f"{self.total} frames", expected=f"at most {LONGEST_FRAMES}")
         self.error: str | None = None
         self.over = False
-        self._began_s = time.monotonic()
+        self._began_s, self._light = time.monotonic(), light
         frame = replace(frame, width=width, height=height, accumulate=None)
         self._work = self._run(renderer, path, frame, fps, -(-quality // QMC_N))
 
@@ -109,6 +111,8 @@ class Filming:
         with pictures_writer(self.file, frame.width, frame.height, fps) as write:
             for index in range(self.total):
                 view = replace(frame, camera=camera_at(path, index / fps))
+                if self._light is not None:
+                    view = replace(view, light=self._light(index / fps))
                 for part in range(parts):
                     view = replace(view, integrator="qmc", n=QMC_N, accumulate=part)
                     if part < parts - 1:  # the last one is drawn below

@@ -15,7 +15,7 @@ from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
-from lambent.viewer.modes.walk.panels import compare, film, light_field, marks, material, metering, scene, view
+from lambent.viewer.modes.walk.panels import compare, film, light_field, lights, marks, material, metering, scene, view
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.navigation import Movement
@@ -33,6 +33,8 @@ def open_store(path: Path, movement: Movement, screen: Screen, light_field_mb: f
     baked = read_baked(store, light_field_mb)
     state = WalkState.of(baked.record, movement, screen, store.folder)
     state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
+    state.lights.groups = baked.groups.records if baked.groups is not None else ()
+    state.lights.fields = bool(baked.light_fields)
     state.missing = (*baked.missing, *state.missing)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
@@ -88,6 +90,7 @@ class WalkMode(Mode):
     def advance(self, dt_s: float) -> None:
         self.input.walk(dt_s)
         self.state.navigation.play(dt_s)
+        self.state.lights.visit(self.state.navigation, self.state.recordings.views.saved)
         self.state.recordings.follow()
         if self.state.materials.editor is not None:
             self.state.materials.editor.tick()
@@ -144,6 +147,11 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
             opened=True,
         ),
         Panel("Camera", partial(view.draw_camera, state), "angle of view, the walker, and marks over the picture"),
+        Panel(
+            "Light",
+            partial(lights.draw, state.lights, state.recordings),
+            "each group of lamps: on or off, brightness, colour",
+        ),
         Panel("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and at which pace"),
         Panel(
             "Light field",

@@ -27,6 +27,7 @@ from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
 from lambent.viewer.work import POLL_S
 
+MIX_S = 0.01  # between two looks at a mix of light that is being made
 METER_S = 0.2  # between two readings of the meter while something moves
 SHARED = 0.5  # of the frame time that each of two pictures may take
 
@@ -86,12 +87,13 @@ class Pictures(Pair):
     def _frame(self, size: tuple[int, int]) -> FrameState:
         state = self._state
         frame = state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
-        return replace(frame, maps=self._renderer.streaming.version)
+        light = state.recordings.light
+        return replace(frame, maps=self._renderer.streaming.version, light=light, mixed=self._renderer.mixer.version)
 
     def wait_s(self) -> float | None:
         if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
-        loading = POLL_S if self._renderer.streaming.busy else None
+        loading = MIX_S if self._renderer.mixer.busy else POLL_S if self._renderer.streaming.busy else None
         return least(super().wait_s(), loading, 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
 
     def save(self) -> None:
@@ -214,6 +216,10 @@ class Pictures(Pair):
         films = self._state.films
         file = film_file(self._state.screen.folder, films.file_name)
         if self._film_renderer is None:
-            self._film_renderer = self._another_renderer()
-        frame = self._frame(SIZES[films.size])
-        return Filming(self._film_renderer, file, path, frame, films.fps, QUALITIES[films.quality])
+            # A film's light may change with its time, and so is not that of the window.
+            scene = self._renderer.scene
+            self._film_renderer = self._another_renderer() if scene.groups is None else Renderer(self.device, scene)
+        frame = replace(self._frame(SIZES[films.size]), mixed=0)
+        track = self._state.recordings.track_of(path)
+        light = None if track is None else lambda time_s: self._state.lights.known(track.factors_at(time_s))
+        return Filming(self._film_renderer, file, path, frame, films.fps, QUALITIES[films.quality], light)

@@ -8,9 +8,11 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera, CameraPath
-from lambent.core.plain import triple
+from lambent.core.light_mix import MixTrack
+from lambent.core.plain import Triple, triple
 from lambent.viewer.cameras import LONGEST_STEP_S
 from lambent.viewer.edits import rescue_file
+from lambent.viewer.modes.walk.lights import Lights, RecordedLight
 from lambent.viewer.modes.walk.views import Kind, SavedViews, write_alone
 from lambent.viewer.navigation import Navigation, PathPlay
 from lambent.viewer.screen import Screen
@@ -48,10 +50,10 @@ class Recording:
     @property
     def seconds(self) -> float:
         """From the first movement to the last."""
-        return self.times_s[-1] - self._start_s if len(self.times_s) > 1 else 0.0
+        return self.times_s[-1] - self.start_s if len(self.times_s) > 1 else 0.0
 
     @property
-    def _start_s(self) -> float:
+    def start_s(self) -> float:
         """When the first movement began; the time before it is left out."""
         waited = len(self.cameras) > 1 and self.cameras[1] == self.cameras[0]
         return self.times_s[1] if waited else self.times_s[0]
@@ -66,7 +68,7 @@ class Recording:
             return None
         count = max(1, round(self.seconds / KEY_S)) + 1
         times = np.linspace(0.0, self.seconds, count)
-        at = np.array(self.times_s) - self._start_s
+        at = np.array(self.times_s) - self.start_s
         values = np.array([(*camera.position, *camera.target, camera.fov_y_deg) for camera in self.cameras])
         even = np.stack([np.interp(times, at, column) for column in values.T], axis=-1)
         smooth = smoothed(even, smooth_s / (times[1] - times[0]))
@@ -80,6 +82,7 @@ class Recorder:
 
     on: bool = False
     recording: Recording = field(default_factory=Recording)
+    light: RecordedLight = field(default_factory=RecordedLight)
     draft: CameraPath | None = None
     smooth_s: float = SMOOTH_S
     began_s: float = 0.0
@@ -109,7 +112,12 @@ class Recorder:
 
     def drop(self) -> None:
         """Forget the draft."""
-        self.recording, self.draft = Recording(), None
+        self.recording, self.light, self.draft = Recording(), RecordedLight(), None
+
+    @property
+    def track(self) -> MixTrack | None:
+        """The light of the draft over its time; None where it was as baked."""
+        return self.light.track(self.recording.start_s) if self.recording.times_s else None
 
 
 @dataclass
@@ -119,6 +127,7 @@ class Recordings:
     views: SavedViews
     navigation: Navigation
     screen: Screen
+    lights: Lights = field(default_factory=Lights)
     recorder: Recorder = field(default_factory=Recorder)
     view_name: str = ""  # typed for the next saved view
 
@@ -133,9 +142,22 @@ class Recordings:
         paths = self.views.all.paths
         return paths if self.recorder.draft is None else (*paths, self.recorder.draft)
 
+    @property
+    def light(self) -> dict[str, Triple]:
+        """Factors of the light groups that the picture shows: of the walk that is followed, else of the mix."""
+        play = self.navigation.path
+        track = None if play is None else self.track_of(play.path)
+        found = self.lights.mix.factors if track is None or play is None else track.factors_at(play.time_s)
+        return self.lights.known(found)
+
+    def track_of(self, path: CameraPath) -> MixTrack | None:
+        """The light over time of a saved path, or of the one just recorded."""
+        return self.recorder.track if path == self.recorder.draft else self.views.saved.tracks.get(path.name)
+
     def save_view(self) -> None:
         """Save where the camera stands, under the typed name or the next free one."""
-        added = self.views.add(self.navigation.camera, self.view_name if self.view_name.strip() else None)
+        mix = self.lights.mix if self.lights.groups else None
+        added = self.views.add(self.navigation.camera, self.view_name if self.view_name.strip() else None, mix)
         if added is not None:
             self.view_name, self.navigation.camera = "", added
             self.screen.say(f"saved the view {added.name}")
@@ -173,7 +195,10 @@ class Recordings:
 
     def follow(self) -> None:
         """Take the camera of this frame into a recording, which ends where it becomes too long."""
-        if self.recorder.take(self.navigation.camera, self.screen.clock()):
+        now_s = self.screen.clock()
+        if self.recorder.on:
+            self.recorder.light.take(self.lights.mix, now_s - self.recorder.began_s)
+        if self.recorder.take(self.navigation.camera, now_s):
             self.record()
 
     def save(self) -> None:
@@ -181,7 +206,7 @@ class Recordings:
         recorder = self.recorder
         if recorder.draft is not None:
             name = None if recorder.name == recorder.suggested else recorder.name
-            self._saved(self.views.add(recorder.draft, name))
+            self._saved(self.views.add(recorder.draft, name, recorder.track))
 
     def _saved(self, added: CameraPath | None) -> None:
         if added is not None:
@@ -203,9 +228,9 @@ class Recordings:
         if draft is None:
             return None
         typed = self.recorder.name if self.recorder.name.strip() not in ("", self.recorder.suggested) else None
-        added = self.views.add(draft, typed)
+        added = self.views.add(draft, typed, self.recorder.track)
         if added is None and typed is not None:  # the name is taken, or none: the walk is worth more
-            added = self.views.add(draft)
+            added = self.views.add(draft, light=self.recorder.track)
         self._saved(added)
         return added.name if added is not None else None
 
@@ -219,7 +244,7 @@ class Recordings:
             return ()
         name = self.recorder.name.strip() or self.views.free_name("path")
         file = rescue_file(self.screen.folder, name)
-        write_alone(file, replace(draft, name=name))
+        write_alone(file, replace(draft, name=name), self.recorder.track)
         return (f"{file}, a views.json for a store",)
 
     def drop(self) -> None:

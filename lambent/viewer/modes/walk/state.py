@@ -18,6 +18,7 @@ from lambent.viewer.look import Look
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.filming import Films
 from lambent.viewer.modes.walk.light_fields import FieldView
+from lambent.viewer.modes.walk.lights import Lights
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.metering import Meter
 from lambent.viewer.modes.walk.recording import Recordings
@@ -134,6 +135,7 @@ class WalkState:
     meter: Meter = field(default_factory=Meter)
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
+    lights: Lights = field(default_factory=Lights)
     store_name: str = "STORE"
     missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map
@@ -150,11 +152,11 @@ class WalkState:
         """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
         look, meter = Look(scene.exposure_ev or 0.0), Meter(expose_wanted=scene.exposure_ev is None)
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
-        fault = views.load()
+        fault, lights = views.load(), Lights()
         return cls(
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
-            Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen),
-            Marks({}, scene.reflectors), meter=meter,
+            Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen, lights),
+            Marks({}, scene.reflectors), meter=meter, lights=lights,
             store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -11,6 +11,7 @@ from typing import Literal, TypeVar
 from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
+from lambent.core.light_mix import LightMix, MixTrack
 from lambent.store.contract import SceneRecord
 from lambent.store.views import Views, change_views, checked_name, free_name, read_views, with_views
 
@@ -47,8 +48,8 @@ class SavedViews:
     def free_name(self, kind: Kind) -> str:
         return free_name(STEMS[kind], self._names(kind, self.saved))
 
-    def add(self, item: Item, name: str | None = None) -> Item | None:
-        """Save a camera or path as `name`, or under the next free one; None where that cannot be."""
+    def add(self, item: Item, name: str | None = None, light: LightMix | MixTrack | None = None) -> Item | None:
+        """Save a camera or path as `name`, or under the next free one, with its light; None where that cannot be."""
         kind: Kind = "camera" if isinstance(item, Camera) else "path"
         named: list[Item] = []
 
@@ -56,7 +57,8 @@ class SavedViews:
             taken = self._names(kind, views)  # another window may have saved some meanwhile
             free = free_name(STEMS[kind], taken)
             named.append(replace(item, name=free if name is None else checked_name(name, taken)))
-            return _with(views, kind, (*_of(views, kind), *named))
+            lit = _lit(views, kind, {**_lights(views, kind), **({} if light is None else {named[0].name: light})})
+            return _with(lit, kind, (*_of(views, kind), *named))
 
         return named[0] if self._change(change) else None
 
@@ -68,13 +70,19 @@ class SavedViews:
             if old not in names:
                 raise UserError("is no longer there: another window deleted or renamed it", got=old)
             name = checked_name(new, names - {old})
-            return _with(views, kind, (replace(i, name=name) if i.name == old else i for i in _of(views, kind)))
+            lit = _lit(views, kind, {name if key == old else key: one for key, one in _lights(views, kind).items()})
+            return _with(lit, kind, (replace(i, name=name) if i.name == old else i for i in _of(views, kind)))
 
         return self._change(change)
 
     def delete(self, kind: Kind, name: str) -> bool:
         """Delete a saved camera or path; whether that was possible."""
-        return self._change(lambda views: _with(views, kind, (i for i in _of(views, kind) if i.name != name)))
+
+        def change(views: Views) -> Views:
+            lit = _lit(views, kind, {key: one for key, one in _lights(views, kind).items() if key != name})
+            return _with(lit, kind, (i for i in _of(views, kind) if i.name != name))
+
+        return self._change(change)
 
     def _names(self, kind: Kind, views: Views) -> set[str]:
         return {item.name for item in (*_of(self.scene, kind), *_of(views, kind))}
@@ -108,6 +116,15 @@ def _with(views: Views, kind: Kind, items: Iterable[Camera | CameraPath]) -> Vie
     return views.model_copy(update={f"{kind}s": tuple(items)})
 
 
-def write_alone(file: Path, path: CameraPath) -> None:
+def _lights(views: Views, kind: Kind) -> Mapping[str, LightMix | MixTrack]:
+    return views.lights if kind == "camera" else views.tracks
+
+
+def _lit(views: Views, kind: Kind, lights: Mapping[str, LightMix | MixTrack]) -> Views:
+    return views.model_copy(update={"lights" if kind == "camera" else "tracks": dict(lights)})
+
+
+def write_alone(file: Path, path: CameraPath, track: MixTrack | None = None) -> None:
     """A `views.json` of another name that holds one path, for a store that cannot take it."""
-    write_text(file, json.dumps(Views(paths=(path,)).model_dump(mode="json"), indent=1) + "\n")
+    tracks = {} if track is None else {path.name: track}
+    write_text(file, json.dumps(Views(paths=(path,), tracks=tracks).model_dump(mode="json"), indent=1) + "\n")

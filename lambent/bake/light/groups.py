@@ -1,0 +1,118 @@
+"""Light maps by group of emitters: their samples beside those of the whole, and the finished maps.
+
+Every group is denoised, filled and stitched by itself, as light of one lamp is easier to tell from noise than that of
+all; the whole is the sum of the finished groups.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.sampling import cleaned, relative_noise, sampled_halves
+from lambent.bake.light.stitching import Cuts
+from lambent.bake.surfaces.texels import Texels
+from lambent.bake.tracing.rays import array_of, vectors
+from lambent.bake.tracing.sun import SunRays
+from lambent.bake.tracing.traced_scene import TracedScene
+from lambent.core.arrays import Floats, Indices
+from lambent.core.colour import HALF_MAX, luminance
+from lambent.core.progress import Progress
+from lambent.store.store import Array, Artefact, Chunk, Writer
+
+
+class BothWriters:
+    """Writes tiles (2, h, w, 4 + c) of samples as two arrays: (2, H, W, 4), and the means of both halves (1, H, W, c).
+
+    The parts are written first: where the whole has a tile, its parts are there.
+    """
+
+    def __init__(self, whole: Writer, parts: Writer) -> None:
+        self._whole, self._parts = whole, parts
+
+    @property
+    def artefact(self) -> Artefact:
+        """Of the whole, whose chunks the parts have too."""
+        return self._whole.artefact
+
+    @property
+    def missing(self) -> Sequence[Chunk]:
+        """Chunks that one of both lacks."""
+        lacking = {*self._whole.missing, *self._parts.missing}
+        return [chunk for chunk in self.artefact.chunk_grid if chunk in lacking]
+
+    def write(self, chunk: Chunk, data: Array) -> None:
+        """Write what is missing of a tile."""
+        if chunk in self._parts.missing:
+            count = data[..., 3].sum(axis=0)
+            means = data[..., 4:].sum(axis=0) / np.maximum(count, 1)[..., None]
+            self._parts.write(chunk, means[None].astype(np.float32))
+        if chunk in self._whole.missing:
+            self._whole.write(chunk, np.ascontiguousarray(data[..., :4]))
+
+    def finish(self) -> None:
+        """Mark both complete."""
+        self._parts.finish()
+        self._whole.finish()
+
+
+@dataclass(frozen=True, eq=False)
+class GroupMaps:
+    """A side of the light map, float16: `whole` (H, W, 3), `light` and `direct` by group (n, H, W, 3); its notes."""
+
+    whole: NDArray[np.float16]
+    light: NDArray[np.float16]
+    direct: NDArray[np.float16] | None
+    notes: dict[str, float]
+
+
+def finished_groups(
+    raw: Floats, parts: Floats, count: int, texels: Texels, labels: Indices, cuts: Cuts, progress: Progress
+) -> GroupMaps:
+    """The maps of `count` groups from samples of the whole (2, H, W, 4) and of parts (H, W, 3 count or 6 count).
+
+    Direct light is nowhere more than all light of its group, whose denoising is another.
+    """
+    halves, known = sampled_halves(raw)
+    samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
+    noisy = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0)
+    finished = []
+    for number, one in enumerate(noisy):
+        progress(number, len(noisy), "denoising by group")
+        finished.append(cleaned(one, known, texels, labels, cuts) if one.any() else np.zeros(one.shape, np.float16))
+    light = np.stack(finished[:count])
+    direct = np.minimum(np.stack(finished[count:]), light) if len(finished) > count else None
+    whole = np.minimum(light.astype(np.float32).sum(axis=0), HALF_MAX).astype(np.float16)
+    return GroupMaps(whole, light, direct, {"noise": relative_noise(halves[:, known]), "samples": samples})
+
+
+def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:
+    """LightGroupRecords of the groups, whose maps (n, H, W, 3) are `light`, for JSON."""
+    sides, lights = traced.lit_sides(1.0), traced.sorted_lights
+    index, area = sides.texels.index, sides.texels.spacing**2
+    lit = sides.valid.any(axis=1)
+    shining = [luminance(one.reshape(-1, 3)[index].astype(float)) for one in light]
+    if traced.sun is not None and lights.sun is not None:
+        shining[lights.sun] = shining[lights.sun] + luminance(_sun_on(traced, sides.texels).astype(float))
+    total = [float((one * area)[lit].sum()) for one in shining]
+    whole = max(sum(total), 1e-30)
+    return [
+        {"name": group.name, "members": list(group.members), "share": one / whole}
+        for group, one in zip(lights.groups, total, strict=True)
+    ]
+
+
+def _sun_on(traced: TracedScene, texels: Texels) -> Floats:
+    """Direct irradiance (K, 3) of the sun on the first point of each texel, on the normal's side."""
+    kind = {"diffuse": False}
+    p, n, flat = (vectors(mi.Vector3f, v[:, 0]) for v in (texels.positions, texels.normals, texels.flat))
+    si = dr.zeros(mi.SurfaceInteraction3f, len(texels.index))
+    si.p, si.n, si.sh_frame = mi.Point3f(p), mi.Normal3f(flat), mi.Frame3f(mi.Normal3f(n))
+    assert traced.sun is not None
+    return np.maximum(array_of(SunRays(traced.sun, traced.whole(**kind))(si, mi.Bool(True))), 0)

@@ -1,0 +1,58 @@
+"""Light of paths sorted by the group of its emitter: the same paths as without groups, and one more index.
+
+Of an environment with a sun in it, what the sun's picture adds is the sun's, the rest the sky's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lambent.bake.tracing.scene_builder import SceneBuilder
+from lambent.bake.tracing.sun import Sun
+from lambent.scenes.light_groups import SortedLights
+
+
+class GroupTally:
+    """A `path_tracer.Tally` with a sum for each group and, with `direct`, one more for what comes straight from it.
+
+    Sums of all light are the first `count`. Its caches are `GroupedCache`s, or None.
+    """
+
+    def __init__(self, lights: SortedLights, builder: SceneBuilder, sun: Sun | None, *, direct: bool) -> None:
+        self.count, self._direct = len(lights.groups), direct
+        self._sun, self._of_sun, self._of_sky = sun, lights.sun, lights.sky
+        known = [(builder.meshes[name].emitter(), group) for name, group in lights.of_objects.items()]
+        known += list(zip(builder.lights, lights.of_lights, strict=True))
+        numbers = [int(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(emitter))[0]) for emitter, _ in known]
+        table = np.zeros(max(numbers, default=0) + 1, np.uint32)
+        table[numbers] = [group for _, group in known]
+        self._groups, self._size = mi.UInt32(table), len(table)
+
+    def begin(self, width: int) -> list[Any]:
+        return [dr.zeros(mi.Color3f, width) for _ in range(self.count * (1 + self._direct))]
+
+    def emitted(self, sums: list[Any], light: Any, emitter: Any, w: Any, factor: Any, first: Any) -> list[Any]:
+        number = dr.reinterpret_array(mi.UInt32, emitter)
+        group = dr.gather(mi.UInt32, self._groups, number, number < self._size)
+        of_sun = mi.Color3f(0.0)
+        if self._of_sky is not None:
+            environment = emitter.is_environment()
+            group = dr.select(environment, self._of_sky, group)
+            if self._sun is not None and self._sun.is_in_sky:
+                of_sun = dr.select(environment, dr.clip(factor * self._sun.radiance(w), 0.0, light), 0.0)
+        parts = [dr.select(group == number, light - of_sun, 0.0) for number in range(self.count)]
+        if self._of_sun is not None:
+            parts[self._of_sun] = parts[self._of_sun] + of_sun
+        straight = [dr.select(first, part, 0.0) for part in parts] if self._direct else []
+        return [total + part for total, part in zip(sums, [*parts, *straight], strict=True)]
+
+    def cached(self, sums: list[Any], throughput: Any, cache: Any, si: Any, active: Any) -> list[Any]:
+        if cache is None:
+            return sums
+        shown = cache.groups(si, active)
+        lit = [total + dr.select(active, throughput * one, 0.0) for total, one in zip(sums, shown, strict=False)]
+        return [*lit, *sums[self.count :]]

@@ -1,0 +1,67 @@
+"""The light of a store by light group, read when a mix first needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.errors import UserError, did_you_mean
+from lambent.core.light_mix import WHITE, Factors
+from lambent.store import contract
+from lambent.store.contract import SIDES, LightGroupRecord, group_name, light_groups
+from lambent.store.store import Store
+
+NO_GROUPS = "the store holds no light by group"
+BAKE_GROUPS = "`lambent bake` of the same scene with --light-groups scene adds it"
+FIELDS_STAY = "light fields do not follow the mix: what they show stays as baked"
+
+
+@dataclass(frozen=True, eq=False)
+class GroupArrays:
+    """Light by group as a store has it: sides of the light map (n, H, W, 3), and probes (n, 6, N, N, 3) by object.
+
+    All are read when they are first needed; probes are in `unit` W/(sr m^2).
+    """
+
+    records: tuple[LightGroupRecord, ...]
+    store: Store
+    unit: float = 1.0
+
+    @cached_property
+    def sides(self) -> tuple[Floats | None, ...]:
+        """Light maps by group, float32; None of a side without light."""
+        found = [self.store.read(name) if (name := group_name(side)) in self.store else None for side in SIDES]
+        lit = [None if one is None or not one.any() else one.astype(np.float32) for one in found]
+        scale = np.float32(1 / self.unit)
+        return tuple(None if one is None else one if self.unit == 1 else one * scale for one in lit)
+
+    def probe(self, name: str) -> Floats | None:
+        """Radiance of the probe of an object by group; None where the store has none."""
+        array = contract.probe_name(name, "groups")
+        if array not in self.store:
+            return None
+        scale = np.float32(contract.radiance_unit(self.store, array) / self.unit)
+        return np.asarray(self.store.read(array).astype(np.float32) * scale)
+
+    def number(self, member: str) -> int | None:
+        """The group of the sun, the sky, or an object that emits."""
+        return next((i for i, record in enumerate(self.records) if member in record.members), None)
+
+    def factors(self, light: Factors) -> Floats:
+        """(n, 3) of a mix; `UserError` for a name that no group has."""
+        names = [record.name for record in self.records]
+        for name in light:
+            if name not in names:
+                hint = did_you_mean(name, names)
+                expected = ", ".join(names)
+                raise UserError("no light group of this name", field="light", got=name, expected=expected, hint=hint)
+        return np.array([light.get(name, WHITE) for name in names], np.float32)
+
+
+def groups_in(store: Store, unit: float) -> GroupArrays | None:
+    """The light of a store by group; None where it was baked without."""
+    records = light_groups(store)
+    return GroupArrays(records, store, unit) if records else None

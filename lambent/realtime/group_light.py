@@ -1,0 +1,82 @@
+"""The light of a baked scene by group, as arrays, and what a mix of the groups makes of it: nothing here draws.
+
+A mix is a table of factors (n, 3), by group and channel. All light is in units of the scene, and without the sun's
+disc, which the renderer draws by pixel (`sun_disc`): the disc is taken out of the sun's group.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+from lambent.core.irradiance import irradiance_of
+from lambent.core.plain import Triple, triple
+from lambent.realtime.baked import BakedScene, Probe
+from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_arrays import GroupArrays
+from lambent.realtime.sun_disc import sky_without, without_sun
+from lambent.realtime.uploads import with_alpha
+from lambent.store.contract import ObjectRecord
+
+SUN, SKY = "sun", "sky"  # members of groups
+
+
+@dataclass(frozen=True, eq=False)
+class GroupLight:
+    """What a mix of groups makes of the light of a scene."""
+
+    scene: BakedScene
+    groups: GroupArrays
+    _discs: dict[str, Floats] = field(default_factory=dict)  # radiance of the sun's disc, by object with a probe
+
+    def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
+        """By side of the light map, (H, W, 4) half floats; None of a side that no light reaches."""
+        return tuple(None if side is None else with_alpha(mixed(side, factors)) for side in self.groups.sides)
+
+    def sky(self, factors: Floats) -> tuple[Floats | None, Floats | None]:
+        """The environment (6, N, N, 3) as it is seen, and without the sun's disc."""
+        whole, sun = self.scene.environment, self.scene.sun
+        if whole is None:
+            return None, None
+        rest = whole if sun is None else sky_without(whole, sun)
+        tint, of_sun = self._of(SKY, factors), self._of(SUN, factors)
+        return rest * tint + (whole - rest) * of_sun, rest * tint
+
+    def sun(self, factors: Floats) -> Triple | None:
+        """W/m^2 of the sun, in units of the scene."""
+        return None if self.scene.sun is None else triple(np.array(self.scene.sun.irradiance) * self._of(SUN, factors))
+
+    def emission(self, record: ObjectRecord, factors: Floats) -> Triple:
+        """W/(sr m^2) of an object, not in units of the scene."""
+        return triple(np.array(record.emission) * self._of(record.part_of or record.name, factors))
+
+    def probe(self, name: str, factors: Floats) -> Probe | None:
+        """The probe of an object without the sun's disc; None where the store does not have it by group."""
+        by_group = self.groups.probe(name)
+        if by_group is None:
+            return None
+        probe, sun = self.scene.probes[name], self.groups.number(SUN)
+        if self.scene.sun is not None and sun is not None:
+            if name not in self._discs:
+                bare = without_sun(replace(probe, irradiance=()), self.scene.sun, self.scene.unit)
+                self._discs[name] = np.asarray(finite(probe.radiance)[0] - finite(bare.radiance)[0])
+            by_group[sun] = np.maximum(by_group[sun] - self._discs[name], 0)
+        radiance = finite(mixed(by_group, factors))[0]
+        scaled = probe.irradiance and tuple(map(float, irradiance_of(radiance) * self.scene.unit))
+        return replace(probe, radiance=radiance, irradiance=scaled)
+
+    def _of(self, member: str, factors: Floats) -> Floats:
+        number = self.groups.number(member)
+        return np.ones(3, np.float32) if number is None else factors[number]
+
+
+def mixed(by_group: Floats, factors: Floats) -> Floats:
+    """Sum over groups of light (n, ..., 3) times factors (n, 3)."""
+    total = by_group[0] * factors[0]
+    for light, factor in zip(by_group[1:], factors[1:], strict=True):
+        if factor.any():
+            total += light * factor
+    return np.asarray(total)

@@ -1,0 +1,144 @@
+"""Brings mixes of light groups onto the GPU: light map, sky, sun and emitters at once, then probe after probe.
+
+A thread makes the arrays and touches no GPU; before a frame, whatever is ready is uploaded. A mix that changes while
+the thread works is taken up after the part under way: the light map first, so that a dragged slider shows at once, and
+the probes by turns.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cached_property
+from typing import Any
+
+from lambent.core.arrays import Floats
+from lambent.core.light_mix import Factors
+from lambent.realtime.baked import BakedScene
+from lambent.realtime.cube_mips import finite
+from lambent.realtime.group_light import GroupLight
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.resources import SceneResources
+
+MAP = -1  # the part that is no probe
+
+
+class LightMixer:
+    """The mix of a scene's light that its resources show.
+
+    Attributes
+    ----------
+    version : int
+        Grows with every part that is ready: a frame drawn now is another one than before.
+    """
+
+    def __init__(self, layouts: Layouts, scene: BakedScene, resources: SceneResources) -> None:
+        self._layouts, self._scene, self._resources = layouts, scene, resources
+        self.version = 0
+        self._wanted: Floats | None = None  # None: as baked, and nothing was read yet
+        self._made: dict[int, bytes] = {}  # mix of each part that was made last
+        self._ready: deque[tuple[int, Floats, Any]] = deque()
+        self._work: Future[None] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether a part of the mix is not on the GPU yet."""
+        return self._work is not None or bool(self._ready)
+
+    def follow(self, light: Factors, *, waits: bool) -> None:
+        """Show a mix from this frame on, all of it where the frame `waits`, else what is ready.
+
+        Raises
+        ------
+        UserError
+            Where a group is named that the store does not have.
+        """
+        groups = self._scene.groups
+        if groups is None or (self._wanted is None and not light):
+            return
+        self._wanted = groups.factors(light)
+        while True:
+            if self._work is not None and (waits or self._work.done()):
+                self._work.result()
+                self._work = None
+            while self._ready:
+                self._show(*self._ready.popleft())
+            if self._work is not None or not self._stale():
+                return
+            self._work = self._thread.submit(self._make)
+
+    @cached_property
+    def _thread(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(1, "light")
+
+    @cached_property
+    def _light(self) -> GroupLight:
+        assert self._scene.groups is not None, "asked for with groups alone"
+        return GroupLight(self._scene, self._scene.groups)
+
+    @cached_property
+    def _owners(self) -> dict[int, str | None]:
+        """By the number of each probe's light, the object whose probe it is; None: the sky stands for one."""
+        names = {id(probe.radiance): name for name, probe in self._scene.probes.items()}
+        found = [self._scene.probe_of(record) for record in self._scene.record.objects]
+        keys = [0 if probe is None else id(probe.radiance) for probe in found]
+        return {number: names.get(keys[users[0]]) for number, users in enumerate(self._users)}
+
+    @cached_property
+    def _users(self) -> list[list[int]]:
+        """Objects that show each probe's light, by number."""
+        found: dict[int, list[int]] = {}
+        for number, item in enumerate(self._resources.objects):
+            found.setdefault(id(item.light), []).append(number)
+        return list(found.values())
+
+    def _stale(self) -> list[int]:
+        """Parts that were not made for the mix that is wanted: the light map, then probes, longest ago first."""
+        assert self._wanted is not None
+        now, parts = self._wanted.tobytes(), [MAP, *range(len(self._users))]
+        age = {part: place for place, part in enumerate(self._made)}
+        return [p for p in sorted(parts, key=lambda p: (p != MAP, age.get(p, -1))) if self._made.get(p) != now]
+
+    def _make(self) -> None:
+        """Make what is stale until nothing is; the light map and a probe by turns while the mix changes."""
+        turn = False
+        while stale := self._stale():
+            assert self._wanted is not None
+            part = stale[1] if turn and stale[0] == MAP and len(stale) > 1 else stale[0]
+            turn, factors = part == MAP, self._wanted
+            made = self._map(factors) if part == MAP else self._probe(part, factors)
+            self._made.pop(part, None)
+            self._made[part] = factors.tobytes()
+            self._ready.append((part, factors, made))
+            self.version += 1
+
+    def _map(self, factors: Floats) -> Any:
+        sides = self._light.light_map(factors)
+        return sides, self._light.sky(factors)
+
+    def _probe(self, number: int, factors: Floats) -> ProbeLight | None:
+        light, owner = self._resources.objects[self._users[number][0]].light, self._owners[number]
+        if owner is None:
+            sky = self._light.sky(factors)[1]
+            return None if sky is None else light.relit(finite(sky)[0], ())
+        probe = self._light.probe(owner, factors)
+        return None if probe is None else light.relit(probe.radiance, probe.irradiance)
+
+    def _show(self, part: int, factors: Floats, made: Any) -> None:
+        """Upload a part."""
+        resources, light = self._resources, self._light
+        if part != MAP:
+            for number in self._users[part] if made is not None else ():
+                item = resources.objects[number]
+                item.relight(made, item.emission)
+            return
+        sides, (shown, mirrored) = made
+        resources.show_light_map(sides)
+        if shown is not None and mirrored is not None:
+            resources.sky_group = resources.sky_group_of(shown)
+            resources.mirrored_sky_group = resources.sky_group_of(mirrored)
+        if (sun := light.sun(factors)) is not None:
+            resources.sun.shine(sun)
+        for item in resources.objects:
+            item.relight(item.light, light.emission(item.record, factors))

@@ -1,0 +1,68 @@
+"""The mix of a store's light groups in the window: of the Light panel, of saved views, and of recorded walks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from lambent.core.light_mix import LightMix, MixTrack
+from lambent.core.plain import Triple
+from lambent.store.contract import LightGroupRecord
+from lambent.store.views import Views
+from lambent.viewer.navigation import Navigation
+
+
+@dataclass
+class Lights:
+    """`groups` are the store's, none where it was baked without; `mix` is what the panel shows.
+
+    `fields`: whether an object has a light field, which does not follow the mix.
+    """
+
+    groups: tuple[LightGroupRecord, ...] = ()
+    mix: LightMix = field(default_factory=LightMix)
+    fields: bool = False
+    at_view: str = ""  # the saved view whose mix was taken last
+
+    def visit(self, navigation: Navigation, saved: Views) -> None:
+        """Take the mix of a saved view where the camera has come to stand at one."""
+        camera = navigation.camera
+        if camera not in saved.cameras:
+            self.at_view = ""
+        elif camera.name != self.at_view:
+            self.at_view = camera.name
+            self.mix = saved.lights.get(camera.name, self.mix)
+
+    def known(self, factors: Mapping[str, Triple]) -> dict[str, Triple]:
+        """Those of groups that the store has: a mix may be saved with a store that was baked otherwise since."""
+        names = {group.name for group in self.groups}
+        return {name: factor for name, factor in factors.items() if name in names}
+
+
+@dataclass
+class RecordedLight:
+    """Mixes and their times in seconds, as they were when a walk was recorded."""
+
+    keys: list[tuple[float, LightMix]] = field(default_factory=list)
+    last_s: float = 0.0
+
+    def take(self, mix: LightMix, time_s: float) -> None:
+        """The mix at this moment; it held since the last one where it is another."""
+        if self.keys and mix == self.keys[-1][1]:
+            self.last_s = time_s
+            return
+        if self.keys and self.keys[-1][0] < self.last_s < time_s:
+            self.keys.append((self.last_s, self.keys[-1][1]))
+        self.keys.append((time_s, mix))
+        self.last_s = time_s
+
+    def track(self, began_s: float) -> MixTrack | None:
+        """The same as a track whose times count from `began_s`; None where all light was as baked."""
+        names = {name for _, mix in self.keys for name in mix.groups}
+        groups = {}
+        for name in sorted(names):
+            keys = [(max(time_s - began_s, 0.0), mix.of(name)) for time_s, mix in self.keys]
+            last_of_time = [list(same)[-1] for _, same in groupby(keys, key=lambda key: key[0])]
+            groups[name] = tuple(last_of_time)
+        return MixTrack(groups) if groups else None

@@ -1,0 +1,62 @@
+"""The Light panel: each light group on or off, its intensity, colour temperature and colour."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from lambent.core.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
+from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
+from lambent.store.contract import LightGroupRecord
+from lambent.viewer.modes.walk.lights import Lights
+from lambent.viewer.modes.walk.recording import Recordings
+from lambent.viewer.panels.widgets import check, press, rgb, slider, wrapped
+
+BRIGHTEST = 4.0  # of the slider: times as baked
+WARM_K, COOL_K = 1800.0, 12000.0  # of the slider
+USUAL_K = 6500.0
+
+
+def draw(lights: Lights, recordings: Recordings) -> None:
+    if not lights.groups:
+        wrapped([f"{NO_GROUPS}: {BAKE_GROUPS}"])
+        return
+    play = recordings.navigation.path
+    if play is not None and recordings.track_of(play.path) is not None:
+        wrapped(["the light follows the walk that is shown; move to take it over"])
+    for group in lights.groups:
+        mix = lights.mix.of(group.name)
+        lights.mix = lights.mix.changed(group.name, _row(group, mix))
+    imgui.begin_disabled(not lights.mix.groups)
+    if press("reset all light", "shows all light as it was baked", -1):
+        lights.mix = LightMix()
+    imgui.end_disabled()
+    if lights.fields:
+        wrapped([FIELDS_STAY])
+
+
+def _row(group: LightGroupRecord, mix: GroupMix) -> GroupMix:
+    """One group; a change of a slider or of a colour switches it on."""
+    name = group.name
+    imgui.separator_text(f"{name}  {group.share:.0%}")
+    members = ", ".join(group.members)
+    on = check(f"on##{name}", mix.on, f"switches {members} on or off")
+    imgui.same_line()
+    intensity = slider(
+        f"##times {name}", mix.intensity, 0.0, BRIGHTEST, f"times as bright as baked: {members}", unit=" x"
+    )
+    imgui.same_line()
+    if press(f"reset##{name}", "as it was baked", small=True):
+        return AS_BAKED
+    is_tinted = check(f"black body##{name}", mix.temperature_k is not None, "tints the light as a black body shines")
+    kelvin = mix.temperature_k if is_tinted else None
+    if is_tinted:
+        meaning = "temperature of the black body: 2700 K is a light bulb, 6500 K daylight"
+        low, high = max(WARM_K, LEAST_K), min(COOL_K, MOST_K)
+        imgui.same_line()
+        kelvin = slider(f"##kelvin {name}", mix.temperature_k or USUAL_K, low, high, meaning, log=True, unit=" K")
+    colour = rgb(f"colour##{name}", mix.colour, 1.0, "a filter before the light; how dark it is does not matter")
+    colour = colour if any(colour) else WHITE
+    changed = (intensity, colour) != (mix.intensity, mix.colour)
+    return replace(mix, on=on or changed, intensity=intensity, temperature_k=kelvin, colour=colour)
