@@ -92,15 +92,16 @@ def test_b_is_the_path_traced_scene_and_follows_the_camera(pictures, state, stor
     """Against the reference by z; at rest only, and A stands in until there is something."""
     drawn(pictures, state)
     a, b = pictures.shown
-    assert pictures.views == (a.view, a.view) and "at rest" in b.label
+    views = pictures.views
+    assert views[0] is a.view and views[1] is not a.view and views[1].texture is a.view.texture and "at rest" in b.label
     b = traced_until(pictures, state, 8)
     first = reference(store, state.navigation.camera, 64)
     assert np.abs(z_of(b, first)).max() < 4
-    assert pictures.views[1] is not a.view and f"{b.samples} samples" in state.comparison.divider.b_label
+    assert pictures.views[1].texture is not a.view.texture and f"{b.samples} samples" in state.comparison.divider.b_label
     camera = state.navigation.camera
     state.navigation.camera = replace(camera, fov_y_deg=0.6 * camera.fov_y_deg)
     drawn(pictures, state)
-    assert pictures.views[1] is a.view and not b.readable, "the last view is not this one"
+    assert pictures.views[1].texture is a.view.texture and not b.readable, "the last view is not this one"
     b = traced_until(pictures, state, 16)
     assert np.abs(z_of(b, reference(store, state.navigation.camera, 64))).max() < 4
     assert np.abs(z_of(b, first)).max() > 8, "the first view is another one"

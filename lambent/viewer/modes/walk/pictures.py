@@ -19,7 +19,7 @@ from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
-from lambent.viewer.modes.walk.light_fields import FieldDrawing
+from lambent.viewer.modes.walk.light_fields import FieldDrawing, shows_choice
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.state import WalkState
@@ -42,6 +42,8 @@ class Pictures(Pair):
         renderer.waits = False  # for maps: the picture is drawn again when they are there
         self._b: Picture | None = None
         self._traced: TracedPicture | None = None
+        self._stands_for: Any = None
+        self._stand_in: Any = None
         self.shown = (self._a,)
         self._film_renderer: Renderer | None = None
         self._outlining = Outlining(renderer)
@@ -59,8 +61,10 @@ class Pictures(Pair):
 
     @property
     def views(self) -> tuple[Any, ...]:
-        """A stands in for what is not there yet."""
-        return tuple(picture.view or self._a.view for picture in self.shown)
+        """Of A and B; where B is not there yet, another view of A's texture: Dear ImGui drops views one by one."""
+        if any(picture.view is None for picture in self.shown) and self._stands_for is not self._a.view:
+            self._stands_for, self._stand_in = self._a.view, self._a.view.texture.create_view()
+        return tuple(self._stand_in if picture.view is None else picture.view for picture in self.shown)
 
     @property
     def divider(self) -> Divider | None:
@@ -83,7 +87,8 @@ class Pictures(Pair):
             state.comparison.forget()
             state.comparison.figures = None
             self.shown = (self._a,)
-            self._a.update(wanted, refine=None if state.films.under_way is None else False)
+            still = state.films.under_way is not None or shows_choice(wanted)  # a mean of points' colours is none of them
+            self._a.update(wanted, refine=False if still else None)
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
