@@ -21,10 +21,11 @@ class Discs(Overlay):
 
     _pipeline: Any = None
 
-    def draw(self, state: FrameState, places: Floats, colours: Floats, radii_px: Floats) -> Any:
+    def draw(self, state: FrameState, places: Floats, colours: Floats, radii_px: Floats, rims: Floats) -> Any:
         """View of an RGBA texture of the state's size: discs at places (P, 3) in the world; clear elsewhere.
 
-        `colours` (P, 3) are encoded for the display, `radii_px` (P,) in its pixels.
+        `colours` (P, 3) are encoded for the display, `radii_px` (P,) in its pixels, `rims` (P,)
+        the grey of the rims, encoded.
         """
         if self._pipeline is None:
             module = self._device.create_shader_module(code=assemble("discs.wgsl"))
@@ -38,17 +39,17 @@ class Discs(Overlay):
         render = context.begin("discs", [shown], "clear")
         if len(places):
             render.set_pipeline(self._pipeline)
-            render.set_vertex_buffer(0, self._layouts.buffer("VERTEX", _vertices(places, colours, radii_px, state)))
+            render.set_vertex_buffer(0, self._layouts.buffer("VERTEX", _vertices(places, colours, radii_px, rims, state)))
             render.draw(len(_CORNERS) * len(places))
         render.end()
         self._device.queue.submit([context.slicing.encoder.finish()])
         return shown
 
 
-def _vertices(places: Floats, colours: Floats, radii_px: Floats, state: FrameState) -> Floats:
-    """(6 P, VERTEX_FLOATS): place, colour, corner within [-1, 1]^2 and 0, half sizes in clip space, 0, 0."""
+def _vertices(places: Floats, colours: Floats, radii_px: Floats, rims: Floats, state: FrameState) -> Floats:
+    """(6 P, VERTEX_FLOATS): place, colour, corner within [-1, 1]^2 and rim, half sizes in clip space, 0, 0."""
     each = np.zeros((len(places), len(_CORNERS), VERTEX_FLOATS), np.float32)
     each[..., :3], each[..., 3:6] = places[:, None], colours[:, None]
-    each[..., 6:8] = _CORNERS
+    each[..., 6:8], each[..., 8] = _CORNERS, np.asarray(rims)[:, None]
     each[..., 9:11] = 2 * np.asarray(radii_px)[:, None, None] / np.array(state.size)
     return each.reshape(-1, VERTEX_FLOATS)

@@ -28,6 +28,7 @@ from lambent.realtime.context import FrameContext, Pass
 from lambent.realtime.discs import Discs
 from lambent.realtime.draws import draws_of
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
+from lambent.realtime.given import Given
 from lambent.realtime.integrators import integrator
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.light_mixer import LightMixer
@@ -149,6 +150,10 @@ class Renderer:
     def discs(self) -> Discs:
         """What draws discs at places in the scene."""
         return Discs(self._layouts, self.resources, self._clusters)
+
+    def given(self) -> Given:
+        """What shows radiance that was made elsewhere as frames show theirs."""
+        return Given(self._layouts, self.resources)
 
     def redrawn(self, state: FrameState) -> frozenset[str] | None:
         """Materials whose objects alone a frame would draw with `FrameState.over`; None where it is drawn whole."""

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import wgpu
@@ -106,6 +106,16 @@ class Picture:
     def under_way(self) -> bool:
         """Whether a frame is being drawn in parts, see `work`."""
         return self._under_way is not None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of `radiance`; 0, 0 where there is none."""
+        return (0, 0) if self.radiance is None else self.radiance.size[:2]
+
+    @property
+    def accumulated(self) -> int:
+        """Frames of the progressive series that the picture is the mean of."""
+        return self.pacer.accumulated
 
     @property
     def readable(self) -> bool:
@@ -229,10 +239,26 @@ class Picture:
         )  # fmt: skip
 
 
+class Shown(Protocol):
+    """A picture in the window, whoever makes it; members as those of `Picture`."""
+
+    @property
+    def view(self) -> Any: ...
+    @property
+    def under_way(self) -> bool: ...
+    @property
+    def readable(self) -> bool: ...
+    @property
+    def samples(self) -> int: ...
+    def work(self) -> bool: ...
+    def wait_s(self) -> float | None: ...
+    def read(self, at: tuple[float, float] | None = None) -> NDArray[np.float32]: ...
+
+
 class Pair(Drawing):
     """The picture A and, where two are compared, B: `shown` in this order."""
 
-    shown: tuple[Picture, ...] = ()
+    shown: tuple[Shown, ...] = ()
 
     @property
     def views(self) -> tuple[Any, ...]:

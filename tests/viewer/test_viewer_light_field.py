@@ -46,7 +46,8 @@ def test_discs_are_drawn_where_points_are_and_hidden_by_the_ball(renderer, field
     """A disc's middle has its colour if the point faces the eye; behind the ball nothing is drawn."""
     frame = FrameState(CAMERA, *SIZE)
     colours = colours_of(np.arange(len(field.points), dtype=float))
-    drawn = pixels_of(renderer, renderer.discs().draw(frame, field.points, colours, np.full(len(field.points), 4.0)))
+    count = len(field.points)
+    drawn = pixels_of(renderer, renderer.discs().draw(frame, field.points, colours, np.full(count, 4.0), np.zeros(count)))
     places, _ = projected(CAMERA, field.points.astype(float), SIZE)
     towards = np.array(CAMERA.position) - field.points
     facing = (field.normals * towards).sum(axis=-1) / np.linalg.norm(towards, axis=-1)
@@ -184,3 +185,17 @@ def test_a_click_on_a_disc_keeps_the_selection(state, geometry, field):
     state.fields.points_on = False
     walk.clicked(x, y)
     assert state.selection.name is None
+
+
+def test_the_choice_of_points_is_not_refined(renderer, screen):
+    """At rest the picture stays one of the integrator that was chosen: the mean of two points' colours is that of none."""
+    state = WalkState.of(renderer.scene.record, "walk", screen)
+    state.navigation.camera, screen.pace.adaptive = CAMERA, False
+    counts = {}
+    for look_up in ("light_field-choice", "light_field"):
+        state.look.lookup = look_up
+        pictures = Pictures(renderer, state)
+        for _ in range(4):
+            drawn(pictures, state)
+        counts[look_up] = pictures.shown[0].samples
+    assert counts["light_field-choice"] == 0 < counts["light_field"]

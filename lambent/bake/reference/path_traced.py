@@ -9,7 +9,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lambent.bake.tiles import seed_of
 from lambent.bake.tracing import path_tracer
@@ -105,12 +105,20 @@ def _pass(scene: object, camera: Camera, size: tuple[int, int], samples: int, se
 
 
 def camera_rays(camera: Camera, size: tuple[int, int], samples: int, sampler: Any) -> Any:
-    """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel."""
+    """mi.Ray3f through random places of the pixels, `samples` for each, pixel after pixel.
+
+    The camera is no constant of the kernel: another view of the same size needs no other one.
+    """
     width, height = size
     count = width * height * samples
     pixel = dr.arange(mi.UInt32, count) // samples
     jitter = sampler.next_2d()
     x, y = (pixel % width + jitter.x) / width * 2 - 1, 1 - (pixel // width + jitter.y) / height * 2
-    across, up, forward = (mi.Vector3f(*map(float, axis)) for axis in image_plane(camera, width, height))
-    origin = mi.Point3f(*map(float, camera.position)) + dr.zeros(mi.Point3f, count)
+    across, up, forward = (_opaque(mi.Vector3f, axis) for axis in image_plane(camera, width, height))
+    origin = _opaque(mi.Point3f, camera.position) + dr.zeros(mi.Point3f, count)
     return mi.Ray3f(origin, dr.normalize(across * x + up * y + forward))
+
+
+def _opaque(kind: Any, components: ArrayLike) -> Any:
+    """mi.Vector3f or mi.Point3f that kernels read from memory."""
+    return kind(*(dr.opaque(mi.Float, float(x)) for x in np.asarray(components)))

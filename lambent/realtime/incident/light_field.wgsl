@@ -227,22 +227,26 @@ fn is_sky(s: Surface, found: vec4f, half_log2_omega: f32) -> bool {
 // ends in the sky if a point sees it there, or the answer is B_n.
 fn marched_light(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     let found = found_by_points(s, r);
-    let nearest = largest_of(found);
     if (HAS_SKY && is_sky(s, found, half_log2_omega)) { return light_of_sky(r, half_log2_omega); }
-    let agree = (found > vec4f(0.0)) & (found * (1.0 + ALIKE) >= vec4f(nearest));
-    var weights = weights_about(s.n, s);
-    weights = select(weights, select(vec4f(0.0), max(weights, vec4f(1e-6)), agree), nearest > 0.0);
-    return weighted(s, r, max(found, vec4f(0.0)) * select(0.0, 1.0, nearest > 0.0), weights, half_log2_omega);
+    let met = select(0.0, 1.0, largest_of(found) > 0.0);
+    return weighted(s, r, max(found, vec4f(0.0)) * met, weights_of_found(s, found), half_log2_omega);
 }
 
-// What is found, in colours of middle brightness: one for each point, of that which sees the nearest surface; blue for the
-// sky, and red where no point verifies a surface.
+// Weights of the points that agree on the nearest surface; of all, where none has met one.
+fn weights_of_found(s: Surface, found: vec4f) -> vec4f {
+    let nearest = largest_of(found);
+    let agree = (found > vec4f(0.0)) & (found * (1.0 + ALIKE) >= vec4f(nearest));
+    let weights = weights_about(s.n, s);
+    return select(weights, select(vec4f(0.0), max(weights, vec4f(1e-6)), agree), nearest > 0.0);
+}
+
+// What is found, in colours of middle brightness: one for each point, of that which has the largest share; blue for the sky, and red where no point verifies a surface.
 fn chosen(s: Surface, r: vec3f) -> vec3f {
     let found = found_by_points(s, r);
     var colour = vec3f(1.0, 0.0, 0.0);
     if (largest_of(found) == SKY) { colour = vec3f(0.0, 0.1, 1.0); }
     if (largest_of(found) > 0.0) {
-        let point = dot(first_largest(found), vec4f(s.points));
+        let point = dot(first_largest(weights_of_found(s, found)), vec4f(s.points));
         colour = 0.2 + 0.6 * fract(point * vec3f(0.618034, 0.754878, 0.569840));
     }
     return 0.3 * colour / frame.exposure;

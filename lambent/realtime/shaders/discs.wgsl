@@ -1,4 +1,4 @@
-// Discs that face the eye, each with a dark rim; see realtime/discs.py for what the vertices hold.
+// Discs that face the eye, each with a rim; see realtime/discs.py for what the vertices hold.
 
 #include "frame.wgsl"
 
@@ -6,6 +6,7 @@ struct Corner {
     @builtin(position) position: vec4f,
     @location(0) colour: vec3f,
     @location(1) corner: vec2f,
+    @location(2) rim: f32, // grey
 }
 
 @vertex fn vertex_main(
@@ -13,11 +14,11 @@ struct Corner {
     @location(4) none: vec2f,
 ) -> Corner {
     let clip = frame.clip_from_world * vec4f(place, 1.0);
-    return Corner(clip + vec4f(corner.xy * half_size * clip.w, 0.0, 0.0), colour, corner.xy);
+    return Corner(clip + vec4f(corner.xy * half_size * clip.w, 0.0, 0.0), colour, corner.xy, corner.z);
 }
 
 @fragment fn discs_main(v: Corner) -> @location(0) vec4f {
     let r = length(v.corner);
     if (r > 1.0) { discard; }
-    return vec4f(select(v.colour, vec3f(0.0), r > 0.75), 1.0);
+    return vec4f(select(v.colour, vec3f(v.rim), r > 0.75), 1.0);
 }

@@ -1,7 +1,7 @@
-"""The picture A beside B, another integrator's, and how far the two are apart.
+"""The picture A beside B, another integrator's or the path tracer's, and how far the two are apart.
 
 B is, unless chosen otherwise, the unbiased `qmc`, which accumulates while nothing moves: the error is then that of A's
-few samples. Figures compare what a display shows; the map of differences compares luminances.
+few samples. By the path tracer it is that of the bake as well. Figures compare what a display shows; the map of differences compares luminances.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ Kind = Literal["difference", "FLIP"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 KINDS: tuple[Kind, ...] = get_args(Kind)
 REFERENCE = "qmc"
+TRACED = "path"  # B by the path tracer, in a process beside the window
 AS_A = "as A"  # look-up of B
 PERCENT = Range(1.0, 100.0)  # of the map of differences
 FLOOR = 0.02  # of the mean luminance: below, a difference counts as one of this
@@ -63,6 +64,7 @@ class Comparison:
         self.mode: Mode = "off"
         self.integrator = REFERENCE
         self.look_up = AS_A
+        self.fault = ""  # why there is no B, in a line
         self.kind: Kind = "difference"
         self.divider = Divider()
         self.figures: Figures | None = None
@@ -77,6 +79,11 @@ class Comparison:
     @property
     def on(self) -> bool:
         return self.mode != "off"
+
+    @property
+    def is_traced(self) -> bool:
+        """Whether B is to be path traced."""
+        return self.on and self.integrator == TRACED
 
     @property
     def busy(self) -> bool:

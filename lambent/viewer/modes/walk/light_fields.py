@@ -25,6 +25,7 @@ SHOWS: tuple[Shows, ...] = get_args(Shows)
 DISC_PX, PICKED_PX = 3.5, 6.0  # radii, logical
 REACH_PX = 8.0  # from a disc's middle, that a click may be
 HIDDEN = 1.02  # a point farther than this times what was clicked is behind it
+CHOICE = "light_field-choice"  # the look-up that shows them
 HUES = np.array([0.618034, 0.754878, 0.569840])  # as shaders show which point a pixel took
 
 
@@ -94,8 +95,14 @@ class FieldDrawing:
 
     def _drawn(self, frame: FrameState, light_field: LightField, pixel_ratio: float) -> Any:
         numbers = np.arange(len(light_field.points), dtype=float)
-        radii = np.where(numbers == self._view.point, PICKED_PX, DISC_PX) * pixel_ratio
-        return self._discs.draw(frame, light_field.points, colours_of(numbers), radii)
+        picked = numbers == self._view.point
+        radii = np.where(picked, PICKED_PX, DISC_PX) * pixel_ratio
+        return self._discs.draw(frame, light_field.points, colours_of(numbers), radii, np.where(picked, 1.0, 0.0))
+
+
+def shows_choice(frame: FrameState) -> bool:
+    """Whether an object shows which points answer, in their colours."""
+    return CHOICE in (frame.lookup, *frame.lookups.values())
 
 
 def colours_of(numbers: Floats) -> Floats:

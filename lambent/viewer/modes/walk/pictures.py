@@ -19,10 +19,11 @@ from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
-from lambent.viewer.modes.walk.light_fields import FieldDrawing
+from lambent.viewer.modes.walk.light_fields import FieldDrawing, shows_choice
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
 from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.modes.walk.traced import TracedPicture
 from lambent.viewer.picture import Pair, Picture, size_px
 from lambent.viewer.screen import Rect, least
 from lambent.viewer.work import POLL_S
@@ -41,6 +42,9 @@ class Pictures(Pair):
         self._a = Picture(renderer, state.screen)
         renderer.waits = False  # for maps: the picture is drawn again when they are there
         self._b: Picture | None = None
+        self._traced: TracedPicture | None = None
+        self._stands_for: Any = None
+        self._stand_in: Any = None
         self.shown = (self._a,)
         self._film_renderer: Renderer | None = None
         self._outlining = Outlining(renderer)
@@ -57,6 +61,13 @@ class Pictures(Pair):
         return {**self._state.marks.images, **self._outlining.images, **self._fields.images, **own}
 
     @property
+    def views(self) -> tuple[Any, ...]:
+        """Of A and B; where B is not there yet, another view of A's texture: Dear ImGui drops views one by one."""
+        if any(picture.view is None for picture in self.shown) and self._stands_for is not self._a.view:
+            self._stands_for, self._stand_in = self._a.view, self._a.view.texture.create_view()
+        return tuple(self._stand_in if picture.view is None else picture.view for picture in self.shown)
+
+    @property
     def divider(self) -> Divider | None:
         beside = len(self.shown) == 2 and self._state.comparison.mode == "side by side"
         return self._state.comparison.divider if beside else None
@@ -67,13 +78,18 @@ class Pictures(Pair):
         self._film()
         wanted = self._frame(size_px(place, pixel_ratio))
         self._outlining.update(wanted, state.selection.record)
-        if state.comparison.on and state.films.under_way is None:
+        if self._traced is not None and not (state.comparison.is_traced and state.films.under_way is None):
+            self._traced.rest()
+        if state.comparison.is_traced and state.films.under_way is None:
+            self._compare_traced(wanted)
+        elif state.comparison.on and state.films.under_way is None:
             self._compare(wanted)
         else:
             state.comparison.forget()
             state.comparison.figures = None
             self.shown = (self._a,)
-            self._a.update(wanted, refine=None if state.films.under_way is None else False)
+            still = state.films.under_way is not None or shows_choice(wanted)  # a mean of points' colours is none of them
+            self._a.update(wanted, refine=False if still else None)
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
         state.marks.update(state.navigation.camera, size, look.display_transform, exposure_ev)
@@ -110,8 +126,10 @@ class Pictures(Pair):
             screen.say(f"saved {name}-error.png")
 
     def close(self) -> None:
-        """Cancel FLIP and the film under way."""
+        """Cancel FLIP, path tracing and the film under way."""
         self._state.comparison.forget()
+        if self._traced is not None:
+            self._traced.close()
         if self._state.films.under_way is not None:
             self._state.films.under_way.cancel()
 
@@ -138,24 +156,40 @@ class Pictures(Pair):
             + ([comparison.look_up] if comparison.look_up != AS_A else [])
             + ([f"{b.samples} samples"] if b.samples else [])
         )
-        self._measure(a, b)
+        self._measure(a, b, (a.version, comparison.integrator, comparison.look_up, comparison.mode))
+
+    def _compare_traced(self, wanted: FrameState) -> None:
+        """B by the path tracer, which has the processor's time that drawing leaves."""
+        comparison, a = self._state.comparison, self._a
+        if self._traced is None:
+            if self._state.store is None:
+                comparison.fault = "There is no store whose scene could be traced."
+                self.shown = (a,)
+                a.update(wanted, refine=False)
+                return
+            self._traced = TracedPicture(self._renderer.given(), self._state.screen, self._state.store)
+        b = self._traced
+        self.shown = (a, b)
+        b.update(wanted)
+        a.update(wanted, refine=False)
+        comparison.fault = b.fault
+        comparison.divider.a_label, comparison.divider.b_label = wanted.integrator, b.label
+        self._measure(a, b, (a.version, comparison.integrator, comparison.mode))
 
     def _another_renderer(self) -> Renderer:
         return Renderer(self.device, self._renderer.scene, beside=self._renderer)
 
-    def _measure(self, a: Picture, b: Picture) -> None:
-        """Compare A and B where both are whole and at rest."""
+    def _measure(self, a: Picture, b: Picture | TracedPicture, of: object) -> None:
+        """Compare A and B, the pictures of `of`, where both are whole and at rest."""
         comparison, look = self._state.comparison, self._state.look
         done = not a.under_way and a.wait_s() is None
-        at_rest = done and (b.samples > 0 or not (b.under_way or b.wait_s() is not None))
-        if not at_rest or a.radiance is None or b.radiance is None or a.radiance.size != b.radiance.size:
+        at_rest = done and (b.samples > 0 or (isinstance(b, Picture) and not b.under_way and b.wait_s() is None))
+        if not at_rest or not a.readable or not b.readable or a.size != b.size:
             comparison.figures = comparison.figures if at_rest else None
             comparison.forget()
-        elif comparison.due(
-            (a.version, comparison.integrator, comparison.look_up, comparison.mode), max(1, b.pacer.accumulated)
-        ):
+        elif comparison.due(of, max(1, b.accumulated)):
             view, exposure_ev = look.display_transform, look.exposure_ev
-            comparison.compare(a.read(), b.read(), view, exposure_ev, b.pacer.accumulated, b.samples)
+            comparison.compare(a.read(), b.read(), view, exposure_ev, b.accumulated, b.samples)
         comparison.tick()
 
     # readings

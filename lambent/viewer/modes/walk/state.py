@@ -136,6 +136,7 @@ class WalkState:
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)
+    store: Path | None = None  # its folder
     store_name: str = "STORE"
     missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map
@@ -157,6 +158,6 @@ class WalkState:
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
             Materials(MaterialEdits(scene.materials), screen), Recordings(views, navigation, screen, lights),
             Marks({}, scene.reflectors), meter=meter, lights=lights,
-            store_name="STORE" if store is None else store.name,
+            store=store, store_name="STORE" if store is None else store.name,
             missing=() if fault is None else (fault,),  # stays in sight: a message is gone before the window is there
         )  # fmt: skip

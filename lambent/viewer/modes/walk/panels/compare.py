@@ -5,8 +5,8 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.viewer.look import INTEGRATORS, LOOKUPS
-from lambent.viewer.modes.walk.comparison import AS_A, KINDS, MODES, Comparison
-from lambent.viewer.panels.widgets import choice, rows
+from lambent.viewer.modes.walk.comparison import AS_A, KINDS, MODES, TRACED, Comparison
+from lambent.viewer.panels.widgets import choice, rows, wrapped
 
 
 def draw(comparison: Comparison) -> None:
@@ -16,10 +16,18 @@ def draw(comparison: Comparison) -> None:
     if not comparison.on:
         imgui.text_wrapped("Off: the picture refines by itself while nothing moves.")
         return
-    meaning = "integrator of B; qmc is unbiased and accumulates while nothing moves, A stays that of motion"
-    comparison.integrator = choice("with B", comparison.integrator, INTEGRATORS, meaning)
-    meaning = "where B finds reflected light: as A, or of all objects by one look-up, as of the single probe by plain"
-    comparison.look_up = choice("look-up of B", comparison.look_up, (AS_A, *LOOKUPS), meaning)
+    meaning = (
+        "integrator of B; qmc is unbiased and accumulates while nothing moves, path traces the scene itself, beside the "
+        "window; A stays that of motion"
+    )
+    comparison.integrator = choice("with B", comparison.integrator, (*INTEGRATORS, TRACED), meaning)
+    if comparison.is_traced:
+        if comparison.fault:
+            wrapped([comparison.fault])
+            return
+    else:
+        meaning = "where B finds reflected light: as A, or of all objects by one look-up, as of the single probe by plain"
+        comparison.look_up = choice("look-up of B", comparison.look_up, (AS_A, *LOOKUPS), meaning)
     if comparison.mode == "error map":
         meaning = "the difference of luminance in percent of B's, or what a viewer notices (FLIP)"
         comparison.kind = choice("map", comparison.kind, KINDS, meaning)

@@ -1,0 +1,56 @@
+"""Radiance that was made elsewhere, shown as the renderer shows its own: exposure, view transform, false colours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import wgpu
+
+from lambent.core.arrays import Floats
+from lambent.realtime.frame_state import FrameState, frame_data
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.pipelines import cover, screen_pipeline
+from lambent.realtime.resources import SceneResources
+from lambent.realtime.structs import FRAME_DTYPE
+from lambent.realtime.targets import DISPLAY_FORMAT, target_texture
+
+
+class Given:
+    """One picture; `view` is that of the texture that shows it, None before the first `show`."""
+
+    def __init__(self, layouts: Layouts, resources: SceneResources) -> None:
+        self._layouts, self._scene, self._device = layouts, resources.scene, layouts.device
+        self._layout = layouts.of("exact", "exact")
+        self._pipeline = screen_pipeline(
+            self._device, "tonemap", [layouts.frame, self._layout], [DISPLAY_FORMAT], constants={"MARKED": False}
+        )
+        self._frame_buffer = layouts.uniform(FRAME_DTYPE.itemsize)
+        self._frame_group = layouts.group(layouts.frame, self._frame_buffer, resources.sampler)
+        self._group: Any = None
+        self._target: Any = None
+        self.view: Any = None
+
+    def take(self, radiance: Floats) -> None:
+        """Upload a picture (height, width, 3), W/(sr m^2); `show` shows it from then on."""
+        height, width = radiance.shape[:2]
+        texels = np.ones((height, width, 4), np.float32)
+        texels[..., :3] = radiance / self._scene.unit
+        usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
+        texture = self._device.create_texture(size=(width, height, 1), format="rgba32float", usage=usage)
+        rows = {"bytes_per_row": 16 * width, "rows_per_image": height}
+        self._device.queue.write_texture({"texture": texture}, texels, rows, (width, height, 1))
+        self._group = self._layouts.group(self._layout, texture.create_view(), texture.create_view())
+        self._target = target_texture(self._device, (width, height, 1), DISPLAY_FORMAT)
+        self.view = self._target.create_view()
+
+    def show(self, state: FrameState) -> None:
+        """Draw what was taken into `view`, with the exposure and the view transform of a state."""
+        data = frame_data(state, self._scene.record.bounds)
+        for factor in (data["exposure"], data["scale"][3:]):
+            factor *= self._scene.unit
+        data["prior"] = 0.0
+        self._device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
+        encoder = self._device.create_command_encoder()
+        cover(encoder, [self.view], self._pipeline, [self._frame_group, self._group], {})
+        self._device.queue.submit([encoder.finish()])
