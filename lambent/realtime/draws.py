@@ -32,6 +32,7 @@ class Draw:
     table: LampUse = ""  # what it does with the lamps of its probe
     planar_n: int = 0  # samples per lobe where it has pixels on planar reflectors; 0 where it has none
     is_beyond: bool = False  # the light of a part, added to its neighbours
+    is_dark: bool = False  # drawn without what it emits
 
     def by(self, how: Integrator, resources: SceneResources, n: int) -> Draw:
         """The same object by another integrator that does not aim, for a pass that does not read reflections."""
@@ -77,7 +78,7 @@ class Draw:
 
     @property
     def object_group(self) -> Any:
-        return self.item.group(self.cube, self.look_up, self.table)
+        return self.item.group(self.cube, self.look_up, self.table, self.is_dark)
 
     @property
     def constants(self) -> dict[str, float]:

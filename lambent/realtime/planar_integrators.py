@@ -6,6 +6,9 @@ integrator without one shows the probes on planar reflectors, too.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 
 from lambent.core.arrays import Floats
@@ -78,9 +81,16 @@ PLANAR: dict[str, dict[str, Integrator]] = {
     "qmc-lobe": {"qmc": Integrator("planar_qmc.wgsl")},  # its samples follow the lobe already
 }
 PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc-lobe"]
-PLANAR["lamps"] = PLANAR["rings"]  # the buffer has its lamps; what it does not hold comes from the whole probe
+# Small lamps leave the mirrored view (reflector_lamps.py); what that does not hold comes from the whole probe.
+PLANAR["lamps"] = {name: replace(how, lamps=how.shader) for name, how in PLANAR["rings"].items()}
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
+
+
+@cache
+def with_lamps(how: Integrator, count: int) -> Integrator:
+    """A planar integrator that evaluates `count` lamps of a reflector by themselves."""
+    return replace(how, constants={**how.constants, "LAMPS": count})
 
 
 def planar_integrator(integrator: str, method: str) -> Integrator | None:

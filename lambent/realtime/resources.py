@@ -22,6 +22,7 @@ from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.parts import WITHIN, neighbouring_faces
 from lambent.realtime.pipelines import VERTEX_FLOATS
 from lambent.realtime.probe_light import ProbeLight, kind_of
+from lambent.realtime.reflector_lamps import LampsOverReflectors
 from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
@@ -55,12 +56,15 @@ class ObjectResources:
             self.light, self.emission = light, emission
             self.group.cache_clear()
 
-    def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
-        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
+    def _new_group(self, cube: Cube, look_up: LookUp, table: str = "", dark: bool = False) -> Any:
+        """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none.
+
+        `dark`: without the object's own emission.
+        """
         probe = self.light.probe
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
-        data["emission"][0, :3] = np.array(self.emission) / self._unit
+        data["emission"][0, :3] = 0 if dark else np.array(self.emission) / self._unit
         data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
         uniform = self._layouts.buffer("UNIFORM", data)
@@ -112,6 +116,7 @@ class SceneResources:
         self.whole_ranges = merged(((r.first_face, r.first_face + r.face_count) for r in whole), gap=1)
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
+        self.reflector_lamps = LampsOverReflectors(layouts, self)
 
     def show_light_map(self, sides: Sequence[NDArray[np.float16] | None]) -> None:
         """Show other light maps (H, W, 4) on the front and the back; None of a side that stays."""

@@ -11,22 +11,17 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
-from lambent.realtime.clusters import merged
-from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.layouts import SHADOW_MAP, Layouts
 from lambent.realtime.panes import PaneLayers, no_panes, pane_layers
-from lambent.realtime.pipelines import pipeline
-from lambent.realtime.shader_source import assemble
-from lambent.realtime.structs import FRAME_DTYPE, SUN_DTYPE, Record
+from lambent.realtime.solid_depths import SolidDepths, depth_texture, read_depths
+from lambent.realtime.structs import SUN_DTYPE, Record
 from lambent.realtime.sun_squares import SIDE, SunSquares, squares_of
-from lambent.realtime.targets import DEPTH_FORMAT
 from lambent.realtime.uploads import upload
 from lambent.store.contract import SunRecord
 
@@ -51,7 +46,7 @@ class SunLight:
         self.shine(sun.irradiance if sun is not None else (0.0, 0.0, 0.0))
         self.nowhere = upload(layouts.device, [np.zeros((1, 1, 1, 1), np.float16)], "r16float").create_view()
         if squares is not None:
-            read = [_read(layouts.device, depths, layer) for layer in range(len(squares.squares))]
+            read = [read_depths(layouts.device, depths, layer) for layer in range(len(squares.squares))]
             blocks = upload(layouts.device, [block_ranges(np.stack(read))], "rg32float")
             textures = (depths, blocks, panes.depths, panes.colours)
             views = (texture.create_view(dimension="2d-array") for texture in textures)
@@ -106,38 +101,12 @@ def _with_neighbours(least: Floats, greatest: Floats) -> Floats:
 
 def draw_depths(layouts: Layouts, squares: SunSquares, resources: Any, panes: Collection[str] = ()) -> Any:
     """Texture of a layer for each square, with the depths of what blocks the sun (of `resources.SceneResources`)."""
-    device, groups = layouts.device, [layouts.frame, layouts.material]
-    texture = _depth_texture(device, SIDE, len(squares.squares))
-    whole, masked = (device.create_shader_module(code=assemble(name)) for name in ("vertex.wgsl", "mask.wgsl"))
-    draw_whole = pipeline(device, whole, "", groups[:1], (), compare="greater", writes_depth=True)
-    draw_masked = pipeline(device, masked, "mask_main", groups, (), compare="greater", writes_depth=True)
-    records = [item.record for item in resources.objects if item.record.material not in panes]
-    whole_ranges = merged(
-        ((r.first_face, r.first_face + r.face_count) for r in records if r.name not in resources.masked), gap=1
-    )
-    encoder = device.create_command_encoder()
+    texture = depth_texture(layouts.device, SIDE, SIDE, len(squares.squares))
+    solid, encoder = SolidDepths(layouts, resources, materials=panes), layouts.device.create_command_encoder()
     for layer, square in enumerate(squares.squares):
-        data = np.zeros((), FRAME_DTYPE)
-        data["clip_from_world"] = squares.clip_from_world(square).T
-        frame = layouts.group(layouts.frame, layouts.buffer("UNIFORM", data), resources.sampler)
         view = texture.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)
-        depth = {"view": view, "depth_clear_value": 0.0, "depth_load_op": "clear", "depth_store_op": "store"}
-        render = encoder.begin_render_pass(color_attachments=[], depth_stencil_attachment=depth)
-        render.set_bind_group(0, frame)
-        render.set_vertex_buffer(0, resources.vertices)
-        render.set_index_buffer(resources.indices, "uint32")
-        render.set_pipeline(draw_whole)
-        for first, count in whole_ranges:
-            render.draw_indexed(count * 3, 1, first * 3)
-        for record in records:
-            if record.name in resources.masked:
-                material = resources.scene.record.materials[record.material]
-                group = resources.materials[record.material].group(material, INTEGRATORS["diffuse"], 1)
-                render.set_pipeline(draw_masked)
-                render.set_bind_group(1, group)
-                render.draw_indexed(record.face_count * 3, 1, record.first_face * 3)
-        render.end()
-    device.queue.submit([encoder.finish()])
+        solid.draw(encoder, view, squares.clip_from_world(square))
+    layouts.device.queue.submit([encoder.finish()])
     return texture
 
 
@@ -151,16 +120,3 @@ def sun_light(layouts: Layouts, scene: BakedScene, resources: Any) -> SunLight:
     names = scene.sun.panes
     depths = draw_depths(layouts, squares, resources, names)
     return SunLight(layouts, scene.sun, squares, depths, pane_layers(layouts, squares, resources, depths, names))
-
-
-def _depth_texture(device: Any, side: int, layers: int) -> Any:
-    usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_SRC
-    return device.create_texture(size=(side, side, layers), format=DEPTH_FORMAT, usage=usage)
-
-
-def _read(device: Any, texture: Any, layer: int) -> NDArray[np.float32]:
-    """(side, side) depths of a layer; waits for the GPU."""
-    side = texture.size[0]
-    source = {"texture": texture, "origin": (0, 0, layer)}
-    data = device.queue.read_texture(source, {"bytes_per_row": 4 * side}, (side, side, 1))
-    return np.frombuffer(data, np.float32).reshape(side, side)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 from lambent.realtime.context import FrameContext
@@ -10,11 +10,13 @@ from lambent.realtime.integrators import Integrator
 from lambent.realtime.layouts import LIGHT, Layouts
 from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import Shading, Stage
-from lambent.realtime.passes.planar_buffer import PlanarBufferPass, PlanarCells
+from lambent.realtime.passes.planar_buffer import PlanarBuffer, PlanarBufferPass, PlanarCells
 from lambent.realtime.pipelines import screen_pipeline
-from lambent.realtime.planar_integrators import interleaved_table, planar_integrator
+from lambent.realtime.planar_integrators import interleaved_table, planar_integrator, with_lamps
 from lambent.realtime.planar_view import PlanarView
+from lambent.realtime.reflector_lamps import ReflectorLamps
 from lambent.realtime.slices import Steps
+from lambent.realtime.structs import PLANE_LAMPS_DTYPE
 from lambent.realtime.targets import stored, target_texture
 
 FORMAT = "rgba16float"
@@ -30,7 +32,8 @@ class PlanarPass:
         self._buffers, self._cells = PlanarBufferPass(layouts, depth), PlanarCells(layouts)
         # Bindings without gaps: a software Vulkan (Mesa 22.3) dies of them. The light maps of shading, which have the
         # same number, are not read here.
-        self._hits = layouts.of("uniform", "flat", "exact", "exact")
+        self._hits = layouts.of("uniform", "layers", "exact", "exact", "uniform", "storage")
+        self._lamps = cache(lambda index: layouts.uniform(PLANE_LAMPS_DTYPE.itemsize))
         self._shading = Shading(layouts, STAGE, self._hits)
         self.reflections = layouts.of(*LIGHT, "exact layers")
         found = layouts.of("exact layers")
@@ -46,23 +49,41 @@ class PlanarPass:
         layers = [
             texture.create_view(dimension="2d", base_array_layer=i, array_layer_count=1) for i in range(FOUND + CLEANED)
         ]
-        for index, (view, mirrored) in enumerate(zip(context.views, self._buffers.mirrored(context), strict=True)):
-            yield from self._buffers.encode(mirrored, index, view)
-            yield from self._encode_hits(context, index, view, how, layers[:FOUND])
+        lamps = [self._lamps_of(context, view, how) for view in context.views]
+        for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context, lamps)):
+            yield from self._buffers.encode(mirrored, index, context.views[index], buffer, lamps[index])
+            yield from self._encode_hits(context, index, how, buffer, lamps[index], layers[:FOUND])
         self._encode_clean(context, how, texture, layers[FOUND:])
         views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
         yield
 
+    def _lamps_of(self, context: FrameContext, view: PlanarView, how: Integrator) -> ReflectorLamps | None:
+        """The lamps that leave a mirrored view, None where no lobe of its reflector is wide enough for any."""
+        if how.lamps is None:
+            return None
+        found = context.resources.reflector_lamps.of(view)
+        mine = [draw for draw in context.draws if view.has(draw.item.record)]
+        served = found is not None and any(
+            found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
+            for draw in mine
+        )
+        return found if served else None
+
     def _encode_hits(
-        self, context: FrameContext, index: int, view: PlanarView, how: Integrator, layers: list[Any]
-    ) -> Steps:
+        self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, lamps: ReflectorLamps | None,
+        layers: list[Any],
+    ) -> Steps:  # fmt: skip
         """The light of one view's pixels, band by band."""
-        uniform, buffer = self._buffers.uniform(index), self._buffers.buffer(view.size)
+        view, uniform, of_lamps = context.views[index], self._buffers.uniform(index), self._lamps(index)
+        how = how if lamps is None else with_lamps(how, len(lamps.lamps))
+        if lamps is not None:
+            self._layouts.device.queue.write_buffer(of_lamps, 0, lamps.record(view).tobytes())
         if how.constants.get("CELL_STEPS"):
             self._cells.encode(context, buffer.planes, view.size, uniform)
         cells = self._cells.views(view.size)[0]
-        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells)
+        seen = self._layouts.empty if lamps is None else lamps.map
+        group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, cells, of_lamps, seen)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
         for band in context.slicing.bands("planar", context.state.size):

@@ -5,19 +5,22 @@ Beside it the walls that end the view, and the nearest surface in each of its ce
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from itertools import pairwise
 from typing import Any
 
 from lambent.realtime.context import FrameContext
 from lambent.realtime.integrators import INTEGRATORS
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.passes.depth import DepthPass
+from lambent.realtime.passes.depth import DepthPass, draw_seen, set_geometry
 from lambent.realtime.passes.light import Shading, Stage
 from lambent.realtime.passes.sun import SunPass
-from lambent.realtime.pipelines import screen_pipeline
+from lambent.realtime.pipelines import pipeline, screen_pipeline
 from lambent.realtime.planar_view import MOST_REFLECTORS, PlanarView, levels_of
+from lambent.realtime.reflector_lamps import ReflectorLamps
+from lambent.realtime.shader_source import assemble
 from lambent.realtime.slices import Steps
 from lambent.realtime.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
 from lambent.realtime.targets import DEPTH_FORMAT, Target, target_texture
@@ -40,16 +43,25 @@ class PlanarBuffer:
     """Textures of one size, used by all reflectors that need it, one after the other, and their views."""
 
     target: Target
-    light: Any  # all levels
-    levels: list[Any]
+    light: Any  # all levels and layers
+    layers: list[list[Any]]  # levels of the light, and of what is seen of lamps, where that is asked
     planes: Any
 
     @staticmethod
-    def of(device: Any, size: tuple[int, int]) -> PlanarBuffer:
+    def of(device: Any, size: tuple[int, int], with_lamps: bool = False) -> PlanarBuffer:
         depth, planes = (target_texture(device, size, format) for format in (DEPTH_FORMAT, PLANE_FORMAT))
-        light = target_texture(device, size, LIGHT_FORMAT, levels_of(size))
-        levels = [light.create_view(base_mip_level=i, mip_level_count=1) for i in range(levels_of(size))]
-        return PlanarBuffer(Target(depth, light), light.create_view(), levels, planes.create_view())
+        light = target_texture(device, (*size, 1 + with_lamps), LIGHT_FORMAT, levels_of(size))
+        layers = [
+            [
+                light.create_view(
+                    dimension="2d", base_array_layer=layer, array_layer_count=1, base_mip_level=i, mip_level_count=1
+                )
+                for i in range(levels_of(size))
+            ]
+            for layer in range(1 + with_lamps)
+        ]
+        whole = light.create_view(dimension="2d-array")
+        return PlanarBuffer(Target(depth, light), whole, layers, planes.create_view())
 
 
 class PlanarWalls:
@@ -111,6 +123,30 @@ class PlanarCells:
             finer = into
 
 
+class PlanarLampsShown:
+    """What a mirrored view shows of lamps that are drawn there without their light, a channel for each object."""
+
+    def __init__(self, layouts: Layouts) -> None:
+        module = layouts.device.create_shader_module(code=assemble("planar_lamps_shown.wgsl"))
+        self._pipeline = cache(
+            lambda channel: pipeline(
+                layouts.device, module, "planar_lamps_shown_main", [layouts.frame], [LIGHT_FORMAT], compare="equal",
+                front_face=STAGE.front_face, constants={"CHANNEL": channel},
+            )
+        )  # fmt: skip
+
+    def encode(self, context: FrameContext, objects: Sequence[str], view: Any) -> None:
+        """Draw into the target `view`, where the mirrored view's depth is."""
+        render, seen = context.begin("mirror", [view], "clear"), context.seen()
+        set_geometry(render, context.resources)
+        for draw in context.draws:
+            record = draw.item.record
+            if record.name in objects:
+                render.set_pipeline(self._pipeline(objects.index(record.name)))
+                context.counts["draw_calls"] += draw_seen(render, seen, record.first_face, record.face_count)
+        render.end()
+
+
 class PlanarBufferPass:
     """Draws the mirrored views of a frame; they may share a buffer, so each is shaded from before the next is drawn."""
 
@@ -119,30 +155,43 @@ class PlanarBufferPass:
         self._layouts, self._depth = layouts, depth
         self._sun = SunPass(layouts, "cw")
         self._shading, self._walls = Shading(layouts, STAGE, layouts.light), PlanarWalls(layouts)
-        self.buffer = lru_cache(MOST_REFLECTORS)(lambda size: PlanarBuffer.of(device, size))
+        self.buffer = lru_cache(MOST_REFLECTORS)(lambda size, lamps: PlanarBuffer.of(device, size, lamps))
+        self._lamps = PlanarLampsShown(layouts)
         self.uniform = cache(lambda index: layouts.uniform(MIRRORED_VIEW_DTYPE.itemsize))
         self._frame = cache(lambda index: layouts.uniform(FRAME_DTYPE.itemsize))
         groups = [layouts.frame, layouts.cube]
         self._sky = screen_pipeline(device, "planar_buffer_sky", groups, FORMATS, compare="equal")
         self._mips = screen_pipeline(device, "planar_buffer_mips", [layouts.shown], [LIGHT_FORMAT])
 
-    def mirrored(self, context: FrameContext) -> Iterator[FrameContext]:
-        """The mirrored frames of a frame, one after the other; `uniform` has the record of each."""
+    def mirrored(
+        self, context: FrameContext, lamps: Sequence[ReflectorLamps | None]
+    ) -> Iterator[tuple[FrameContext, PlanarBuffer]]:
+        """The mirrored frames of a frame, one after the other, and their buffers; `uniform` has the record of each.
+
+        `lamps` are those that leave each view.
+        """
         write, layouts = self._layouts.device.queue.write_buffer, self._layouts
         wanted = INTEGRATORS[context.state.integrator]
         few = INTEGRATORS["lamps" if wanted.lamps or wanted.progressive else "rings"]  # published ones, as they were
         diffuse = INTEGRATORS["diffuse"]
         draws = [d.by(few if d.material.lobes else diffuse, context.resources, MIRRORED_N) for d in context.draws]
-        for index, view in enumerate(context.views):
+        for index, (view, gone) in enumerate(zip(context.views, lamps, strict=True)):
             write(self._frame(index), 0, view.frame.tobytes())
             write(self.uniform(index), 0, view.uniform.tobytes())
             group = layouts.group(layouts.frame, self._frame(index), context.resources.sampler)
-            target = self.buffer(view.size).target
-            yield replace(context, data=view.frame, frame_group=group, draws=draws, target=target, shown=None)
+            buffer = self.buffer(view.size, gone is not None)
+            names = gone.objects if gone else ()
+            shown = [replace(d, is_dark=True) if d.item.record.name in names else d for d in draws]
+            frame = replace(
+                context, data=view.frame, frame_group=group, draws=shown, target=buffer.target, shown=None
+            )  # fmt: skip
+            yield frame, buffer
 
-    def encode(self, context: FrameContext, index: int, view: PlanarView) -> Steps:
+    def encode(
+        self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer, lamps: ReflectorLamps | None
+    ) -> Steps:
         """Draw a mirrored frame, band by band."""
-        buffer, resources = self.buffer(view.size), context.resources
+        resources = context.resources
         render = context.begin("mirror", [], "clear", depth="clear")
         context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
         render.end()
@@ -150,7 +199,7 @@ class PlanarBufferPass:
         yield from self._sun.encode(context)
         light = self._layouts.group(self._layouts.light, *context.light)
         for band in context.slicing.bands("mirror", view.size):
-            render = context.begin("mirror", [buffer.levels[0], buffer.planes], band.load_op, band=band)
+            render = context.begin("mirror", [buffer.layers[0][0], buffer.planes], band.load_op, band=band)
             seen = context.seen(band.shares)
             self._shading.draw(render, context, context.draws, seen, FORMATS, light)
             render.set_pipeline(self._sky)
@@ -159,6 +208,8 @@ class PlanarBufferPass:
             context.counts["draw_calls"] += 1
             render.end()
             yield
-        for finer, into in zip(buffer.levels, buffer.levels[1:], strict=False):
+        if lamps is not None:
+            self._lamps.encode(context, lamps.objects, buffer.layers[1][0])
+        for finer, into in (pair for levels in buffer.layers for pair in pairwise(levels)):
             group = self._layouts.group(self._layouts.shown, finer, resources.sampler)
             context.cover("mips", [into], self._mips, [group])

@@ -16,7 +16,7 @@ fn integrate_planar(index: u32, wo: vec3f, s: Surface, place: Place) -> vec4f {
         let jitter = f32(((frame.first_sample + k) * 2654435769u + offset.x) >> 8u) / 16777216.0;
         let hit = march(place, to_world(s, at.wi), jitter);
         let inside = hit.inside;
-        sum += g * inside * buffer_sample(hit.texel, 0.0);
+        sum += g * inside * buffer_sample(hit.texel, 0.0, mat4x3f());
         let share = 1.0 - inside;
         beyond = Beyond(beyond.gain + share * g, beyond.w + share * at.wi, beyond.omega + share * 1e-6);
     }

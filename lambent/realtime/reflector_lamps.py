@@ -1,0 +1,100 @@
+"""The lamps of planar reflectors on the GPU: what shaders/planar_lamps.wgsl reads of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.materials.document import Lobe
+from lambent.realtime.lamp_maps import PlaneFrame, lamp_map
+from lambent.realtime.layouts import Layouts
+from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
+from lambent.realtime.planar_view import PlanarView
+from lambent.realtime.structs import PLANE_LAMPS_DTYPE, Record
+
+OUT_FROM = 0.5  # of a lamp's radius, as in shaders/planar_lamps.wgsl: narrower lobes leave all lamps in the buffer
+FADE_PX = 24.0  # as in shaders/planar.wgsl
+GRID = 5  # places along each side of a reflector from which lamps' shapes are seen
+
+
+class ReflectorLamps:
+    """The lamps over one side of one reflector, at least one. The map is drawn when it is first asked for."""
+
+    def __init__(
+        self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats, clearance_m: float
+    ) -> None:  # fmt: skip
+        self.lamps = lamps
+        self.objects = list(dict.fromkeys(lamp.object for lamp in lamps))  # in the order of their channels
+        self._layouts, self._resources, self._plane, self._clearance_m = layouts, resources, plane, clearance_m
+        self._frame = PlaneFrame.about(outline, plane[:3])
+        width, height = self._frame.size
+        columns, rows = np.meshgrid(np.linspace(0, width, GRID), np.linspace(0, height, GRID))
+        grid = self._frame.points(columns, rows).reshape(-1, 3)
+        self._spreads = [lamp.spread_from(grid) for lamp in lamps]
+        self._radii_m = [float(np.sqrt(2 * np.linalg.eigvalsh(spread)[-1])) for spread in self._spreads]
+        far_m = [float(np.linalg.norm(grid - lamp.centre, axis=1).max()) for lamp in lamps]
+        self._least_radius_rad = min(radius / far for radius, far in zip(self._radii_m, far_m, strict=True))
+
+    def serve(self, lobes: Iterable[Lobe], widest_factor: float = 1.0) -> bool:
+        """Whether a lamp may leave the buffer for one of the lobes, whose widths textures may multiply."""
+        widest = max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in lobes), default=0.0) * widest_factor
+        return widest > OUT_FROM * self._least_radius_rad
+
+    @cached_property
+    def map(self) -> Any:
+        """Buffer of the solid angles that the reflector's points see."""
+        given = self._layouts, self._resources, self.lamps, self._frame, self._plane, self._clearance_m
+        return self._layouts.buffer("STORAGE", lamp_map(*given))
+
+    def record(self, view: PlanarView) -> Record:
+        """Record of PLANE_LAMPS_DTYPE for one frame."""
+        data = np.zeros((), PLANE_LAMPS_DTYPE)
+        data["to_column"], data["to_row"] = self._frame.texel_rows()
+        data["size"][:2] = self._frame.size
+        for row, lamp, spread, radius_m in zip(data["lamps"], self.lamps, self._spreads, self._radii_m, strict=False):
+            row["centre"][:] = *lamp.centre, inside_share(view, lamp.middles)
+            row["spread"][:, :3] = spread
+            row["emission"][:] = *np.array(lamp.emission) / self._resources.scene.unit, radius_m
+            row["channel"][self.objects.index(lamp.object)] = 1
+        return data
+
+
+class LampsOverReflectors:
+    """The lamps of every reflector of a scene, from either side, found when a frame first shows it."""
+
+    def __init__(self, layouts: Layouts, resources: Any) -> None:
+        """`resources` is a `SceneResources`."""
+        self._layouts, self._resources = layouts, resources
+        self._found: dict[Any, ReflectorLamps | None] = {}
+
+    @cached_property
+    def _lamps(self) -> list[PlaneLamp]:
+        return lamps_of(self._resources.scene)
+
+    def of(self, view: PlanarView) -> ReflectorLamps | None:
+        """Those of a view's reflector, None where there are none."""
+        plane = np.asarray(view.uniform["plane"], float)
+        key = view.reflector.outline, bool(plane[:3] @ np.asarray(view.reflector.plane[:3]) > 0)
+        if key not in self._found:
+            clearance_m = float(view.uniform["tolerance"])
+            lamps = over(self._lamps, view.reflector, plane, clearance_m)
+            outline = np.asarray(view.reflector.outline, float)
+            given = self._layouts, self._resources, lamps, outline, plane, clearance_m
+            self._found[key] = ReflectorLamps(*given) if lamps else None
+        return self._found[key]
+
+
+def inside_share(view: PlanarView, places: Floats) -> float:
+    """Share, 0 to 1, of places (K, 3) that lie within a mirrored view; it fades out beyond its edges (planar.wgsl)."""
+    uniform = view.uniform
+    q = places - uniform["eye"][:3]
+    x, y, depth = (q @ uniform[name][:3].astype(float) for name in ("row_x", "row_y", "row_w"))
+    clip = np.stack([x, -y], axis=-1) / np.maximum(depth, 1e-6)[:, None]
+    texel = (clip + 1) / 2 * uniform["size"]
+    beyond = np.maximum(np.maximum(-texel, texel - uniform["size"]), 0).max(axis=-1)
+    share = np.clip(1 - beyond / FADE_PX, 0, 1)
+    return float(np.mean(np.where(depth > 1e-6, share * share * (3 - 2 * share), 0)))
