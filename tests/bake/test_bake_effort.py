@@ -56,6 +56,10 @@ def test_paths_go_where_the_noise_is() -> None:
     assert np.allclose(_blocks_needed(total, squares, 4, 0.01), [1, MOST, 1])
 
 
+def test_a_black_probe_of_any_noise_needs_no_more_paths() -> None:
+    assert (_blocks_needed(np.zeros((3, 3)), np.zeros((3, 3)), 4, np.inf) == 1).all()
+
+
 def test_bins_as_one_number_are_the_bins() -> None:
     rng = np.random.default_rng(0)
     normals, steps = rng.integers(-6, 7, (2000, 3)), rng.integers(-40, 9, 2000)
