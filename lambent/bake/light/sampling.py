@@ -78,7 +78,7 @@ def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int,
     raw = np.zeros((2, height * width, channels), np.float32)
     if not len(mine):
         return raw.reshape(2, height, width, channels)
-    points = _points(sides, mine)
+    points = points_of(sides, mine)
     sums = np.zeros((2, len(mine), 3 + 3 * how.parts))
     fewest, most = how.samples
     passes = 0
@@ -109,7 +109,7 @@ def relative_noise(halves: Floats, share: Floats | None = None) -> float:
     return float(np.sqrt(np.mean(squares)) / mean) if mean > 0 else 0.0
 
 
-def _points(sides: Sides, mine: Indices) -> path_tracer.Points:
+def points_of(sides: Sides, mine: Indices) -> path_tracer.Points:
     """POINTS of each of some texels on the device, invalid ones replaced by valid ones of the same texel."""
     valid = sides.valid[mine]
     ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, taken in turn

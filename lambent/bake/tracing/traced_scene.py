@@ -132,6 +132,11 @@ class TracedScene:
     def texels(self) -> Texels:
         return texels_of(self.merged, self.atlas.width, self.atlas.height)
 
+    @property
+    def crossed(self) -> Flags:
+        """(T,) faces of objects whose back has a light map too."""
+        return self._two_sided
+
     @cached_property
     def cuts(self) -> Cuts:
         return cuts_of(self.merged, self.atlas.width, self.atlas.height)

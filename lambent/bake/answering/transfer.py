@@ -1,0 +1,131 @@
+"""Light between patches, and light from patches to the points that gather it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.answering.patches import Clusters
+from lambent.bake.answering.rays import NOWHERE, RayEnds
+from lambent.bake.answering.spots import Spots
+from lambent.bake.surfaces.texels import Sides
+from lambent.bake.tiles import seed_of
+from lambent.core.answer import packed_rays
+from lambent.core.arrays import Floats, Indices
+
+LEAST_SENT = 1e-9  # of the brightest patch: darker ones send as if they were even
+RAYS_OF_TEXEL = 32
+STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
+
+
+class Between:
+    """Rays between the texels of a scene, as rays between its patches."""
+
+    def __init__(self, ends: RayEnds, spots: Spots, sides: list[Sides], clusters: Clusters, exitance: Floats) -> None:
+        self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
+        width, height = sides[0].texels.width, sides[0].texels.height
+        self._patch = np.full(width * height * 2, -1)
+        self._shape = np.zeros(width * height * 2, np.float32)
+        patch_light = patch_means(spots, clusters, exitance[..., None])[:, 0]
+        for side in range(2):
+            of = clusters.of[side]
+            there = of >= 0
+            mean = patch_light[of]
+            bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
+            relative = np.divide(exitance[side], mean, out=there.astype(float), where=bright)
+            self._patch[spots.index * 2 + side], self._shape[spots.index * 2 + side] = of, relative
+
+    def patches_met(self, side: int, mine: Indices, count: int, seed: int) -> tuple[Indices, Floats]:
+        """Patches (n, count) that rays from texels `mine` (n,) of a side end on, -1 for none, and their weights.
+
+        A weight is that of the patch's mean exitance: the light within a patch is in it.
+        """
+        spot, weight = self._ends.from_texels(self._sides[side], mine, count, seed)
+        at = np.where(spot == NOWHERE, 0, spot).astype(np.int64)
+        patch = np.where(spot == NOWHERE, -1, self._patch[at])
+        return patch, np.where(patch >= 0, weight * self._shape[at], 0.0)
+
+    def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
+        """Rows [first, last) of F (., P): means over `rays` from each patch, spread over its texels by area."""
+        rows = np.zeros((last - first, self._clusters.count), np.float32)
+        for side in range(2):
+            texel, patch = self._drawn(side, first, last, rays, seed)
+            if not len(texel):
+                continue
+            met, weight = self.patches_met(side, texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
+            known = met >= 0
+            place = ((patch - first)[:, None] * rows.shape[1] + met)[known]
+            sums = np.bincount(place, weight[known], rows.size).reshape(rows.shape)
+            drawn = np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
+            rows += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
+        return rows
+
+    def _drawn(self, side: int, first: int, last: int, rays: int, seed: int) -> tuple[Indices, Indices]:
+        """Texels of a side by area, with replacement in patches of few, and the patch of each."""
+        of, rng = self._clusters.of[side], np.random.default_rng((seed, side))
+        mine = np.flatnonzero(self._spots.lit[side] & (of >= first) & (of < last))
+        mine = mine[np.argsort(of[mine], kind="stable")]
+        wanted = max(1, rays // RAYS_OF_TEXEL)
+        texels, patches = [], []
+        for patch, one in _runs(of[mine], mine):
+            sums = np.cumsum(self._spots.area[one])
+            at = (np.arange(wanted) + rng.random(wanted)) / wanted * sums[-1]
+            texels.append(one[np.searchsorted(sums, at, side="right").clip(0, len(one) - 1)])
+            patches.append(np.full(wanted, patch))
+        nothing: Indices = np.zeros(0, np.int64)
+        return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
+
+    def gathered_rays(self, side: NDArray[np.integer], texel: Indices, count: int, seed: int) -> NDArray[np.uint8]:
+        """`packed_rays` (n, count, 3) from points: their sides and texels (n,)."""
+        found = np.zeros((len(texel), count, 3), np.uint8)
+        for one in range(2):
+            mine = np.flatnonzero(side == one)
+            if len(mine):
+                patch, weight = self.patches_met(one, texel[mine], count, seed_of(seed, "gather", one))
+                found[mine] = packed_rays(patch, weight)
+        return found
+
+
+def _runs(keys: Indices, values: Indices) -> list[tuple[int, Indices]]:
+    """Values by key; keys are sorted."""
+    if not len(keys):
+        return []
+    cuts = np.flatnonzero(np.diff(keys)) + 1
+    return [(int(k[0]), v) for k, v in zip(np.split(keys, cuts), np.split(values, cuts), strict=True)]
+
+
+def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
+    """(P, C) means over the area of each patch of values (2, K, C); over its lit texels where it has any."""
+    total, lit_total = np.zeros((2, clusters.count, values.shape[-1]))
+    area, lit_area = np.zeros((2, clusters.count))
+    for side in range(2):
+        for mask, sums, areas in ((spots.there, total, area), (spots.lit, lit_total, lit_area)):
+            mine = np.flatnonzero(mask[side] & (clusters.of[side] >= 0))
+            of, weight = clusters.of[side][mine], spots.area[mine]
+            areas += np.bincount(of, weight, clusters.count)
+            for channel in range(values.shape[-1]):
+                sums[:, channel] += np.bincount(of, weight * values[side, mine, channel], clusters.count)
+    means = total / np.maximum(area, 1e-30)[:, None]
+    lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
+    return np.where((lit_area > 0)[:, None], lit, means)
+
+
+def hits_from_viewed(ends: RayEnds, spots: Spots, sides: list[Sides], rays: int, seed: int) -> Floats:
+    """(2, K) rays that end on each texel and side, from some of the texels that viewers see."""
+    texels = sides[0].texels
+    number = np.full(texels.width * texels.height, -1)
+    number[spots.index] = np.arange(len(spots.index))
+    found = np.zeros((2, len(spots.index)))
+    for side, of_side in enumerate(sides):
+        mine = np.flatnonzero(spots.lit[side])[::STRIDE]
+        if not len(mine):
+            continue
+        spot, weight = ends.from_texels(of_side, mine, rays, seed_of(seed, "importance", side))
+        met = spot[spot != NOWHERE].astype(np.int64)
+        area = np.broadcast_to(spots.area[mine][:, None], spot.shape)[spot != NOWHERE]
+        at = number[met // 2]
+        share = np.minimum(weight[spot != NOWHERE], 1) * area
+        for other in range(2):
+            chosen = (at >= 0) & (met % 2 == other)
+            found[other] += np.bincount(at[chosen], share[chosen], len(spots.index))
+    return found

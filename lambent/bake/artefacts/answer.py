@@ -1,0 +1,203 @@
+"""What the light of a baked scene needs to answer other colours of its materials: `store.answer`, `core.answer`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_maps
+from lambent.bake.artefacts.probe import sharing
+from lambent.bake.context import BakeContext
+from lambent.bake.engine import engine
+from lambent.bake.keys import key_of
+from lambent.bake.quality import QualityName
+from lambent.bake.tiles import run_tiles
+from lambent.core.arrays import Floats
+from lambent.core.colour import HALF_MAX
+from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
+from lambent.store.contract import probe_name, shared_probes
+
+if TYPE_CHECKING:
+    from lambent.bake.answering.patches import Clusters
+    from lambent.bake.answering.rays import RayEnds
+    from lambent.bake.answering.spots import Spots
+
+KIND = "answer"
+NEEDS = ("geometry", "light_map", "probe")
+REVISION = 1
+TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
+MAPS = tuple(answer_name(part) for part in DIRECT)
+PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
+BETWEEN = ("transfer", "rays", "texels", "near", "shares")
+SEEN = ("spots", "tint", "sun")
+TILES = 16  # of transfer and of rays
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Patches, rays from each, and what light is gathered with.
+
+    Texels get `direct_samples` of direct light. One texel of each block of `block` x `block` texels gathers by
+    `gather_rays`.
+    """
+
+    patches: int = 1000
+    patch_rays: int = 4096
+    gather_rays: int = 256
+    block: int = 4
+    direct_samples: int = 32
+    importance_rays: int = 16
+
+
+SETTINGS = {
+    QualityName.preview: Settings(),
+    QualityName.normal: Settings(patch_rays=8192, block=8, direct_samples=64),
+    QualityName.final: Settings(patch_rays=16384, gather_rays=512, block=12, direct_samples=256),
+}
+
+
+def keys(context: BakeContext) -> dict[str, str]:
+    how: Settings = context.settings(KIND)
+    light = context.keys("light_map")[IRRADIANCE[0]]
+    count = 2 if any(context.two_sided) else 1
+    effort = [how.patches, how.patch_rays, how.gather_rays, how.block, how.direct_samples, how.importance_rays]
+    key = key_of(KIND, REVISION, light, effort, context.seed)
+    found = dict.fromkeys((*TRACED[:count], *MAPS[:count], *map(answer_name, (*PATCH, *BETWEEN))), key)
+    of_probes = context.keys("probe")
+    for o in context.scene.objects:
+        if radiance := of_probes.get(probe_name(o.name, "radiance")):
+            found |= {probe_spots_name(o.name, part): key_of(KIND, REVISION, key, radiance) for part in SEEN}
+    return found
+
+
+def bake(context: BakeContext) -> None:
+    engine()  # before Mitsuba is imported
+    from lambent.bake.answering.rays import RayEnds
+
+    stale = context.stale(KIND)
+    if stale & {*TRACED, *MAPS, *map(answer_name, (*PATCH, *BETWEEN))}:
+        directs = [_direct(context, side) for side in range(2 if any(context.two_sided) else 1)]
+        spots = _spots(context, directs)
+        ends = RayEnds(context.traced)
+        clusters = _clusters(context, ends, spots)
+        _between(context, ends, spots, clusters)
+    _seen_by_probes(context, stale)
+
+
+def _direct(context: BakeContext, side: int) -> Floats:
+    """Direct light (H, W, 3) of a side, at most that of the light map; what lobes alone have sent on counts as such."""
+    from lambent.bake.light.sampling import Sampling, cleaned, sampled_halves, tile_samples
+
+    if MAPS[side] not in context.stale(KIND):
+        return np.asarray(context.store.read(MAPS[side])[0])
+    how: Settings = context.settings(KIND)
+    texels, tile = context.traced.texels, context.settings("light_map").tile_texels
+    shape, chunk = (2, texels.height, texels.width, 4), (2, tile, tile, 4)
+    writer = context.samples(KIND, TRACED[side], shape, chunk)
+    scene = context.traced.whole(diffuse=False)
+    sides, labels = context.traced.in_view(SIGNS[side])
+    if writer.missing:
+        half = max(1, how.direct_samples // 2)
+        depth, unseen = context.settings("light_map").max_depth, context.traced.unseen(diffuse=False)
+        sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=unseen)
+        run_tiles(
+            writer, lambda region, seed: tile_samples(scene, sides, region, seed, sampling), seed=context.seed,
+            progress=context.progress, what="direct light" + (", far sides" if side else ""),
+        )  # fmt: skip
+    writer.finish()
+    context.progress(0, 1, "denoising")
+    halves, known = sampled_halves(context.store.read(TRACED[side]))
+    clean = cleaned(halves.mean(axis=0), known, texels, labels, context.traced.cuts)
+    lit = finished_maps(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    direct = np.minimum(np.minimum(clean, lit), HALF_MAX).astype(np.float16)
+    context.put(KIND, MAPS[side], direct[None], context.provenance())
+    return direct
+
+
+def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
+    from lambent.bake.answering.spots import spots_of
+
+    return spots_of(context.traced, [light for light in finished_maps(context) if light is not None], directs)
+
+
+def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
+    """The patches in the store, or new ones."""
+    from lambent.bake.answering.patches import Clusters, clustered
+    from lambent.bake.answering.transfer import hits_from_viewed, patch_means
+
+    texels, store = context.traced.texels, context.store
+    if not context.stale(KIND) & set(map(answer_name, PATCH)):
+        patch, material, paired = (store.read(answer_name(part)).astype(np.int64) for part in PATCH[:3])
+        of = patch.reshape(2, -1)[:, spots.index]
+        return Clusters(np.where(of == NO_PATCH, -1, of), material, paired)
+    how: Settings = context.settings(KIND)
+    context.progress(0, 1, "patches")
+    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
+    hits = hits_from_viewed(ends, spots, sides, how.importance_rays, context.seed)
+    found = clustered(spots, hits, how.patches)
+    patch = np.full((2, texels.width * texels.height), NO_PATCH, np.uint16)
+    patch[:, spots.index] = np.where(found.of >= 0, found.of, NO_PATCH)
+    numbers = {"patch_material": found.material, "patch_paired": found.paired}
+    for part, values in numbers.items():
+        context.put(KIND, answer_name(part), values.astype(np.uint16), context.provenance())
+    direct = patch_means(spots, found, spots.direct)[None].astype(np.float32)
+    context.put(KIND, answer_name("patch_direct"), direct, context.provenance())
+    note = context.provenance(materials=list(context.scene.materials))
+    context.put(KIND, answer_name("patch"), patch.reshape(2, texels.height, texels.width), note)
+    return found
+
+
+def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
+    """Transfer between patches, and rays from them to the points that gather."""
+    from lambent.bake.answering.points import gather_points, neighbours
+    from lambent.bake.answering.transfer import Between
+
+    how: Settings = context.settings(KIND)
+    width, count = context.traced.texels.width, clusters.count
+    sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
+    between = Between(ends, spots, sides, clusters, spots.exitance(context.scene))
+    points = gather_points(spots, width, how.block)
+
+    def rows(region: tuple[slice, ...], seed: int) -> Floats:
+        return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
+
+    def rays(region: tuple[slice, ...], seed: int) -> Floats:
+        return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
+
+    key = context.keys(KIND)[answer_name("transfer")]
+    arrays = (("transfer", (count, count), "float16", rows, "light between patches"),
+              ("rays", (len(points.texel), how.gather_rays, 3), "uint8", rays, "gathering"))  # fmt: skip
+    for part, shape, dtype, tile, what in arrays:
+        chunk = (max(1, -(-shape[0] // TILES)), *shape[1:])
+        writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
+        run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
+        writer.finish()
+    context.progress(0, 1, "texels that answer")
+    codes, near = neighbours(spots, points, how.block)
+    for part, values in (("texels", codes), ("near", near.points), ("shares", near.shares)):
+        context.put(KIND, answer_name(part), values, context.provenance())
+
+
+def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
+    """What the probes in the store see of the light map."""
+    from lambent.bake.answering.probe_spots import ProbeEyes
+    from lambent.bake.probes.division import family
+
+    scene, store = context.scene, context.store
+    names = [o.name for o in scene.objects if probe_spots_name(o.name, SEEN[-1]) in stale]
+    if not names:
+        return
+    eyes, owners = ProbeEyes(context.traced), shared_probes(store)
+    for number, name in enumerate(names):
+        context.progress(number, len(names), f"what the probe of {name} sees")
+        radiance = store.artefact(probe_name(name, "radiance"))
+        own: set[str] = set()
+        if radiance.meta.get("object_left_out", True):
+            own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
+        found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
+        for part, values in zip(SEEN, (found.spots, found.tint, found.sun), strict=True):
+            context.put(KIND, probe_spots_name(name, part), values, context.provenance())
+    context.progress(len(names), len(names), "what probes see")

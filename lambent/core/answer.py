@@ -1,0 +1,232 @@
+"""Light that answers when surfaces get other colours: radiosity between patches, gathered at points of the light map.
+
+    B = F (a (D + B) + t (D + B) on the other side)                                                  (solve)
+    I = mean over rays of weight (a E + t E on the other side) where they end                        (gather)
+    E(edited) = D + (E - D) I(edited) / I(as baked)                                                  (ratios)
+
+B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, E = D + B, a and t their diffuse albedos of
+reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is linear:
+D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light, so that it
+keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+
+Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light within a patch: a ray that
+ends where a patch is twice as bright as its mean counts twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Floats
+
+BYTE = 255
+MOST_WEIGHT = 16.0  # of a ray
+TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
+SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
+MOST_ALBEDO = 0.97  # of an edited surface
+MOST_RATIO = 64.0  # of the light after an edit, and one over it before
+DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Patches of surface, each of one material and on one side.
+
+    Attributes
+    ----------
+    material : (P,) integers
+        Number of each patch's material.
+    paired : (P,) integers
+        The patch on the other side; its own number on surfaces that no light crosses.
+    direct : (G, P, 3) float32
+        Direct irradiance by group of lights, W/m^2, the sun's included.
+    transfer : (P, P) float32
+        F, rows by the patch that receives.
+    """
+
+    material: NDArray[np.integer]
+    paired: NDArray[np.integer]
+    direct: NDArray[np.float32]
+    transfer: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Albedos:
+    """Diffuse albedos (M, 3) of materials: reflected, and transmitted to the other side."""
+
+    reflected: Floats
+    transmitted: Floats
+
+    def same_as(self, other: Albedos) -> bool:
+        """Whether they are equal, to the bit."""
+        mine, others = (self.reflected, self.transmitted), (other.reflected, other.transmitted)
+        return all(np.array_equal(a, b) for a, b in zip(mine, others, strict=True))
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Exitance (G, P, 3) of patches, W/m^2, the sweeps it took, and whether it stands."""
+
+    exitance: NDArray[np.float32]
+    sweeps: int
+    converged: bool
+
+
+def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> Solution:
+    """Solve for the light between patches by Jacobi's method.
+
+    It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
+    change would leave dark corners unsolved.
+    """
+    groups, count, _ = patches.direct.shape
+    reflected = albedos.reflected[patches.material].astype(np.float32)
+    crossing = (patches.paired != np.arange(count))[:, None]
+    transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
+    crosses = bool(transmitted.any())
+    light = patches.direct.copy()
+
+    def exitance() -> Floats:
+        out = light * reflected
+        return out + light[:, patches.paired] * transmitted if crosses else out
+
+    for sweep in range(1, SWEEPS + 1):
+        sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)
+        arrived = (patches.transfer @ np.ascontiguousarray(sent)).reshape(count, groups, 3).transpose(1, 0, 2)
+        new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
+        change = np.abs(new - light)
+        light = new
+        if (change <= tolerance * new + np.float32(1e-30)).all():
+            return Solution(exitance().astype(np.float32), sweep, True)
+    return Solution(exitance().astype(np.float32), SWEEPS, False)
+
+
+def packed_weights(weights: Floats) -> NDArray[np.uint8]:
+    """Weights of rays as bytes, by their roots: steps are fine where weights are small."""
+    root = np.sqrt(np.clip(weights, 0, MOST_WEIGHT) / MOST_WEIGHT)
+    return np.asarray(root * BYTE + 0.5, np.uint8)
+
+
+def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """The weights that bytes stand for."""
+    return np.asarray((packed.astype(np.float32) / BYTE) ** 2 * MOST_WEIGHT, np.float32)
+
+
+def packed_rays(patch: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
+    """Rays (..., 3) bytes: the patch that each ends on, low byte first, and its weight (0 where it met none)."""
+    number = np.where(weight > 0, patch, 0).astype(np.uint16)
+    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), packed_weights(weight)], axis=-1)
+
+
+def gathered(rays: NDArray[np.uint8], exitance: Floats) -> NDArray[np.float32]:
+    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 3), from exitance (G, P, 3).
+
+    Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
+    """
+    table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8)) / rays.shape[1]
+    lights = np.ascontiguousarray(exitance, np.float32)
+    return np.stack([_gathered(np.ascontiguousarray(rays), table, of_group) for of_group in lights])
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
+def _gathered(rays, table, exitance):  # type: ignore[no-untyped-def]
+    found = np.zeros((rays.shape[0], 3), np.float32)
+    for k in numba.prange(rays.shape[0]):
+        red = green = blue = np.float32(0)
+        for r in range(rays.shape[1]):
+            weight = table[rays[k, r, 2]]
+            patch = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
+            red += weight * exitance[patch, 0]
+            green += weight * exitance[patch, 1]
+            blue += weight * exitance[patch, 2]
+        found[k, 0], found[k, 1], found[k, 2] = red, green, blue
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Points (T, 8) uint32 near each texel, and their shares (T, 8) uint8, which count by their sum, at least 1."""
+
+    points: NDArray[np.uint32]
+    shares: NDArray[np.uint8]
+
+    def __getitem__(self, some: NDArray[np.integer]) -> Neighbours:
+        return Neighbours(self.points[some], self.shares[some])
+
+
+def upsampled(light: Floats, near: Neighbours) -> NDArray[np.float32]:
+    """Means (G, T, 3) over the points near each texel of light (G, K, 3)."""
+    return np.stack([_upsampled(np.ascontiguousarray(of_group, np.float32), near.points, near.shares)
+                     for of_group in light])  # fmt: skip
+
+
+@numba.njit(parallel=True, cache=True, nogil=True)
+def _upsampled(light, points, shares):  # type: ignore[no-untyped-def]
+    found = np.zeros((points.shape[0], 3), np.float32)
+    for t in numba.prange(points.shape[0]):
+        total = np.float32(0)
+        red = green = blue = np.float32(0)
+        for n in range(points.shape[1]):
+            share = np.float32(shares[t, n])
+            at = points[t, n]
+            total += share
+            red += share * light[at, 0]
+            green += share * light[at, 1]
+            blue += share * light[at, 2]
+        found[t, 0], found[t, 1], found[t, 2] = red / total, green / total, blue / total
+    return found
+
+
+def ratios(edited: Floats, reference: Floats) -> NDArray[np.float32]:
+    """I(edited) / I(reference) of light (G, ..., 3), within [0, MOST_RATIO]; 1 where there was next to none."""
+    axes = tuple(range(1, reference.ndim))
+    least = DARK * np.maximum(reference.mean(axis=axes, keepdims=True), 1e-30)
+    ratio = np.divide(edited, reference, out=np.ones_like(reference), where=reference > least)
+    return np.clip(ratio, 0, MOST_RATIO)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Everything that the light of a scene's texels answers with.
+
+    Attributes
+    ----------
+    rays : (K, R, 3) uint8
+        `packed_rays` of the points that gather.
+    near : Neighbours
+        Of the T texels.
+    direct, baked : (G, T, 3) float32
+        Direct irradiance of the texels, and all of it, as the light map has them: W/m^2, direct sun left out.
+    albedos : Albedos
+        As they were baked.
+    """
+
+    patches: Patches
+    rays: NDArray[np.uint8]
+    near: Neighbours
+    direct: NDArray[np.float32]
+    baked: NDArray[np.float32]
+    albedos: Albedos
+
+    def indirect(self, albedos: Albedos) -> NDArray[np.float32]:
+        """Indirect irradiance (G, K, 3) at the points that gather."""
+        return gathered(self.rays, solved(self.patches, albedos).exitance)
+
+    def reference(self) -> NDArray[np.float32]:
+        """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""
+        return upsampled(self.indirect(self.albedos), self.near)
+
+    def irradiance(self, albedos: Albedos, reference: Floats) -> NDArray[np.float32]:
+        """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
+        if albedos.same_as(self.albedos):
+            return self.baked
+        ratio = ratios(upsampled(self.indirect(albedos), self.near), reference)
+        return answered(self.direct, self.baked, ratio)
+
+
+def answered(direct: Floats, baked: Floats, ratio: Floats) -> NDArray[np.float32]:
+    """D + (E - D) times the ratio of indirect light, all (G, T, 3)."""
+    return np.asarray(direct + (baked - direct) * ratio, np.float32)

@@ -1,0 +1,49 @@
+"""Materials as light between surfaces sees them: diffuse albedos, and equivalent ones for lobes that were edited."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lambent.core.answer import MOST_ALBEDO, Albedos
+from lambent.core.arrays import Floats
+from lambent.materials.bsdf import specular_only
+from lambent.materials.document import Material
+from lambent.materials.factored.albedo import albedo
+from lambent.materials.factored.of_lobes import of_material
+
+
+def albedos_of(materials: Sequence[Material]) -> Albedos:
+    """kd and kt_d of materials: light that their lobes send on is in the rays."""
+    shape = (len(materials), 3)
+    return Albedos(
+        np.array([m.kd for m in materials], float).reshape(shape),
+        np.array([m.kt_d for m in materials], float).reshape(shape),
+    )
+
+
+def edited_albedos(baked: Sequence[Material], edited: Sequence[Material]) -> Albedos:
+    """Albedos of edited materials, where rays follow the lobes of the baked ones.
+
+    What an edit adds to the light of a lobe, or takes from it, counts as diffuse: the difference of the equivalent
+    albedos of the lobes (Ben-Artzi 2007, section 5.2.4), of either side, which can make an albedo negative. Colours
+    above MOST_ALBEDO are cut: more would not come to an end.
+    """
+    found = albedos_of(edited)
+    reflected, transmitted = found.reflected.copy(), found.transmitted.copy()
+    for number, (before, after) in enumerate(zip(baked, edited, strict=True)):
+        if before == after:
+            continue
+        if before.lobes != after.lobes:
+            reflected[number] += _of_lobes(after, "reflection") - _of_lobes(before, "reflection")
+            transmitted[number] += _of_lobes(after, "transmission") - _of_lobes(before, "transmission")
+        total = np.maximum(reflected[number] + transmitted[number], MOST_ALBEDO)
+        reflected[number] *= MOST_ALBEDO / total
+        transmitted[number] *= MOST_ALBEDO / total
+    return Albedos(reflected, transmitted)
+
+
+def _of_lobes(material: Material, side: str) -> Floats:
+    lobes = specular_only(material)
+    return albedo(of_material(lobes), side) if lobes.lobes else np.zeros(3)

@@ -1,0 +1,183 @@
+"""What a store holds for its light to answer other colours of materials, as `core.answer` computes it.
+
+answer/patch               (2, H, W) uint16, the patch of each texel of the light map on the normal's side and on
+                           the other; NO_PATCH where there is none. meta["materials"]: names, in order
+answer/patch_material      (P,) uint16, number of each patch's material
+answer/patch_paired        (P,) uint16, the patch on the other side; its own where light does not cross
+answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
+answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
+                           light map; light that only lobes have sent on counts as direct
+answer/transfer            (P, P) float16, share of a patch's light by the patches that send it
+answer/rays                (K, R, 3) uint8, `core.answer.packed_rays` of the points that gather
+answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
+answer/near                (T, 8) uint32, points near each, and
+answer/shares              (T, 8) uint8, what these count
+answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe sees, as above; NO_SPOT for none
+answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
+answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
+answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.answer import Answer, Neighbours, Patches
+from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
+from lambent.materials.diffuse_albedos import albedos_of
+from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_beside
+from lambent.store.store import Store
+
+NO_PATCH = 0xFFFF
+NO_SPOT = 0xFFFFFFFF
+DIRECT = ("direct", "direct_back")  # by side
+LAST = "answer/shares"  # written last but for probes
+
+
+def answer_name(part: str) -> str:
+    """Name of an array."""
+    return f"answer/{part}"
+
+
+def probe_spots_name(object_name: str, part: str) -> str:
+    """Name of an array of what a probe sees."""
+    return f"answer/probe/{object_name}/{part}"
+
+
+def has_answer(store: Store) -> bool:
+    """Whether a store's light can answer other colours of its materials."""
+    return LAST in store and all(answer_name(part) in store for part in ("transfer", "rays", "near", "texels"))
+
+
+@dataclass(frozen=True, eq=False)
+class SeenSpots:
+    """What one probe sees: numbers (6, N, N) of the answer's texels, -1 for none, tint (6, N, N, 3), sun (6, N, N)."""
+
+    texel: NDArray[np.int64]
+    tint: NDArray[np.float16]
+    sun: NDArray[np.float16]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredAnswer:
+    """The answer of a store.
+
+    Attributes
+    ----------
+    texels : (T,) uint32, twice the texel of the light map, plus 1 on the other side
+    other : (T,) number of the same texel on the other side, -1 without
+    material : (T,) number of each one's material
+    materials : names, by number
+    seen : what probes see, by object
+    sun : (3,) W/m^2 on what faces it
+    """
+
+    answer: Answer
+    texels: NDArray[np.uint32]
+    other: NDArray[np.int64]
+    material: NDArray[np.int64]
+    materials: tuple[str, ...]
+    seen: dict[str, SeenSpots]
+    sun: Floats
+
+
+def read_answer(store: Store) -> StoredAnswer:
+    """The answer of a store.
+
+    Raises
+    ------
+    UserError
+        Where the store has none, or its arrays contradict one another.
+    """
+    if not has_answer(store):
+        hint = "bake the scene again with `lambent bake --only answer`"
+        raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
+    record = scene_record(store)
+    material, paired, direct, transfer, rays, texels, near, shares, patch = (
+        store.read(answer_name(part))
+        for part in (
+            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "texels", "near", "shares", "patch",
+        )
+    )  # fmt: skip
+    names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
+    count, height, width = len(material), *patch.shape[1:]
+    fits = (
+        set(names) <= set(record.materials)
+        and (not count or int(material.max()) < len(names))
+        and paired.shape == material.shape
+        and (not count or int(paired.max()) < count)
+        and direct.shape[1:] == (count, 3)
+        and transfer.shape == (count, count)
+        and near.shape == shares.shape
+        and near.shape[0] == len(texels)
+        and (not near.size or int(near.max()) < len(rays))
+        and (not shares.size or bool((shares.sum(axis=1) > 0).all()))
+        and (not len(texels) or int(texels.max()) < 2 * height * width)
+        and (not rays.size or _most_patch(rays) < count)
+    )
+    if not fits:
+        raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
+    lights = [f"light_map/{side}" for side in SIDES], [answer_name(part) for part in DIRECT]
+    baked, directs = (_at_texels(store, of_sides, texels) for of_sides in lights)
+    groups = direct.shape[0]
+    if directs.shape[0] != groups:
+        raise UserError("broken store", file=store.folder, field="answer/direct", got=directs.shape[0], expected=groups)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
+    albedos = albedos_of([record.materials[name] for name in names])
+    answer = Answer(patches, rays, Neighbours(near, shares), np.minimum(directs, baked), baked, albedos)
+    number = _numbers(texels, height * width)
+    flat = patch.reshape(2, -1)
+    of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2]
+    other = number[(texels ^ 1).astype(np.int64)]
+    sun = sun_beside(store)
+    return StoredAnswer(
+        answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
+        np.zeros(3) if sun is None else np.array(sun.irradiance),
+    )  # fmt: skip
+
+
+def _most_patch(rays: NDArray[np.uint8]) -> int:
+    """The largest number of a patch that rays end on."""
+    high = rays[..., 1]
+    top = int(high.max())
+    return top * 256 + int(rays[..., 0][high == top].max())
+
+
+def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """(G, T, 3) of maps of both sides (G, H, W, 3), or (H, W, 3); black where a side has none."""
+    found: NDArray[np.float32] | None = None
+    for side, name in enumerate(names):
+        if name not in store:
+            continue
+        values = store.read(name)
+        values = values[None] if values.ndim == 3 else values
+        flat = values.reshape(len(values), -1, 3)
+        if found is None:
+            found = np.zeros((len(values), len(texels), 3), np.float32)
+        mine = np.flatnonzero(texels % 2 == side)
+        found[:, mine] = flat[:, texels[mine] // 2]
+    return np.zeros((1, len(texels), 3), np.float32) if found is None else found
+
+
+def _numbers(texels: NDArray[np.uint32], size: int) -> NDArray[np.int64]:
+    """(2 size,) number of each spot among the texels that answer, -1 for others."""
+    number = np.full(2 * size, -1)
+    number[texels] = np.arange(len(texels))
+    return number
+
+
+def _seen(store: Store, record: SceneRecord, number: NDArray[np.int64]) -> dict[str, SeenSpots]:
+    found = {}
+    for o in record.objects:
+        name = probe_spots_name(o.name, "spots")
+        if name not in store:
+            continue
+        spots = store.read(name)
+        there = spots < len(number)
+        tint, sun = (store.read(probe_spots_name(o.name, part)) for part in ("tint", "sun"))
+        found[o.name] = SeenSpots(np.where(there, number[np.where(there, spots, 0)], -1), tint, sun)
+    return found
