@@ -12,8 +12,8 @@ from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe
 from lambent.realtime.lamp_maps import PlaneFrame, lamp_map
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
 from lambent.realtime.planar_view import PlanarView
+from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
 from lambent.realtime.structs import PLANE_LAMPS_DTYPE, Record
 
 OUT_FROM = 0.5  # of a lamp's radius, as in shaders/planar_lamps.wgsl: narrower lobes leave all lamps in the buffer
@@ -25,7 +25,8 @@ class ReflectorLamps:
     """The lamps over one side of one reflector, at least one. The map is drawn when it is first asked for."""
 
     def __init__(
-        self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats, clearance_m: float
+        self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats,
+        clearance_m: float,
     ) -> None:  # fmt: skip
         self.lamps = lamps
         self.objects = list(dict.fromkeys(lamp.object for lamp in lamps))  # in the order of their channels
@@ -43,6 +44,10 @@ class ReflectorLamps:
         """Whether a lamp may leave the buffer for one of the lobes, whose widths textures may multiply."""
         widest = max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in lobes), default=0.0) * widest_factor
         return widest > OUT_FROM * self._least_radius_rad
+
+    def are_within(self, view: PlanarView) -> bool:
+        """Whether a mirrored view would show any of them, if nothing hid it."""
+        return any(inside_share(view, lamp.middles) > 0 for lamp in self.lamps)
 
     @cached_property
     def map(self) -> Any:
