@@ -27,7 +27,7 @@ from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
 from lambent.store.contract import ReflectorRecord
 
-MOST = 4  # lamps of a reflector, and channels of its map: LAMPS_MOST of shaders/planar_lamps.wgsl
+MOST = 4  # lamps of a reflector and channels of its map, as shaders/planar_lamp_record.wgsl has room for
 POINTS = 64  # of a lamp, that see a reflector's points or do not; of a ball, some 20 face each of these
 MOST_RADIUS_RAD = 0.35  # of a lamp as seen from the farthest point: larger ones are surfaces, not lamps
 AT_ONCE = 1 << 20  # pairs of points and triangles: some 50 MB
@@ -103,10 +103,10 @@ class PlaneLamp:
         areas = self.areas[facing][of] / np.bincount(of)[of][:, None]
         label = _bundles(pieces, POINTS)
         label = np.unique(label, return_inverse=True)[1]
-        weight = np.linalg.norm(areas, axis=1)
-        total = np.bincount(label, weight)
-        places = np.stack([np.bincount(label, weight * pieces[:, i]) / total for i in range(3)], axis=-1)
-        return places, np.stack([np.bincount(label, areas[:, i]) for i in range(3)], axis=-1)
+        # a piece of each bundle at random: middles lie in rows, and straight edges would pass them row by row
+        order = np.random.default_rng(5).permutation(len(pieces))
+        chosen = order[np.unique(label[order], return_index=True)[1]]
+        return pieces[chosen], np.stack([np.bincount(label, areas[:, i]) for i in range(3)], axis=-1)
 
 
 def _bundles(points: Floats, count: int) -> NDArray[np.intp]:

@@ -116,7 +116,7 @@ def test_a_map_of_a_lamp_behind_an_edge(device: Any) -> None:
     share = np.array([segment(np.clip(one, -1, 1)) for one in offset])
     whole = 2 * np.pi * (1 - np.sqrt(1 - (radius / away) ** 2))
     assert 3 < ((share > 0) & (share < 1)).sum() < 20
-    np.testing.assert_allclose(got, share * whole, atol=0.05 * whole.max())
+    np.testing.assert_allclose(got, share * whole, atol=0.08 * whole.max())
     assert np.abs(got - share * whole).mean() < 0.012 * whole.max()
 
 
