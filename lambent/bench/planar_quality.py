@@ -20,6 +20,7 @@ from lambent.realtime.renderer import Renderer
 
 NAME = "planar-quality"
 METHODS = {
+    "lamps": ("lamps", "marched"),
     "marched": ("rings", "marched"),
     "interleaved": ("rings", "interleaved"),
     "fixed": ("rings", "fixed"),

@@ -6,7 +6,7 @@ casts rays at the triangles that the renderer draws and reads the same light map
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -29,12 +29,14 @@ LAMP: Triple = (12.0, 10.0, 8.0)
 CAMERA = Camera(name="front", position=(0.5, 1.55, 4.2), target=(0.0, 0.35, 0.0), fov_y_deg=42.0)
 COLOURS: Mapping[str, Triple] = {
     "wall": (0.75, 0.7, 0.6), "cube": (0.8, 0.25, 0.15), "cylinder": (0.2, 0.5, 0.75), "ball": (0.3, 0.7, 0.3),
-    "pole": (0.1, 0.1, 0.12), "lamp": (0.0, 0.0, 0.0),
+    "pole": (0.1, 0.1, 0.12),
 }  # fmt: skip
+Lamps = Mapping[str, tuple[Mesh, Triple]]  # black shapes and their radiance, by name
+LAMPS: Lamps = {"lamp": (placed(sphere(0.12, 32, 16), (-0.25, 1.35, 0.2)), LAMP)}
 TILE_TEXELS = 256  # of the light map, for each object
 
 
-def meshes() -> dict[str, Mesh]:
+def meshes(lamps: Lamps = LAMPS) -> dict[str, Mesh]:
     """All shapes; the floor is the plane y = 0."""
     return {
         "wall": patch((-REACH, 0, -2), (2 * REACH, 0, 0), (0, 3.2, 0)),
@@ -42,7 +44,7 @@ def meshes() -> dict[str, Mesh]:
         "cylinder": placed(cylinder(0.3, 1.1, 64), (0.15, 0.0, -0.7)),
         "ball": placed(sphere(0.36, 64, 32), (0.95, 0.36, 0.35)),
         "pole": placed(cylinder(0.025, 2.2, 24), (0.45, 0.0, 0.75)),
-        "lamp": placed(sphere(0.12, 32, 16), (-0.25, 1.35, 0.2)),
+        **{name: mesh for name, (mesh, _) in lamps.items()},
         FLOOR: patch((-REACH, 0, REACH), (2 * REACH, 0, 0), (0, 0, -2 * REACH)),
     }
 
@@ -53,12 +55,13 @@ def floor_state(lobe: Lobe, width: int, height: int) -> FrameState:
     return FrameState(CAMERA, width, height, show="specular", antialias=False, materials=materials)
 
 
-def planar_scene(lobe: Lobe) -> BakedScene:
+def planar_scene(lobe: Lobe, lamps: Lamps = LAMPS) -> BakedScene:
     """The scene with a floor of one lobe."""
-    shapes = meshes()
+    shapes = meshes(lamps)
     sky = np.tile(np.array(SKY, np.float32), (6, 4, 4, 1))
     scene = unbaked_scene(shapes, Material(name=PAINT, kd=(1, 1, 1)), sky, name="planar bench")
-    changes: dict[str, dict[str, object]] = {FLOOR: {"material": FLOOR}, "lamp": {"emission": LAMP}}
+    changes: dict[str, dict[str, object]] = {FLOOR: {"material": FLOOR}}
+    changes.update({name: {"emission": emission} for name, (_, emission) in lamps.items()})
     objects = tuple(o.model_copy(update=changes.get(o.name, {})) for o in scene.record.objects)
     outline = ((-REACH, 0, -REACH), (-REACH, 0, REACH), (REACH, 0, REACH), (REACH, 0, -REACH))
     part = ReflectorPart(object=FLOOR, faces=(0, 1), area_m2=4 * REACH * REACH)
@@ -66,15 +69,15 @@ def planar_scene(lobe: Lobe) -> BakedScene:
     materials = {PAINT: scene.record.materials[PAINT], FLOOR: Material(name=FLOOR, lobes=(lobe,))}
     record = scene.record.model_copy(update={"objects": objects, "materials": materials, "reflectors": (reflector,)})
     uv2 = np.concatenate(list(light_map_places(shapes).values()))
-    return replace(scene, record=record, uv2=uv2, irradiance=light_map())
+    return replace(scene, record=record, uv2=uv2, irradiance=light_map(shapes))
 
 
-def light_map() -> Floats:
-    """Irradiance (TILE_TEXELS, TILE_TEXELS objects, 3): for each object a tile of checks, brighter to the right."""
+def light_map(shapes: Iterable[str]) -> Floats:
+    """Irradiance (TILE_TEXELS, TILE_TEXELS shapes, 3): for each shape a tile of checks, brighter to the right."""
     at = (np.arange(TILE_TEXELS) + 0.5) / TILE_TEXELS
     u, v = np.meshgrid(at, at)
     checks = np.where((np.floor(u * 10) + np.floor(v * 10)) % 2 == 0, 1.0, 0.45) * (0.6 + 0.6 * u)
-    tiles = [np.pi * checks[..., None] * np.array(COLOURS.get(name, (0, 0, 0))) for name in meshes()]
+    tiles = [np.pi * checks[..., None] * np.array(COLOURS.get(name, (0, 0, 0))) for name in shapes]
     return np.concatenate(tiles, axis=1).astype(np.float32)
 
 
@@ -90,7 +93,7 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 
 
 def exact_reflection(
-    lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent
+    lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent, lamps: Lamps = LAMPS
 ) -> tuple[Floats, Flags]:
     """Radiance (height, width, 3) of the floor by ray casting, and where the floor is (height, width) bool.
 
@@ -102,10 +105,10 @@ def exact_reflection(
     engine()
     from lambent.bake.reference.planar_reflection import ReflectionTracer
 
-    shapes, lamps = meshes(), {"lamp": LAMP}
-    objects = tuple(SceneObject(n, mesh, PAINT, lamps.get(n, (0.0, 0.0, 0.0))) for n, mesh in shapes.items())
+    shapes, dark = meshes(lamps), (0.0, 0.0, 0.0)
+    objects = tuple(SceneObject(n, mesh, PAINT, lamps[n][1] if n in lamps else dark) for n, mesh in shapes.items())
     scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
-    tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(), FLOOR, SKY)
+    tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(shapes), FLOOR, SKY)
 
     rays = pixel_rays(camera, width, height).reshape(-1, 3)
     eye = np.asarray(camera.position, float)

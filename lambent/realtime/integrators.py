@@ -36,6 +36,7 @@ class Integrator:
     spp: int = 256  # of a still of a progressive one
     aimed: str | None = None  # shader for a probe whose lamps stand out: part of the samples aims at them
     lamps: str | None = None  # shader for a probe with lamps that are smaller than a lobe: they leave the cube map
+    clears_views: bool = False  # of a planar one: lamps smaller than a lobe leave the mirrored view
 
 
 SUN_SAMPLED = {"SUN_SAMPLED": 1}  # not in closed form: exact for lobes narrower than the sun's disc, too

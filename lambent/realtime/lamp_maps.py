@@ -1,12 +1,13 @@
 """How much of its lamps each point of a planar reflector sees: a map over the plane, made once.
 
-Sixteen places of a lamp draw what stands between them and the plane, each by the projection that has the reflector for
-its picture. A texel holds the solid angles, in sr, of at most four lamps, one per channel, penumbras included. No look-up
+Places of a lamp draw what stands between them and the plane, each by the projection that has the reflector for its
+picture. A texel holds the solid angles, in sr, of at most four lamps, one per channel, penumbras included. No look-up
 in a mirrored view could tell: it does not hold what its eye does not see.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,19 +19,19 @@ from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
 from lambent.core.sequences import hammersley
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.plane_lamps import MOST, POINTS, PlaneLamp
+from lambent.realtime.plane_lamps import MOST, PlaneLamp
 from lambent.realtime.solid_depths import SolidDepths, depth_texture, read_depths
 
 LONGER_PX = 512  # texels along the longer side of a map
 STEP_PX = 64  # rows that can be read back are multiples of this
 COARSE = 24  # places along each side where the shape of a lamp is summed over all its triangles
 THIN = 1e-3  # of a lamp's height: what is nearer to its places than that blocks nothing
-LEAST = 1e-9  # sr
+AT_ONCE = 16  # places of a lamp: layers of a texture
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneFrame:
-    """A rectangle about a reflector: corner (3,), axes (2, 3), sides (2,) in metres, and size (width, height) in texels."""
+    """A rectangle about a reflector: corner (3,), axes (2, 3), sides (2,) in metres, and size (columns, rows)."""
 
     corner: Floats
     axes: Floats
@@ -59,6 +60,29 @@ class PlaneFrame:
         scale = self.axes * (np.array(self.size) / self.sides_m)[:, None]
         return np.column_stack([scale, -scale @ self.corner])
 
+    def _offsets(self, place: Floats) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
+        """Of the middles of columns, of rows, and of the plane from a place (3,), along the axes and across, metres."""
+        u, v = (place - self.corner) @ self.axes.T
+        lines = (
+            ((np.arange(count) + 0.5) * side / count - start).astype(np.float32)
+            for count, side, start in zip(self.size, self.sides_m, (u, v), strict=True)
+        )
+        columns, rows = lines
+        return columns, rows, float((self.corner - place) @ np.cross(*self.axes))
+
+    def distances2(self, place: Floats) -> NDArray[np.float32]:
+        """(rows, columns) squared distances of texels from a place (3,), m^2."""
+        columns, rows, off = self._offsets(place)
+        return np.asarray(columns * columns + (rows * rows)[:, None] + np.float32(off * off), np.float32)
+
+    def received(self, place: Floats, area: Floats) -> NDArray[np.float32]:
+        """(rows, columns) sr of a small area at a place, its vector (3,) along its normal, 0 from behind."""
+        columns, rows, off = self._offsets(place)
+        along, beside = (self.axes @ area).astype(np.float32)
+        facing = columns * along + (rows * beside)[:, None] + np.float32(off * (area @ np.cross(*self.axes)))
+        distance2 = self.distances2(place)
+        return np.asarray(np.maximum(facing, 0) / (distance2 * np.sqrt(distance2)), np.float32)
+
     def clip_from_world(self, place: Floats, plane: Floats, least_m: float, jitter_px: Floats) -> Floats:
         """(4, 4) of the projection from a place (3,) over the plane (n, d); depths rise with the height over it.
 
@@ -82,44 +106,45 @@ class PlaneFrame:
 def lamp_map(
     layouts: Layouts, resources: Any, lamps: list[PlaneLamp], frame: PlaneFrame, plane: Floats, clearance_m: float
 ) -> NDArray[np.float16]:
-    """(height, width, MOST) sr of each lamp that the middles of texels see; `resources` is a `SceneResources`."""
+    """(rows, columns, MOST) sr of each lamp that the middles of texels see; `resources` is a `SceneResources`."""
     width, height = frame.size
-    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    points = frame.points(columns, rows).reshape(-1, 3)
+    edge = np.linspace(0, 1, COARSE)
+    coarse = frame.points(*(side.ravel() for side in np.meshgrid(edge * width, edge * height)))
     found = np.zeros((height, width, MOST), np.float16)
     for channel, lamp in enumerate(lamps):
-        foot = _nearest(frame, lamp.centre)
-        places, areas = lamp.light_points(foot)
-        depths = depth_texture(layouts.device, width, height, POINTS)
-        encoder, solid = layouts.device.create_command_encoder(), SolidDepths(layouts, resources, names={lamp.object})
-        for layer, (place, shift) in enumerate(zip(places, hammersley(len(places)) - 0.5, strict=True)):
-            view = depths.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)
-            solid.draw(encoder, view, frame.clip_from_world(place, plane, clearance_m, shift))
-        layouts.device.queue.submit([encoder.finish()])
-        seen, whole = np.zeros(len(points), np.float32), np.full(len(points), 1e-30, np.float32)
-        for layer, (place, area) in enumerate(zip(places, areas, strict=True)):
-            to = (points - place).astype(np.float32)
-            weight = np.maximum(to @ area.astype(np.float32), 0) / np.einsum("px,px->p", to, to) ** 1.5
+        places, areas = lamp.light_points(coarse)
+        solid = SolidDepths(layouts, resources, names={lamp.object})
+        seen, whole = np.zeros((height, width), np.float32), np.full((height, width), 1e-30, np.float32)
+        for at, layer in enumerate(_blocked(layouts, solid, places, frame, plane, clearance_m)):
+            weight = frame.received(places[at], areas[at])
             whole += weight
-            seen += weight * (read_depths(layouts.device, depths, layer).reshape(-1) == 0)
-        share = (seen / whole).reshape(height, width)
-        found[..., channel] = np.where(share > 0, share * _solid_angles(lamp, frame, points).reshape(height, width), 0)
+            seen += weight * (layer == 0)
+        found[..., channel] = seen / whole * _solid_angles(lamp, frame, coarse)
     return found
 
 
-def _nearest(frame: PlaneFrame, place: Floats) -> Floats:
-    """The point (3,) of the rectangle that is nearest to a place."""
-    shares = np.clip((place - frame.corner) @ frame.axes.T, 0, frame.sides_m)
-    return np.asarray(frame.corner + shares @ frame.axes)
+def _blocked(
+    layouts: Layouts, solid: SolidDepths, places: Floats, frame: PlaneFrame, plane: Floats, clearance_m: float
+) -> Iterator[NDArray[np.float32]]:
+    """For each place (K, 3), (rows, columns), not 0 where something stands between it and the plane."""
+    depths = depth_texture(layouts.device, *frame.size, AT_ONCE)
+    shifts = hammersley(max(len(places), 1)) - 0.5  # of the texels: each place draws edges elsewhere
+    for first in range(0, len(places), AT_ONCE):
+        mine = range(first, min(first + AT_ONCE, len(places)))
+        encoder = layouts.device.create_command_encoder()
+        for k in mine:
+            view = depths.create_view(dimension="2d", base_array_layer=k - first, array_layer_count=1)
+            solid.draw(encoder, view, frame.clip_from_world(places[k], plane, clearance_m, shifts[k]))
+        layouts.device.queue.submit([encoder.finish()])
+        for k in mine:
+            yield read_depths(layouts.device, depths, k - first)
 
 
-def _solid_angles(lamp: PlaneLamp, frame: PlaneFrame, points: Floats) -> NDArray[np.float32]:
-    """(P,) of points at the texels of the frame, in order: areas across the view are interpolated, distances are not."""
+def _solid_angles(lamp: PlaneLamp, frame: PlaneFrame, coarse: Floats) -> NDArray[np.float32]:
+    """(rows, columns) sr of all of a lamp; from `coarse` points areas across the view are interpolated."""
     width, height = frame.size
-    u, v = np.meshgrid(np.linspace(0, width, COARSE), np.linspace(0, height, COARSE))
-    coarse = frame.points(u, v).reshape(-1, 3)
     across = lamp.solid_angles(coarse) * ((coarse - lamp.centre) ** 2).sum(axis=1)
-    step = (COARSE - 1) / np.array([height, width])
-    at = (np.indices((height, width)) + 0.5) * step[:, None, None]
-    shown = map_coordinates(across.reshape(COARSE, COARSE), at, order=1, mode="nearest").reshape(-1)
-    return np.asarray(np.maximum(shown / ((points - lamp.centre) ** 2).sum(axis=1), LEAST), np.float32)
+    lines = (np.arange(count) + 0.5 for count in (height, width))
+    at = np.meshgrid(*(line * (COARSE - 1) / len(line) for line in lines), indexing="ij")
+    shown = map_coordinates(across.reshape(COARSE, COARSE), at, order=1, mode="nearest")
+    return np.asarray(shown / frame.distances2(lamp.centre), np.float32)

@@ -82,7 +82,7 @@ PLANAR: dict[str, dict[str, Integrator]] = {
 }
 PLANAR["oslf"] = PLANAR["oslf-points"] = PLANAR["qmc-lobe"]
 # Small lamps leave the mirrored view (reflector_lamps.py); what that does not hold comes from the whole probe.
-PLANAR["lamps"] = {name: replace(how, lamps=how.shader) for name, how in PLANAR["rings"].items()}
+PLANAR["lamps"] = {name: replace(how, clears_views=True) for name, how in PLANAR["rings"].items()}
 AUTO, OFF = "auto", "off"
 CHOICES = tuple(dict.fromkeys([AUTO, OFF, *(name for methods in PLANAR.values() for name in methods if name != "qmc")]))
 

@@ -27,9 +27,10 @@ from lambent.core.plain import Triple
 from lambent.realtime.baked import BakedScene
 from lambent.store.contract import ReflectorRecord
 
-MOST = 4  # lamps of a reflector, and channels of its map: LAMPS_MOST of shaders/planar_lamps.wgsl
-POINTS = 16  # of a lamp, that see a reflector's points or do not
+MOST = 4  # lamps of a reflector and channels of its map, as shaders/planar_lamp_record.wgsl has room for
+POINTS = 64  # of a lamp, that see a reflector's points or do not; of a ball, some 20 face each of these
 MOST_RADIUS_RAD = 0.35  # of a lamp as seen from the farthest point: larger ones are surfaces, not lamps
+AT_ONCE = 1 << 20  # pairs of points and triangles: some 50 MB
 WELDED_M = 1e-5  # corners that are nearer are one
 
 
@@ -49,12 +50,13 @@ class PlaneLamp:
 
     def solid_angles(self, points: Floats) -> Floats:
         """(M,) sr of the lamp from points (M, 3) that see all of it, as of a convex one."""
-        return np.asarray(self._facing(points).sum(axis=1))
+        parts = np.array_split(np.arange(len(points)), 1 + len(points) * len(self.middles) // AT_ONCE)
+        return np.concatenate([self._facing(points[part]).sum(axis=1) for part in parts])
 
     def _facing(self, points: Floats) -> Floats:
         """(M, F) solid angle of every triangle, 0 of those seen from behind."""
         to = points[:, None] - self.middles
-        return np.maximum(np.einsum("mfx,fx->mf", to, self.areas), 0) / (to * to).sum(axis=-1) ** 1.5
+        return np.asarray(np.maximum(np.einsum("mfx,fx->mf", to, self.areas), 0) / (to * to).sum(axis=-1) ** 1.5)
 
     @cached_property
     def centre(self) -> Floats:
@@ -69,8 +71,11 @@ class PlaneLamp:
         for point, share in zip(points, self._facing(points), strict=True):
             if share.sum() <= 0:
                 continue
-            axes = np.stack(basis(normalize(self.centre - point)))
-            place = (self.corners - self.centre) @ axes.T  # (F, 3, 2)
+            to = self.centre - point
+            w = normalize(to)
+            axes = np.stack(basis(w))
+            # in the plane across the view through the centre: (F, 3, 2)
+            place = (self.corners - point) @ axes.T * (to @ w / ((self.corners - point) @ w))[..., None]
             mean = share @ place.mean(axis=1) / share.sum()
             about = place - mean
             # over a triangle the second moment is (sum of the corners' + 9 times the middle's)/12
@@ -88,19 +93,20 @@ class PlaneLamp:
         value, vector = np.linalg.eigh(matrix)
         return np.asarray((vector * np.maximum(value, 0)) @ vector.T)
 
-    def light_points(self, towards: Floats) -> tuple[Floats, Floats]:
-        """At most POINTS places (K, 3) among triangles that a point (3,) sees, and their area vectors (K, 3)."""
-        facing = np.flatnonzero(((towards - self.middles) * self.areas).sum(axis=1) > 0)
+    def light_points(self, points: Floats) -> tuple[Floats, Floats]:
+        """At most POINTS places (K, 3) on triangles that any of points (M, 3) sees, and their area vectors (K, 3)."""
+        heights = points @ self.areas.T - (self.middles * self.areas).sum(axis=1)
+        facing = np.flatnonzero(heights.max(axis=0) > 0)
         if not len(facing):
             return np.zeros((0, 3)), np.zeros((0, 3))
-        pieces, of = _pieces(self.corners[facing], 16 * POINTS)
+        pieces, of = _pieces(self.corners[facing], 8 * POINTS)
         areas = self.areas[facing][of] / np.bincount(of)[of][:, None]
         label = _bundles(pieces, POINTS)
         label = np.unique(label, return_inverse=True)[1]
-        weight = np.linalg.norm(areas, axis=1)
-        total = np.bincount(label, weight)
-        places = np.stack([np.bincount(label, weight * pieces[:, i]) / total for i in range(3)], axis=-1)
-        return places, np.stack([np.bincount(label, areas[:, i]) for i in range(3)], axis=-1)
+        # a piece of each bundle at random: middles lie in rows, and straight edges would pass them row by row
+        order = np.random.default_rng(5).permutation(len(pieces))
+        chosen = order[np.unique(label[order], return_index=True)[1]]
+        return pieces[chosen], np.stack([np.bincount(label, areas[:, i]) for i in range(3)], axis=-1)
 
 
 def _bundles(points: Floats, count: int) -> NDArray[np.intp]:

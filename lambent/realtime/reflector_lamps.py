@@ -12,8 +12,8 @@ from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe
 from lambent.realtime.lamp_maps import PlaneFrame, lamp_map
 from lambent.realtime.layouts import Layouts
-from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
 from lambent.realtime.planar_view import PlanarView
+from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
 from lambent.realtime.structs import PLANE_LAMPS_DTYPE, Record
 
 OUT_FROM = 0.5  # of a lamp's radius, as in shaders/planar_lamps.wgsl: narrower lobes leave all lamps in the buffer
@@ -25,7 +25,8 @@ class ReflectorLamps:
     """The lamps over one side of one reflector, at least one. The map is drawn when it is first asked for."""
 
     def __init__(
-        self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats, clearance_m: float
+        self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats,
+        clearance_m: float,
     ) -> None:  # fmt: skip
         self.lamps = lamps
         self.objects = list(dict.fromkeys(lamp.object for lamp in lamps))  # in the order of their channels
@@ -44,6 +45,10 @@ class ReflectorLamps:
         widest = max((float(np.sqrt(lobe.mx * lobe.my)) for lobe in lobes), default=0.0) * widest_factor
         return widest > OUT_FROM * self._least_radius_rad
 
+    def are_within(self, view: PlanarView) -> bool:
+        """Whether a mirrored view would show any of them, if nothing hid it."""
+        return any(inside_share(view, lamp.middles) > 0 for lamp in self.lamps)
+
     @cached_property
     def map(self) -> Any:
         """Buffer of the solid angles that the reflector's points see."""
@@ -55,11 +60,11 @@ class ReflectorLamps:
         data = np.zeros((), PLANE_LAMPS_DTYPE)
         data["to_column"], data["to_row"] = self._frame.texel_rows()
         data["size"][:2] = self._frame.size
-        for row, lamp, spread, radius_m in zip(data["lamps"], self.lamps, self._spreads, self._radii_m, strict=False):
-            row["centre"][:] = *lamp.centre, inside_share(view, lamp.middles)
-            row["spread"][:, :3] = spread
-            row["emission"][:] = *np.array(lamp.emission) / self._resources.scene.unit, radius_m
-            row["channel"][self.objects.index(lamp.object)] = 1
+        for k, (lamp, spread, radius_m) in enumerate(zip(self.lamps, self._spreads, self._radii_m, strict=True)):
+            data["centres"][k] = *lamp.centre, inside_share(view, lamp.middles)
+            data["spreads"][3 * k : 3 * k + 3, :3] = spread
+            data["emissions"][k] = *np.array(lamp.emission) / self._resources.scene.unit, radius_m
+            data["channels"][k, self.objects.index(lamp.object)] = 1
         return data
 
 

@@ -60,7 +60,7 @@ class PlanarPass:
 
     def _lamps_of(self, context: FrameContext, view: PlanarView, how: Integrator) -> ReflectorLamps | None:
         """The lamps that leave a mirrored view, None where no lobe of its reflector is wide enough for any."""
-        if how.lamps is None:
+        if not how.clears_views:
             return None
         found = context.resources.reflector_lamps.of(view)
         mine = [draw for draw in context.draws if view.has(draw.item.record)]
@@ -68,7 +68,7 @@ class PlanarPass:
             found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
             for draw in mine
         )
-        return found if served else None
+        return found if served and found.are_within(view) else None
 
     def _encode_hits(
         self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, lamps: ReflectorLamps | None,

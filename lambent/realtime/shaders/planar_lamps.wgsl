@@ -16,7 +16,7 @@ const LARGE_TO = 0.35;
 
 // How far a lamp has left the buffer for a lobe at a place, 0 to 1.
 fn lamp_out(lobe: LambentLobe, k: u32, p_world: vec3f) -> f32 {
-    let radius = plane_lamps.lamps[k].emission.w / max(distance(plane_lamps.lamps[k].centre.xyz, p_world), 1e-6);
+    let radius = plane_lamps.emissions[k].w / max(distance(plane_lamps.centres[k].xyz, p_world), 1e-6);
     let small = 1.0 - smoothstep(LARGE_FROM, LARGE_TO, radius);
     return small * smoothstep(OUT_FROM, OUT_TO, sqrt(lobe.mx * lobe.my) / max(radius, 1e-6));
 }
@@ -25,7 +25,7 @@ fn lamp_out(lobe: LambentLobe, k: u32, p_world: vec3f) -> f32 {
 fn object_out(lobe: LambentLobe, k: u32, p_world: vec3f) -> f32 {
     var out = 1.0;
     for (var i = 0u; i < LAMPS; i++) {
-        let same = dot(plane_lamps.lamps[i].channel, plane_lamps.lamps[k].channel) > 0.5;
+        let same = dot(plane_lamps.channels[i], plane_lamps.channels[k]) > 0.5;
         out = min(out, select(1.0, lamp_out(lobe, i, p_world), same));
     }
     return out;
@@ -35,10 +35,9 @@ fn object_out(lobe: LambentLobe, k: u32, p_world: vec3f) -> f32 {
 fn lamps_kept(lobe: LambentLobe, p_world: vec3f) -> mat4x3f {
     var kept = mat4x3f();
     for (var k = 0u; k < LAMPS; k++) {
-        let lamp = plane_lamps.lamps[k];
-        let light = (1.0 - object_out(lobe, k, p_world)) * lamp.emission.rgb;
+        let light = (1.0 - object_out(lobe, k, p_world)) * plane_lamps.emissions[k].rgb;
         for (var c = 0u; c < 4u; c++) {
-            kept[c] = select(kept[c], light, lamp.channel[c] > 0.5);
+            kept[c] = select(kept[c], light, plane_lamps.channels[k][c] > 0.5);
         }
     }
     return kept;
@@ -67,13 +66,15 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, p_world: vec3f) -> vec3
     let to_local = transpose(mat3x3f(s.t, s.b, s.n));
     var sum = vec3f(0.0);
     for (var k = 0u; k < LAMPS; k++) {
-        let lamp = plane_lamps.lamps[k];
-        let to = lamp.centre.xyz - p_world;
+        let to = plane_lamps.centres[k].xyz - p_world;
         let per_t = inverseSqrt(max(dot(to, to), 1e-12));
         let w = to * per_t;
         let across = normalize(perpendicular(w));
         let beside = cross(w, across);
-        let spread = mat3x3f(lamp.spread[0].xyz, lamp.spread[1].xyz, lamp.spread[2].xyz);
+        let rows = 3u * k;
+        let spread = mat3x3f(
+            plane_lamps.spreads[rows].xyz, plane_lamps.spreads[rows + 1u].xyz, plane_lamps.spreads[rows + 2u].xyz,
+        );
         // two vectors whose outer products add up to the spread across the view
         let first = spread * across;
         let width = sqrt(max(dot(across, first), 1e-12));
@@ -81,8 +82,8 @@ fn lamps_light(lobe: LambentLobe, wo: vec3f, s: Surface, p_world: vec3f) -> vec3
         let rest = sqrt(max(dot(beside, spread * beside) - lean * lean, 0.0));
         let a = to_local * ((width * across + lean * beside) * per_t);
         let b = to_local * (rest * per_t * beside);
-        let share = object_out(lobe, k, p_world) * lamp.centre.w * seen[k];
-        sum += share * lamp.emission.rgb * lambent_lamp_response(lobe, wo, to_local * w, a, b);
+        let share = object_out(lobe, k, p_world) * plane_lamps.centres[k].w * seen[k];
+        sum += share * plane_lamps.emissions[k].rgb * lambent_lamp_response(lobe, wo, to_local * w, a, b);
     }
     return sum;
 }
