@@ -89,6 +89,13 @@ def command(
     light_field_mb: Annotated[
         float | None, typer.Option(min=0, help="GPU memory for the maps of light fields. [default: all of them]")
     ] = None,
+    sky_turn: Annotated[
+        float,
+        typer.Option(
+            help="Degrees by which the sky, its sun and what light fields see of both turn about the vertical; light on "
+            "surfaces stays as baked."
+        ),
+    ] = 0.0,
     projection: Annotated[
         Literal["perspective", "fisheye", "hemispherical", "cylinder"],
         typer.Option(help="How directions lie in the picture; fisheyes are square."),
@@ -131,7 +138,7 @@ def command(
     scale = parse_range(false_range, log=not linear) if false_range is not None else None
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
-        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb,
+        lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, sky_turn_deg=sky_turn,
     )  # fmt: skip
     settings.check()
     if edit is not None:

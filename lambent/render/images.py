@@ -60,6 +60,8 @@ class Settings:
         Perspective, or what is drawn from the faces of a cube around the eye.
     light_field_mb : float, optional
         Memory on the GPU for the maps of light fields; by default all of them.
+    sky_turn_deg : float
+        By which the sky is turned about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     """
@@ -78,6 +80,7 @@ class Settings:
     projection: Projection = Projection.perspective
     field_deg: float | None = None
     light_field_mb: float | None = None
+    sky_turn_deg: float = 0.0
 
     @property
     def is_false_coloured(self) -> bool:
@@ -96,6 +99,9 @@ class Settings:
         if self.exposure_ev is not None and not -MOST_EV <= self.exposure_ev <= MOST_EV:  # also refuses nan
             got, expected = self.exposure_ev, f"-{MOST_EV} to {MOST_EV} EV"
             raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
+        if not -360 <= self.sky_turn_deg <= 360:  # also refuses nan
+            got, expected = self.sky_turn_deg, "-360 to 360 degrees"
+            raise UserError("the sky turns by less", field="--sky-turn", got=got, expected=expected)
         if self.projection is not Projection.perspective:
             self.view_of(ANYWHERE).check()
         elif self.field_deg is not None:

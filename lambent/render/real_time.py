@@ -21,6 +21,7 @@ from lambent.realtime.incident import AUTO, look_ups
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
+from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
@@ -51,7 +52,8 @@ class RealTime(Images):
             planar=settings.planar, covers=moving,
             lookup=known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup"),
         )  # fmt: skip
-        self._renderer = Renderer(open_device(), read_baked(store, settings.light_field_mb))
+        baked = under_turned_sky(read_baked(store, settings.light_field_mb), settings.sky_turn_deg)
+        self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
 

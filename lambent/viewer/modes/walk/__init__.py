@@ -11,8 +11,10 @@ STARTS = ("walk", "view")
 NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
 
 
-def start(path: Path, name: str, screen: Screen, light_field_mb: float | None = None) -> Mode:
+def start(
+    path: Path, name: str, screen: Screen, light_field_mb: float | None = None, sky_turn_deg: float = 0.0
+) -> Mode:
     """The mode on the store at `path`; `light_field_mb`: for the maps of light fields on the GPU."""
     from lambent.viewer.modes.walk.mode import open_store
 
-    return open_store(path, "walk" if name == "walk" else "orbit", screen, light_field_mb)
+    return open_store(path, "walk" if name == "walk" else "orbit", screen, light_field_mb, sky_turn_deg)

@@ -160,12 +160,13 @@ class Pictures(Pair):
         """B by the path tracer, which has the processor's time that drawing leaves."""
         comparison, a = self._state.comparison, self._a
         if self._traced is None:
-            if self._state.store is None:
+            state = self._state
+            if state.store is None:
                 comparison.fault = "There is no store whose scene could be traced."
                 self.shown = (a,)
                 a.update(wanted, refine=False)
                 return
-            self._traced = TracedPicture(self._renderer.given(), self._state.screen, self._state.store)
+            self._traced = TracedPicture(self._renderer.given(), state.screen, state.store, state.sky_turn_deg)
         b = self._traced
         self.shown = (a, b)
         b.update(wanted)
