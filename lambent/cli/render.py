@@ -83,7 +83,8 @@ def command(
         str,
         typer.Option(
             help="Where reflected rays find their light: auto, planes, distance or plain (of probes), or light_field, "
-            "light_field-1, -bn, -br, -average, -angle, -nearest; -choice shows which point answers."
+            "light_field-1, -bn, -br, -average, -angle, -nearest; -surface shows the object itself from it, too; -choice, "
+            "which point answers."
         ),
     ] = "auto",
     light_field_mb: Annotated[

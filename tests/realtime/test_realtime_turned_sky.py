@@ -19,7 +19,7 @@ from lambent.realtime.baked import Probe, read_baked
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.turned_sky import under_turned_sky
-from lambent.render import Settings, still
+from lambent.render import Settings
 from lambent.scenes.geometry import turn
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.turned_sky import under_turned_sky as scene_under_turned_sky
@@ -99,6 +99,6 @@ def test_what_cannot_be_turned_is_a_line(tmp_path: Path) -> None:
     even = Scene("even", (), {}, environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     assert scene_under_turned_sky(even, 10.0, tmp_path).environment == even.environment
     with pytest.raises(UserError, match="--sky-turn"):
-        still(tmp_path / "none", tmp_path / "a.png", settings=Settings(8, 8, sky_turn_deg=float("nan")))
+        Settings(8, 8, sky_turn_deg=float("nan")).check()
 
 

@@ -34,6 +34,7 @@ class LightFieldLookUp:
     PREFERENCE: int = -1
     RULE: March = field(default_factory=March)
     POWER: int = POWER  # of the cosines that weight points
+    SURFACE: bool = False  # whether points show the object itself, too, in place of its light map
     AIMS: bool = False
     BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "exact layers", "numbers", "cube")
     __file__: str = __file__
@@ -51,7 +52,7 @@ class LightFieldLookUp:
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
-            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None,
+            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
@@ -87,4 +88,5 @@ LOOK_UPS = (
     LightFieldLookUp("light_field-br", TOWARDS_RAY, 13),
     LightFieldLookUp("light_field-bn", TOWARDS_NORMAL, 14),
     LightFieldLookUp("light_field-choice", CHOSEN, 21),
+    LightFieldLookUp("light_field-surface", MARCHED, 22, SURFACE=True),
 )
