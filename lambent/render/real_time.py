@@ -18,6 +18,7 @@ from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.incident import AUTO, look_ups
+from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
@@ -50,9 +51,11 @@ class RealTime(Images):
             n=None if self._progressive else settings.samples,
             view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
             planar=settings.planar, covers=moving,
-            lookup=known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup"),
+            lookup=settings.lookup,
         )  # fmt: skip
+        lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = under_turned_sky(read_baked(store, settings.light_field_mb), settings.sky_turn_deg)
+        check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,16 @@ import pytest
 
 from lambent.core import light_field_lookup as numpy_twin
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.core.light_field import LightField
 from lambent.core.octahedral import texel_directions
 from lambent.materials.document import Lobe, Material
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.render import Settings, still
+from tests.realtime.lit_ball import light_field, put_ball
 from tests.realtime.lit_plate import CAMERA, EDGE, HEIGHT, mirrored, plate_field, plate_scene
+from tests.viewer.small_store import write_small_store
 
 SIZE = 128
 STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="diffuse", integrator="rings")
@@ -40,7 +45,7 @@ def field_with_plate(blind: int = 0) -> LightField:
     nearness = np.where(on, 1 / t, field.inverse_distance).astype(np.float16)
     if blind:
         nearness[::blind] *= np.float16(1.5)
-    return replace(field, radiance=radiance, inverse_distance=nearness)
+    return replace(field, radiance=radiance, inverse_distance=nearness, own_diffuse=True)
 
 
 def drawn(device: Any, field: LightField, look_up: str) -> Floats:
@@ -82,3 +87,18 @@ def test_reflections_are_those_of_the_march(device: Any) -> None:
         scene.image(replace(STATE, show="specular", lookup=name)) for name in ("light_field-surface", "light_field")
     ]
     np.testing.assert_array_equal(*pictures)
+
+
+def test_a_store_that_cannot_serve_is_a_line(tmp_path: Path) -> None:
+    """No light field at all, or maps that show the object with its reflections."""
+    from lambent.store.light_fields import read_light_field
+
+    ball = put_ball(tmp_path / "ball.store", light_field(count=12, side=14))
+    assert not read_light_field(ball, "ball").own_diffuse
+    for folder, look_up, said in (
+        (write_small_store(tmp_path / "small"), "light_field-bn", "no light field"),
+        (ball.folder, "light_field-surface", "levels = 1"),
+    ):
+        with pytest.raises(UserError, match="--lookup") as fault:
+            still(folder, tmp_path / "a.png", settings=Settings(8, 8, lookup=look_up))
+        assert said in str(fault.value) and "\n" not in str(fault.value)

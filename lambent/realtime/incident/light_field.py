@@ -5,16 +5,17 @@ Spec: thesis R, "Offset surface light fields"; the methods are those of `core.li
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import wgpu
 
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.core.light_field import NO_POINT
 from lambent.core.light_field_lookup import POWER, March
-from lambent.realtime.baked import Probe
+from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.structs import LIGHT_FIELD_DTYPE
@@ -40,7 +41,10 @@ class LightFieldLookUp:
     __file__: str = __file__
 
     def serves(self, probe: Probe) -> bool:
-        return probe.light_field is not None and bool((probe.light_field.sample_map != NO_POINT).any())
+        field = probe.light_field
+        if field is None or (self.SURFACE and not field.own_diffuse):
+            return False
+        return bool((field.sample_map != NO_POINT).any())
 
     def distances(self, probe: Probe, w: Floats) -> Floats:
         return np.full(len(w), np.inf)
@@ -90,3 +94,16 @@ LOOK_UPS = (
     LightFieldLookUp("light_field-choice", CHOSEN, 21),
     LightFieldLookUp("light_field-surface", MARCHED, 22, SURFACE=True),
 )
+
+
+def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
+    """`UserError` where a look-up of light fields is wanted and serves no object of the scene."""
+    look_up = next((one for one in LOOK_UPS if one.NAME == wanted), None)
+    if look_up is None:
+        return
+    if not scene.light_fields:
+        hint = f"`lambent bake SCENE -o {store} --light-fields NAME,...` makes some"
+        raise UserError("the store has no light field", field="--lookup", got=wanted, hint=hint)
+    if not any(look_up.serves(replace(DARK, light_field=one)) for one in scene.light_fields.values()):
+        hint = "give the object `light_field = { levels = 1 }` in the scene, and bake"
+        raise UserError("light fields show their object with its reflections", field="--lookup", got=wanted, hint=hint)
