@@ -90,6 +90,9 @@ def command(
     light_field_mb: Annotated[
         float | None, typer.Option(min=0, help="GPU memory for the maps of light fields. [default: all of them]")
     ] = None,
+    light_field_cache: Annotated[
+        str, typer.Option(help="Which maps go where not all have room: least-recent or adaptive.")
+    ] = "least-recent",
     sky_turn: Annotated[
         float,
         typer.Option(
@@ -140,6 +143,7 @@ def command(
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, sky_turn_deg=sky_turn,
+        light_field_cache=light_field_cache,
     )  # fmt: skip
     settings.check()
     if edit is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.map_cache import LEAST_RECENT
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 
@@ -60,6 +62,8 @@ class Settings:
         Perspective, or what is drawn from the faces of a cube around the eye.
     light_field_mb : float, optional
         Memory on the GPU for the maps of light fields; by default all of them.
+    light_field_cache : str
+        Which maps go where not all have room: least-recent or adaptive (`core.map_cache`).
     sky_turn_deg : float
         By which the sky is turned about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
     field_deg : float, optional
@@ -81,6 +85,7 @@ class Settings:
     field_deg: float | None = None
     light_field_mb: float | None = None
     sky_turn_deg: float = 0.0
+    light_field_cache: str = LEAST_RECENT
 
     @property
     def is_false_coloured(self) -> bool:
@@ -118,7 +123,7 @@ class Images(ABC):
         self.exposure_ev = settings.exposure_ev  # None until an image was displayed
 
     @property
-    def light_fields(self) -> dict[str, float]:
+    def light_fields(self) -> dict[str, Any]:
         """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
         return {}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,14 +55,16 @@ class RealTime(Images):
             lookup=settings.lookup,
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
-        baked = under_turned_sky(read_baked(store, settings.light_field_mb), settings.sky_turn_deg)
+        baked = under_turned_sky(
+            read_baked(store, settings.light_field_mb, settings.light_field_cache), settings.sky_turn_deg
+        )
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
 
     @property
-    def light_fields(self) -> dict[str, float]:
+    def light_fields(self) -> dict[str, Any]:
         return self._renderer.streaming.statistics
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

@@ -100,5 +100,3 @@ def test_what_cannot_be_turned_is_a_line(tmp_path: Path) -> None:
     assert scene_under_turned_sky(even, 10.0, tmp_path).environment == even.environment
     with pytest.raises(UserError, match="--sky-turn"):
         Settings(8, 8, sky_turn_deg=float("nan")).check()
-
-

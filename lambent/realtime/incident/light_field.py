@@ -62,7 +62,7 @@ class LightFieldLookUp:
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
         light_field = probe.light_field
         assert light_field is not None, "this look-up does not serve the probe"
-        maps = ResidentMaps(device, light_field, probe.most_bytes)
+        maps = ResidentMaps(device, light_field, probe.most_bytes, probe.policy)
         if not maps.whole:
             streams.append(maps)
         atlas = maps.atlas

@@ -6,6 +6,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from lambent.core.map_cache import LEAST_RECENT
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
@@ -29,14 +30,15 @@ from lambent.viewer.work import POLL_S
 
 
 def open_store(
-    path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, sky_turn_deg: float = 0.0
-) -> WalkMode:
+    path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
+    sky_turn_deg: float = 0.0,
+) -> WalkMode:  # fmt: skip
     """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`.
 
-    `light_field_mb` is for the maps of light fields on the GPU; by `sky_turn_deg` the sky is turned.
+    `light_field_mb` is for the maps of light fields on the GPU, in caches of a `policy` of `core.map_cache`; by `sky_turn_deg` the sky is turned.
     """
     store = Store.open(path)
-    baked = under_turned_sky(read_baked(store, light_field_mb), sky_turn_deg)
+    baked = under_turned_sky(read_baked(store, light_field_mb, policy), sky_turn_deg)
     state = WalkState.of(baked.record, movement, screen, store.folder)
     state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
     state.sky_turn_deg = sky_turn_deg

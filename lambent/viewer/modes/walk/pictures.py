@@ -87,7 +87,9 @@ class Pictures(Pair):
             state.comparison.forget()
             state.comparison.figures = None
             self.shown = (self._a,)
-            still = state.films.under_way is not None or shows_choice(wanted)  # a mean of points' colours is none of them
+            still = state.films.under_way is not None or shows_choice(
+                wanted
+            )  # a mean of points' colours is none of them
             self._a.update(wanted, refine=False if still else None)
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units

@@ -110,7 +110,9 @@ class TracedPicture:
         if at is None:
             return np.asarray(light, np.float32)
         height, width = light.shape[:2]
-        column, row = (min(max(int(share * size), 0), size - 1) for share, size in zip(at, (width, height), strict=True))
+        column, row = (
+            min(max(int(share * size), 0), size - 1) for share, size in zip(at, (width, height), strict=True)
+        )
         return np.asarray(light[row : row + 1, column : column + 1], np.float32)
 
     def rest(self) -> None:

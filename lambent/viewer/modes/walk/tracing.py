@@ -104,9 +104,7 @@ class Tracing:
         if self._process is None:
             self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
             command = [sys.executable, "-m", WORKER, *self._words]
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log
-            )
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log)
             self._work = Work(self._listen, lambda _: None, self._failed)
         assert self._process.stdin is not None
         try:

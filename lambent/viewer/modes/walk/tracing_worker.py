@@ -140,6 +140,8 @@ if __name__ == "__main__":
     own = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is none of the pictures
     try:
-        main(Path(sys.argv[1]), float(sys.argv[2]), Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own)  # no lock to end with
+        main(
+            Path(sys.argv[1]), float(sys.argv[2]), Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own
+        )  # no lock to end with
     except UserError as error:
         say(own, error=str(error))
