@@ -83,7 +83,8 @@ def command(
         str,
         typer.Option(
             help="Where reflected rays find their light: auto, planes, distance or plain (of probes), or light_field, "
-            "light_field-1, -bn, -br, -average, -angle, -nearest; -choice shows which point answers."
+            "light_field-1, -bn, -br, -average, -angle, -nearest; -surface shows the object itself from it, too; -choice, "
+            "which point answers."
         ),
     ] = "auto",
     light_field_mb: Annotated[
@@ -96,6 +97,16 @@ def command(
             "with @SECONDS. Repeatable. [default: as saved with the view, else as baked]"
         ),
     ] = None,
+    light_field_cache: Annotated[
+        str, typer.Option(help="Which maps go where not all have room: least-recent or adaptive.")
+    ] = "least-recent",
+    sky_turn: Annotated[
+        float,
+        typer.Option(
+            help="Degrees by which the sky, its sun and what light fields see of both turn about the vertical; light on "
+            "surfaces stays as baked."
+        ),
+    ] = 0.0,
     projection: Annotated[
         Literal["perspective", "fisheye", "hemispherical", "cylinder"],
         typer.Option(help="How directions lie in the picture; fisheyes are square."),
@@ -143,7 +154,7 @@ def command(
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
-        light=parse_light(light) if light else None,
+        light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
     )  # fmt: skip
     settings.check()
     if edit is not None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from lambent.cli.walk import SIZE, Memory, Size, Store, show
+from lambent.cli.walk import LEAST_RECENT, SIZE, Cache, Memory, Size, Store, Turn, show
 
 
-def command(store: Store, size: Size = SIZE, light_field_mb: Memory = None) -> None:
+def command(
+    store: Store, size: Size = SIZE, light_field_mb: Memory = None, light_field_cache: Cache = LEAST_RECENT,
+    sky_turn: Turn = 0.0,
+) -> None:  # fmt: skip
     """Turn about an object of a baked scene: drag to orbit, wheel to come nearer; the same window as `walk`.
 
     Example: lambent view room.store
     """
-    show(store, "view", size, light_field_mb)
+    show(store, "view", size, light_field_mb, light_field_cache, sky_turn)

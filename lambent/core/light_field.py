@@ -32,6 +32,7 @@ class LightField:
     corner : row and column of the sample map's first texel in a grid of `grid` (rows, columns) over the light map's uv2
         in [0, 1]: texel (row, column) has its centre at uv2 = ((column + 1/2)/columns, (row + 1/2)/rows).
     offset_m : how far off the surface the points are.
+    own_diffuse : whether the maps show the object itself without its lobes.
     blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
     """
 
@@ -44,3 +45,4 @@ class LightField:
     grid: tuple[int, int]
     offset_m: float
     blocks: NDArray[np.uint32] | None = None
+    own_diffuse: bool = False

@@ -131,4 +131,5 @@ def fewest_misses(reads: Sequence[int], capacity: int) -> int:
     return missed
 
 
-POLICIES: dict[str, Callable[[int], MapCache]] = {"least-recent": LeastRecent, "adaptive": Adaptive}
+LEAST_RECENT = "least-recent"
+POLICIES: dict[str, Callable[[int], MapCache]] = {LEAST_RECENT: LeastRecent, "adaptive": Adaptive}

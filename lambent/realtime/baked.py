@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.discovery import known
 from lambent.core.light_field import LightField
+from lambent.core.map_cache import LEAST_RECENT, POLICIES
 from lambent.core.plain import triple
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays, groups_in
@@ -42,6 +44,7 @@ class Probe:
     light_field: LightField | None = None
     sky: Floats | None = None
     most_bytes: float | None = None  # that the maps of the light field may take on the GPU
+    policy: str = LEAST_RECENT  # of the cache that they are in, where they do not fit
 
 
 DARK = Probe((0.0, 0.0, 0.0), np.zeros((6, 1, 1, 3), np.float32))
@@ -75,6 +78,7 @@ class BakedScene:
     dominant_direction: Floats | None = None  # (H, W, 3), that light comes from; may be absent
     unit: float = 1.0
     light_field_mb: float | None = None  # that the maps of all light fields may take on the GPU; None: any
+    policy: str = LEAST_RECENT  # of their caches
     sun: SunRecord | None = None  # whose direct light the light maps leave out
     groups: GroupArrays | None = None  # the light by group; None where it was baked as one
 
@@ -90,7 +94,9 @@ class BakedScene:
         if self.light_field_mb is not None:
             whole = sum(one.inverse_distance.size for one in self.light_fields.values())
             most = 1e6 * self.light_field_mb * light_field.inverse_distance.size / whole
-        return replace(probe or DARK, light_field=light_field, sky=self.environment, most_bytes=most)
+        return replace(
+            probe or DARK, light_field=light_field, sky=self.environment, most_bytes=most, policy=self.policy
+        )
 
     def _cube_of(self, obj: ObjectRecord) -> Probe | None:
         owner = self.shared_probes.get(obj.name, obj.name)
@@ -118,8 +124,9 @@ def _in_units(sun: SunRecord | None, unit: float) -> SunRecord | None:
     return sun and sun.model_copy(update={"irradiance": triple(np.divide(sun.irradiance, unit))})
 
 
-def read_baked(store: Store, light_field_mb: float | None = None) -> BakedScene:
+def read_baked(store: Store, light_field_mb: float | None = None, policy: str = LEAST_RECENT) -> BakedScene:
     """Everything the renderer shows of a store. Only the geometry and the scene record must be there."""
+    known("cache of light fields", policy, POLICIES, field="--light-field-cache")
     record = contract.scene_record(store)
     missing: list[str] = []
     cubes = [n for n in (ENVIRONMENT, *(contract.probe_name(o.name, "radiance") for o in record.objects)) if n in store]
@@ -170,6 +177,7 @@ def read_baked(store: Store, light_field_mb: float | None = None) -> BakedScene:
         dominant_direction=store.read(DOMINANT_DIRECTION) if DOMINANT_DIRECTION in store else None,
         unit=unit,
         light_field_mb=light_field_mb,
+        policy=policy,
         sun=_in_units(contract.sun_beside(store), unit),
         groups=groups_in(store, unit),
     )

@@ -39,7 +39,9 @@ class Discs(Overlay):
         render = context.begin("discs", [shown], "clear")
         if len(places):
             render.set_pipeline(self._pipeline)
-            render.set_vertex_buffer(0, self._layouts.buffer("VERTEX", _vertices(places, colours, radii_px, rims, state)))
+            render.set_vertex_buffer(
+                0, self._layouts.buffer("VERTEX", _vertices(places, colours, radii_px, rims, state))
+            )
             render.draw(len(_CORNERS) * len(places))
         render.end()
         self._device.queue.submit([context.slicing.encoder.finish()])

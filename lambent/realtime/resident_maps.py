@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from lambent.core.light_field import NO_POINT, LightField
-from lambent.core.map_cache import LeastRecent
+from lambent.core.map_cache import LEAST_RECENT, POLICIES
 from lambent.realtime.light_field_atlas import Atlas, Packed
 from lambent.realtime.uploads import upload
 
@@ -38,14 +38,16 @@ class ResidentMaps:
     """The atlas of a light field, and `points`, the table of places; `most_bytes` for both textures of the atlas.
 
     Without a budget, and where all maps fit, they stay for good. Else `follow` keeps those that views need, and drops
-    the one that was needed longest ago.
+    those that its `policy`, one of `core.map_cache.POLICIES`, lets go.
     """
 
-    def __init__(self, device: Any, field: LightField, most_bytes: float | None = None) -> None:
+    def __init__(
+        self, device: Any, field: LightField, most_bytes: float | None = None, policy: str = LEAST_RECENT
+    ) -> None:
         self.atlas, self._device, self._field = Atlas(device, field, most_bytes), device, field
         count, room = len(field.points), self.atlas.places
         self.whole, self.reads = room == count, Reads()
-        self._cache = LeastRecent(room)
+        self._cache = POLICIES[policy](room)
         first = np.arange(count) if self.whole else np.linspace(0, count - 1, room).round().astype(int)
         self._place = {int(point): place for place, point in enumerate(first)}  # of the maps that are there, by point
         self._ready: Future[tuple[Sequence[int], Packed]] | None = None

@@ -62,11 +62,12 @@ class Streaming:
 
     @property
     def statistics(self) -> dict[str, Any]:
-        """maps of all light fields with a budget; how many are resident, their MB; hits and misses of frames' reads."""
+        """The policy of the caches; maps of all light fields with a budget; how many are resident, their MB; hits and misses of frames' reads."""
         caches = list(self._caches())
         if not caches:
             return {}
         return {
+            "cache": self._scene.policy,
             "maps": sum(one.maps for one in caches),
             "resident": sum(one.resident for one in caches),
             "resident_mb": round(sum(one.resident_mb for one in caches), 3),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from lambent.core.false_colour import Range, false_colour, fitting_range, with_s
 from lambent.core.images import to_bytes
 from lambent.core.light_mix import MixTrack
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.map_cache import LEAST_RECENT
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 
@@ -64,6 +66,10 @@ class Settings:
     light : MixTrack, optional
         Mix of the store's light groups, over the time of a film; by default that of a saved view or walk, else as
         baked.
+    light_field_cache : str
+        Which maps go where not all have room: least-recent or adaptive (`core.map_cache`).
+    sky_turn_deg : float
+        By which the sky is turned about the vertical, -360 to 360, from -z towards -x (`realtime.turned_sky`).
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     seed : int
@@ -86,6 +92,8 @@ class Settings:
     light_field_mb: float | None = None
     seed: int = 0
     light: MixTrack | None = None
+    sky_turn_deg: float = 0.0
+    light_field_cache: str = LEAST_RECENT
 
     @property
     def is_false_coloured(self) -> bool:
@@ -104,6 +112,9 @@ class Settings:
         if self.exposure_ev is not None and not -MOST_EV <= self.exposure_ev <= MOST_EV:  # also refuses nan
             got, expected = self.exposure_ev, f"-{MOST_EV} to {MOST_EV} EV"
             raise UserError("exposure is out of range", field="--exposure", got=got, expected=expected)
+        if not -360 <= self.sky_turn_deg <= 360:  # also refuses nan
+            got, expected = self.sky_turn_deg, "-360 to 360 degrees"
+            raise UserError("the sky turns by less", field="--sky-turn", got=got, expected=expected)
         if self.projection is not Projection.perspective:
             self.view_of(ANYWHERE).check()
         elif self.field_deg is not None:
@@ -121,7 +132,7 @@ class Images(ABC):
         self.exposure_ev = settings.exposure_ev  # None until an image was displayed
 
     @property
-    def light_fields(self) -> dict[str, float]:
+    def light_fields(self) -> dict[str, Any]:
         """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
         return {}
 

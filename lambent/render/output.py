@@ -49,7 +49,7 @@ class Rendered:
     exposure_ev: float | None = None
     ev100: float | None = None
     scale: dict[str, float | bool | str] | None = None
-    light_fields: dict[str, float] | None = None
+    light_fields: dict[str, Any] | None = None
 
 
 def ignore(text: str) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from lambent.bake.engine import engine
 from lambent.core.arrays import Floats
@@ -10,6 +12,7 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.render.images import Images, Settings
+from lambent.scenes.turned_sky import under_turned_sky
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 
@@ -40,6 +43,7 @@ class PathTraced(Images):
         )
 
         settings = self.settings
-        spp = settings.samples or SPP
-        size = settings.width, settings.height
-        return render_reference(self._scene, camera, *size, spp, settings.seed, progress)[0]
+        spp, size = settings.samples or SPP, (settings.width, settings.height)
+        with TemporaryDirectory() as folder:
+            scene = under_turned_sky(self._scene, settings.sky_turn_deg, Path(folder))
+            return render_reference(scene, camera, *size, spp, settings.seed, progress)[0]

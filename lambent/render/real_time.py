@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,11 @@ from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
 from lambent.realtime.incident import AUTO, look_ups
+from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
+from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
@@ -51,9 +54,14 @@ class RealTime(Images):
             n=None if self._progressive else settings.samples,
             view_transform="filmic" if settings.is_false_coloured else settings.view, show=settings.show,
             planar=settings.planar, covers=moving,
-            lookup=known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup"),
+            lookup=settings.lookup,
         )  # fmt: skip
-        self._renderer = Renderer(open_device(), read_baked(store, settings.light_field_mb))
+        lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
+        baked = under_turned_sky(
+            read_baked(store, settings.light_field_mb, settings.light_field_cache), settings.sky_turn_deg
+        )
+        check_serves(baked, lookup, store.folder.name)
+        self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
         self._check_light(settings.light, note)
@@ -74,7 +82,7 @@ class RealTime(Images):
         return self._frame(camera, light={} if light is None else light.factors_at(self.time_s))
 
     @property
-    def light_fields(self) -> dict[str, float]:
+    def light_fields(self) -> dict[str, Any]:
         return self._renderer.streaming.statistics
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

@@ -234,7 +234,8 @@ class LightGroup:
 class LightFieldWish:
     """What is asked of an object's offset surface light field (`core.light_field`); None leaves it to the bake.
 
-    `points` at most, each with a map of `texels` a side, at `offset_m` off the surface. With an `error`, the mean
+    `points` at most, each with a map of `texels` a side, at `offset_m` off the surface; with one of
+    `levels`, the object shows itself without its lobes. With an `error`, the mean
     difference in log(1 + L/median) to what viewers see mirrored, only as many points as it takes to come down to it.
     """
 
@@ -242,6 +243,7 @@ class LightFieldWish:
     texels: int | None = None
     offset_m: float | None = None
     error: float | None = None
+    levels: int | None = None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from lambent.viewer.pacing import BUDGET_S
 
@@ -50,7 +51,7 @@ class Statistics:
     accumulated: int = 0  # per pixel, since the camera rests
     accumulate_to: int = 0
     scale: float = 1.0  # of the picture's width and height, by the pacing
-    light_fields: Mapping[str, float] = field(default_factory=dict)  # `Streaming.statistics`
+    light_fields: Mapping[str, Any] = field(default_factory=dict)  # `Streaming.statistics`
     mirrors: int | None = 0  # planar reflectors with a mirrored view; None: left out, by the pacing
 
 

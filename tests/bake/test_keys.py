@@ -143,6 +143,7 @@ WISH: Answers = {
     "texels": (12, FIELDS),
     "offset_m": (0.02, FIELDS),
     "error": (0.1, FIELDS),
+    "levels": (1, FIELDS),
 }
 SCENE: Answers = {
     "name": ("renamed", NOTHING),

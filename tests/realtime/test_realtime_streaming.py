@@ -115,3 +115,21 @@ def test_a_still_says_how_its_maps_were_found(tmp_path: Path, device: Any, field
     done = still(store.folder, tmp_path / "a.exr", settings=settings)
     assert done.light_fields is not None and done.light_fields["resident"] == 20 and done.light_fields["hits"] > 0
     assert still(store.folder, tmp_path / "b.exr", settings=Settings(32, 32, samples=1)).light_fields is None
+
+
+def test_the_cache_is_chosen_by_name(tmp_path: Path, device: Any, scene: BakedScene, field: LightField) -> None:
+    """A walk to the other side and back leaves other maps in an adaptive cache; both show what there is room for."""
+    exact, kept = Renderer(device, scene), {}
+    mb = megabytes(device, field, 44.5)
+    for policy in ("least-recent", "adaptive"):
+        renderer = Renderer(device, replace(scene, light_field_mb=mb, policy=policy))
+        for camera in (CAMERA, BEHIND, CAMERA, CAMERA):
+            image = renderer.image(replace(STATE, camera=camera))
+        found = renderer.streaming.statistics
+        assert found["cache"] == policy and found["resident"] == 44
+        assert np.abs(image - exact.image(STATE)).mean() < 0.05 * exact.image(STATE).mean()
+        kept[policy] = found["hits"], found["misses"]
+    assert kept["least-recent"] != kept["adaptive"]
+    store = put_ball(tmp_path / "ball.store", field)
+    with pytest.raises(UserError, match="--light-field-cache"):
+        still(store.folder, tmp_path / "a.png", settings=Settings(8, 8, light_field_cache="newest"))

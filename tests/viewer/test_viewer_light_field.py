@@ -47,7 +47,9 @@ def test_discs_are_drawn_where_points_are_and_hidden_by_the_ball(renderer, field
     frame = FrameState(CAMERA, *SIZE)
     colours = colours_of(np.arange(len(field.points), dtype=float))
     count = len(field.points)
-    drawn = pixels_of(renderer, renderer.discs().draw(frame, field.points, colours, np.full(count, 4.0), np.zeros(count)))
+    drawn = pixels_of(
+        renderer, renderer.discs().draw(frame, field.points, colours, np.full(count, 4.0), np.zeros(count))
+    )
     places, _ = projected(CAMERA, field.points.astype(float), SIZE)
     towards = np.array(CAMERA.position) - field.points
     facing = (field.normals * towards).sum(axis=-1) / np.linalg.norm(towards, axis=-1)

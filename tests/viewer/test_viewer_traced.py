@@ -97,7 +97,9 @@ def test_b_is_the_path_traced_scene_and_follows_the_camera(pictures, state, stor
     b = traced_until(pictures, state, 8)
     first = reference(store, state.navigation.camera, 64)
     assert np.abs(z_of(b, first)).max() < 4
-    assert pictures.views[1].texture is not a.view.texture and f"{b.samples} samples" in state.comparison.divider.b_label
+    assert (
+        pictures.views[1].texture is not a.view.texture and f"{b.samples} samples" in state.comparison.divider.b_label
+    )
     camera = state.navigation.camera
     state.navigation.camera = replace(camera, fov_y_deg=0.6 * camera.fov_y_deg)
     drawn(pictures, state)
@@ -184,7 +186,9 @@ def test_given_radiance_is_shown_as_frames_show_theirs(renderer, state):
         )
         given.take(renderer.image(frame))
         given.show(frame)
-        data = renderer.device.queue.read_texture({"texture": given.view.texture}, {"bytes_per_row": 4 * SIZE[0]}, (*SIZE, 1))
+        data = renderer.device.queue.read_texture(
+            {"texture": given.view.texture}, {"bytes_per_row": 4 * SIZE[0]}, (*SIZE, 1)
+        )
         shown = np.frombuffer(data, np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3].astype(int)
         assert np.abs(shown - renderer.display_image(frame)).max() <= 1
     assert shown.std() > 3

@@ -73,11 +73,15 @@ SETTINGS = {
 
 @dataclass(frozen=True)
 class Traced:
-    """The scene that points are placed in, what they see, and the unit of its light in half floats."""
+    """The scene that points are placed in, what they see, and the unit of its light in half floats.
+
+    `bare` is what points of objects see whose light fields have one level.
+    """
 
     placing: Placing
     around: Around
     unit: float
+    bare: Around
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -125,7 +129,7 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
     """This bake's settings, with what is asked of one object."""
-    asked = {name: value for name in ("points", "texels") if (value := getattr(wish, name)) is not None}
+    asked = {name: value for name in ("points", "texels", "levels") if (value := getattr(wish, name)) is not None}
     how: Settings = context.settings(KIND)
     return replace(how, **asked)
 
@@ -166,15 +170,15 @@ def _traced(context: BakeContext) -> Traced:
     from lambent.bake.light_fields.surroundings import around, unit_of
 
     levels, traced, maps = context.settings(KIND).levels, context.traced, finished_maps(context)
-    bare = context.scene.light_fields if levels == 1 else ()
+    wishes = context.scene.light_fields.items()
+    bare = [name for name, wish in wishes if settings_of(context, wish).levels == 1]
     depth = MIRROR_DEPTH if levels == 1 else levels
-    if _cached(context):
-        seen = around(traced, maps, depth, bare)
-    else:
-        seen = around(traced, None, context.settings("light_map").max_depth, bare)
+    lit = (maps, depth) if _cached(context) else (None, context.settings("light_map").max_depth)
+    seen = around(traced, *lit, bare if levels == 1 else ())
     kind = {"diffuse": not _cached(context)}
     placing = Placing(traced.builder(**kind), traced.whole(**kind))
-    return Traced(placing, seen, unit_of(context.scene, maps[0], traced.sun))
+    unit = unit_of(context.scene, maps[0], traced.sun)
+    return Traced(placing, seen, unit, seen if levels == 1 or not bare else around(traced, *lit, bare))
 
 
 def _chooser(context: BakeContext, traced: Traced) -> Chooser:
@@ -188,7 +192,8 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     from lambent.bake.light_fields.acquisition import inverse_distances, radiance_maps
     from lambent.core.light_field_blocks import blocks_of, blocks_shape
 
-    start, how, seen = time.perf_counter(), settings_of(context, wish), traced.around
+    start, how = time.perf_counter(), settings_of(context, wish)
+    seen = traced.bare if how.levels == 1 else traced.around
     progress(0, 1, "points")
     points = _points(context, name, wish, traced)
 
@@ -212,7 +217,7 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
         run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
         writer.finish()
-    _sample_map(context, name, points, start)
+    _sample_map(context, name, points, how.levels, start)
 
 
 def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Floats:
@@ -235,7 +240,7 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     return context.store.read(names[0])
 
 
-def _sample_map(context: BakeContext, name: str, points: Floats, start: float) -> None:
+def _sample_map(context: BakeContext, name: str, points: Floats, levels: int, start: float) -> None:
     """Written last: a light field that has it is whole."""
     from lambent.bake.light_fields.sample_map import sample_map
 
@@ -247,7 +252,7 @@ def _sample_map(context: BakeContext, name: str, points: Floats, start: float) -
     faces = np.arange(first[number], first[number + 1])
     found = sample_map(context.geometry, faces, size, points, float(np.sqrt(area_m2 / len(points))))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
-    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m}
+    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": levels}
     seconds = round(time.perf_counter() - start, 2)
     name_of_map = light_field_name(name, "sample_map")
     context.put(KIND, name_of_map, found.entries, context.provenance(**note, seconds=seconds))

@@ -5,16 +5,17 @@ Spec: thesis R, "Offset surface light fields"; the methods are those of `core.li
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import wgpu
 
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.core.light_field import NO_POINT
 from lambent.core.light_field_lookup import POWER, March
-from lambent.realtime.baked import Probe
+from lambent.realtime.baked import DARK, BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
 from lambent.realtime.resident_maps import ResidentMaps, filled
 from lambent.realtime.structs import LIGHT_FIELD_DTYPE
@@ -34,12 +35,16 @@ class LightFieldLookUp:
     PREFERENCE: int = -1
     RULE: March = field(default_factory=March)
     POWER: int = POWER  # of the cosines that weight points
+    SURFACE: bool = False  # whether points show the object itself, too, in place of its light map
     AIMS: bool = False
     BINDINGS: tuple[str, ...] = ("uniform", "exact", "layers", "exact layers", "numbers", "cube")
     __file__: str = __file__
 
     def serves(self, probe: Probe) -> bool:
-        return probe.light_field is not None and bool((probe.light_field.sample_map != NO_POINT).any())
+        field = probe.light_field
+        if field is None or (self.SURFACE and not field.own_diffuse):
+            return False
+        return bool((field.sample_map != NO_POINT).any())
 
     def distances(self, probe: Probe, w: Floats) -> Floats:
         return np.full(len(w), np.inf)
@@ -51,13 +56,13 @@ class LightFieldLookUp:
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
-            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None,
+            "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
         light_field = probe.light_field
         assert light_field is not None, "this look-up does not serve the probe"
-        maps = ResidentMaps(device, light_field, probe.most_bytes)
+        maps = ResidentMaps(device, light_field, probe.most_bytes, probe.policy)
         if not maps.whole:
             streams.append(maps)
         atlas = maps.atlas
@@ -87,4 +92,18 @@ LOOK_UPS = (
     LightFieldLookUp("light_field-br", TOWARDS_RAY, 13),
     LightFieldLookUp("light_field-bn", TOWARDS_NORMAL, 14),
     LightFieldLookUp("light_field-choice", CHOSEN, 21),
+    LightFieldLookUp("light_field-surface", MARCHED, 22, SURFACE=True),
 )
+
+
+def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
+    """`UserError` where a look-up of light fields is wanted and serves no object of the scene."""
+    look_up = next((one for one in LOOK_UPS if one.NAME == wanted), None)
+    if look_up is None:
+        return
+    if not scene.light_fields:
+        hint = f"`lambent bake SCENE -o {store} --light-fields NAME,...` makes some"
+        raise UserError("the store has no light field", field="--lookup", got=wanted, hint=hint)
+    if not any(look_up.serves(replace(DARK, light_field=one)) for one in scene.light_fields.values()):
+        hint = "give the object `light_field = { levels = 1 }` in the scene, and bake"
+        raise UserError("light fields show their object with its reflections", field="--lookup", got=wanted, hint=hint)

@@ -20,6 +20,7 @@ override FIRST: f32 = 0.15;
 override LAST: f32 = 1.0;
 override TOLERANCE: f32 = 0.15;
 override ALIKE: f32 = 0.15;
+override SURFACE: bool = false; // points show the surface itself, too
 override HAS_SKY: bool = true; // or the maps answer for it
 
 const NEAREST = 0u;
@@ -250,6 +251,34 @@ fn chosen(s: Surface, r: vec3f) -> vec3f {
         colour = 0.2 + 0.6 * fract(point * vec3f(0.618034, 0.754878, 0.569840));
     }
     return 0.3 * colour / frame.exposure;
+}
+
+const CONES = vec2f(0.42261826, 0.25881905); // cosines of 65 and 75 degrees
+const SURFACE_TOLERANCE = 0.15;
+const UNSEEN = 3.0;
+
+// How little a point is asked for the surface at x: by the cones about n that it is out of, UNSEEN where its map has
+// something else in x's place.
+fn rank_of(point: u32, x: vec3f, n: vec3f) -> f32 {
+    if (point == NO_POINT) { return UNSEEN; }
+    let q = x - place_of_point(point);
+    let away = length(q);
+    let cosine = -dot(q, n) / max(away, 1e-12);
+    let sees = abs(away * inverse_distance(tile_of(point), select(-n, q, away > 0.0)) - 1.0) < SURFACE_TOLERANCE;
+    return select(UNSEEN, dot(select(vec2f(0.0), vec2f(1.0), vec2f(cosine) < CONES), vec2f(1.0)), sees);
+}
+
+// Light of the surface as the nearest point shows it that lies in the narrowest cone and sees it (3.11).
+fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
+    if (!SURFACE) { return of_light_map; }
+    let x = s.x + object.centre.xyz;
+    let p = s.points;
+    let ranks = vec4f(rank_of(p.x, x, s.n), rank_of(p.y, x, s.n), rank_of(p.z, x, s.n), rank_of(p.w, x, s.n));
+    let least = -largest_of(-ranks);
+    if (least >= UNSEEN) { return of_light_map; }
+    let point = u32(dot(first_largest(-ranks), vec4f(p)));
+    let q = x - place_of_point(point);
+    return light_of(point, select(-s.n, q, dot(q, q) > 0.0), SHARP);
 }
 
 fn incident_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {

@@ -27,6 +27,11 @@ fn ray_of_point(s: Surface, point: u32, w: vec3f) -> vec3f {
     return incident_ray(s, w);
 }
 
+// Light of the surface itself without its lobes: that of the light map, where no look-up knows better.
+fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
+    return of_light_map;
+}
+
 // Light from local direction w without a filter.
 fn incident_ray(s: Surface, w: vec3f) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));

@@ -73,7 +73,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     s.occlusion = specular_occlusion(s.n, e_bent); // of light without the sun, as probes have it
     e_bent += sun_cos * direct;
     e_here += max(facing, 0.0) * direct;
-    let diffuse = diffuse_light(wo.z, e_bent, e_beyond, s.painted);
+    let diffuse = own_light(s, diffuse_light(wo.z, e_bent, e_beyond, s.painted));
     let emitted = select(vec3f(0.0), object.emission.rgb, front);
 
     let specular = specular_light(wo, s);

@@ -29,7 +29,9 @@ def draw(screen: Screen, editor: Editor | None, notes: Sequence[str] = ()) -> No
         table.append(("disks, curves, error", f"{1e3 * editor.shown.moving_seconds:.1f} ms while a slider moves"))
     if maps := s.light_fields:
         table.append(("light fields", f"{maps['resident']} of {maps['maps']} maps, {maps['resident_mb']:.1f} MB"))
-        table.append(("maps asked for", f"{maps['hits']} there, {maps['misses']} not"))
+        share = maps["misses"] / max(maps["hits"] + maps["misses"], 1)
+        table.append(("maps asked for", f"{maps['hits']} there, {maps['misses']} not ({100 * share:.1f} %)"))
+        table.append(("cache", str(maps["cache"])))
     table += [(f"GPU: {name}", f"{ms:.2f} ms") for name, ms in s.gpu_ms.items()]
     rows(table, "statistics")
     for note in notes:

@@ -116,6 +116,7 @@ class LightFieldSection(Section):
     texels: Annotated[int, Field(ge=LEAST_TEXELS, le=MOST_TEXELS)] | None = None
     offset_m: Annotated[float, Field(gt=0, le=1000)] | None = None
     error: Positive | None = None
+    levels: Literal[1] | None = None
 
     def wish(self) -> LightFieldWish:
         return LightFieldWish(**self.model_dump(exclude={"use"}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from lambent.core.map_cache import LEAST_RECENT
 from lambent.viewer.mode import Mode
 from lambent.viewer.screen import Screen
 
@@ -11,8 +12,11 @@ STARTS = ("walk", "view")
 NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
 
 
-def start(path: Path, name: str, screen: Screen, light_field_mb: float | None = None) -> Mode:
-    """The mode on the store at `path`; `light_field_mb`: for the maps of light fields on the GPU."""
+def start(
+    path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
+    sky_turn_deg: float = 0.0,
+) -> Mode:  # fmt: skip
+    """The mode on the store at `path`; `light_field_mb`: for the maps of light fields on the GPU, in caches of a `policy`."""
     from lambent.viewer.modes.walk.mode import open_store
 
-    return open_store(path, "walk" if name == "walk" else "orbit", screen, light_field_mb)
+    return open_store(path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg)

@@ -88,7 +88,9 @@ class Pictures(Pair):
             state.comparison.forget()
             state.comparison.figures = None
             self.shown = (self._a,)
-            still = state.films.under_way is not None or shows_choice(wanted)  # a mean of points' colours is none of them
+            still = state.films.under_way is not None or shows_choice(
+                wanted
+            )  # a mean of points' colours is none of them
             self._a.update(wanted, refine=False if still else None)
         look, size = state.look, (max(1, place.width), max(1, place.height))
         exposure_ev = look.exposure_ev + math.log2(self._renderer.scene.unit)  # probes' light is in these units
@@ -162,12 +164,13 @@ class Pictures(Pair):
         """B by the path tracer, which has the processor's time that drawing leaves."""
         comparison, a = self._state.comparison, self._a
         if self._traced is None:
-            if self._state.store is None:
+            state = self._state
+            if state.store is None:
                 comparison.fault = "There is no store whose scene could be traced."
                 self.shown = (a,)
                 a.update(wanted, refine=False)
                 return
-            self._traced = TracedPicture(self._renderer.given(), self._state.screen, self._state.store)
+            self._traced = TracedPicture(self._renderer.given(), state.screen, state.store, state.sky_turn_deg)
         b = self._traced
         self.shown = (a, b)
         b.update(wanted)

@@ -137,6 +137,7 @@ class WalkState:
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)
     store: Path | None = None  # its folder
+    sky_turn_deg: float = 0.0  # under which the scene was opened
     store_name: str = "STORE"
     missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map

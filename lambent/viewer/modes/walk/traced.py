@@ -24,8 +24,8 @@ class TracedPicture:
 
     under_way = False  # no part of it is drawn on the GPU
 
-    def __init__(self, given: Given, screen: Screen, store: Path) -> None:
-        self._given, self._screen, self._tracing = given, screen, Tracing(store)
+    def __init__(self, given: Given, screen: Screen, store: Path, sky_turn_deg: float) -> None:
+        self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg)
         self._of: FrameState | None = None  # what is asked for, by what paths depend on
         self._asked = False
         self._changed_s = 0.0
@@ -110,7 +110,9 @@ class TracedPicture:
         if at is None:
             return np.asarray(light, np.float32)
         height, width = light.shape[:2]
-        column, row = (min(max(int(share * size), 0), size - 1) for share, size in zip(at, (width, height), strict=True))
+        column, row = (
+            min(max(int(share * size), 0), size - 1) for share, size in zip(at, (width, height), strict=True)
+        )
         return np.asarray(light[row : row + 1, column : column + 1], np.float32)
 
     def rest(self) -> None:

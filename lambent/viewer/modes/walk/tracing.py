@@ -71,8 +71,8 @@ class Tracing:
         Why it ended, in a line; empty while it has not.
     """
 
-    def __init__(self, store: Path) -> None:
-        self._store = store
+    def __init__(self, store: Path, sky_turn_deg: float) -> None:
+        self._words = (str(store), str(sky_turn_deg))
         self._last: Traced | None = None
         self.what, self.error = "starting", ""
         self._wish = Wish(0)
@@ -103,10 +103,8 @@ class Tracing:
         self._wish = Wish(self._wish.number + 1, camera, size, dict(materials))
         if self._process is None:
             self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
-            command = [sys.executable, "-m", WORKER, str(self._store)]
-            self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log
-            )
+            command = [sys.executable, "-m", WORKER, *self._words]
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log)
             self._work = Work(self._listen, lambda _: None, self._failed)
         assert self._process.stdin is not None
         try:

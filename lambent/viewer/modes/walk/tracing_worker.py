@@ -1,6 +1,6 @@
 """A process of its own that path traces views of a store's scene for the window, pass after pass.
 
-python -m lambent.viewer.modes.walk.tracing_worker STORE
+python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES, by which the sky is turned
 
 Every line on stdin is a `Wish` as a JSON object; a newer one ends those before it, at the next pass, and the end of stdin
 ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or "number", that of
@@ -16,6 +16,7 @@ import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -25,6 +26,7 @@ from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
+from lambent.scenes.turned_sky import under_turned_sky
 from lambent.store.source import SOURCE, scene_of
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.tracing import MOST_SAMPLES, Wish
@@ -86,7 +88,7 @@ class Views:
         return True
 
 
-def main(folder: Path, wishes: Wishes, out: BinaryIO) -> None:
+def main(folder: Path, sky_turn_deg: float, wishes: Wishes, out: BinaryIO) -> None:
     """Trace what is wished until the wishes end."""
     from lambent.bake.engine import engine
 
@@ -95,11 +97,12 @@ def main(folder: Path, wishes: Wishes, out: BinaryIO) -> None:
         raise UserError("the store does not say where its scene is", file=folder, hint="bake the scene from its file")
     say(out, what="loading the scene")
     engine()
-    views, wish = Views(scene_of(store)), wishes.newest(None)
-    while wish is not None:
-        if wish.camera is not None:
-            trace(views, wish, wish.camera, wishes, out)
-        wish = wishes.newest(wish)
+    with TemporaryDirectory() as images:
+        views, wish = Views(under_turned_sky(scene_of(store), sky_turn_deg, Path(images))), wishes.newest(None)
+        while wish is not None:
+            if wish.camera is not None:
+                trace(views, wish, wish.camera, wishes, out)
+            wish = wishes.newest(wish)
 
 
 def trace(views: Views, wish: Wish, camera: Camera, wishes: Wishes, out: BinaryIO) -> None:
@@ -137,6 +140,8 @@ if __name__ == "__main__":
     own = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is none of the pictures
     try:
-        main(Path(sys.argv[1]), Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own)  # no lock to end with
+        main(
+            Path(sys.argv[1]), float(sys.argv[2]), Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own
+        )  # no lock to end with
     except UserError as error:
         say(own, error=str(error))

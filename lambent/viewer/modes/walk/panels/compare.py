@@ -26,7 +26,9 @@ def draw(comparison: Comparison) -> None:
             wrapped([comparison.fault])
             return
     else:
-        meaning = "where B finds reflected light: as A, or of all objects by one look-up, as of the single probe by plain"
+        meaning = (
+            "where B finds reflected light: as A, or of all objects by one look-up, as of the single probe by plain"
+        )
         comparison.look_up = choice("look-up of B", comparison.look_up, (AS_A, *LOOKUPS), meaning)
     if comparison.mode == "error map":
         meaning = "the difference of luminance in percent of B's, or what a viewer notices (FLIP)"
