@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 3
+REVISION = 4
 MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
@@ -196,9 +196,12 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     seen = traced.bare if how.levels == 1 else traced.around
     progress(0, 1, "points")
     points = _points(context, name, wish, traced)
+    normals = context.store.read(light_field_name(name, "normals"))
 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
-        maps = halves(radiance_maps(seen, points[region[0]], how.texels, how.strata, seed, how.onward), traced.unit)
+        some = region[0]
+        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, normals[some])
+        maps = halves(light, traced.unit)
         return blocks_of(maps) if how.blocks else maps
 
     def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:

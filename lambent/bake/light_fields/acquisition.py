@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from lambent.bake.light.cache import LightMapCache
 from lambent.bake.tiles import slices
 from lambent.bake.tracing import path_tracer, rays
-from lambent.bake.tracing.rays import block_sums, independent, vectors
+from lambent.bake.tracing.rays import array_of, block_sums, independent, vectors
 from lambent.bake.tracing.sun import Sun
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import HALF_MAX
+from lambent.core.octahedral import bordered, texel_directions
 
 PATHS_AT_ONCE = 1 << 21
+CONTRAST = 0.2  # of the brighter of two texels beside each other: from there on both are traced in parts
+BENEATH = 0.25  # sine of the angle under a point's horizon from where on only surfaces beside it look
 
 
 @dataclass(frozen=True)
@@ -44,47 +47,102 @@ class Around:
         return light - dr.select(si.is_valid(), 0.0, self.sun.radiance(ray.d))
 
 
+@dataclass(frozen=True)
+class _First:
+    """What rays meet first: its light (mi.Color3f) without what it mirrors, whether it mirrors, whether it is there."""
+
+    light: Any
+    mirrors: Any
+    met: Any
+
+
 def radiance_maps(
-    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1
+    around: Around, points: Floats, texels: int, strata: int, seed: int, onward: int = 1, normals: Floats | None = None
 ) -> NDArray[np.float32]:
     """Maps (P, texels, texels, 3) of the radiance that arrives at points (P, 3).
 
-    Rays go through strata x strata parts of each texel, and `onward` paths go on from the surface that each of them
-    meets first, where that is glossy. A path that is not finite counts as black. A texel holds the light of surfaces or
-    of the sky, as the ray through its middle meets one: as `inverse_distances` has it, and look-ups tell them apart.
+    Where the ray through a texel's middle meets no glossy surface, and its neighbours show nearly the same, its light
+    is the texel's (Whitted 1980). In other texels, rays go through strata x strata parts, and `onward` paths go on from
+    each glossy surface that these meet first. Beneath points whose surface has `normals` (P, 3), where next to no
+    reflection looks, glossy surfaces are met through the middle alone. A path that is not finite counts as black. A
+    texel holds the light of surfaces or of the sky, as its middle does: as `inverse_distances` has it, and look-ups
+    tell them apart.
     """
-    found = np.zeros((len(points) * texels * texels, 3), np.float32)
+    found = np.empty((len(points), texels, texels, 3), np.float32)
+    for mine in slices(len(points), max(1, PATHS_AT_ONCE // texels**2)):
+        some, shape = points[mine], found[mine].shape
+        every = dr.arange(mi.UInt32, len(some) * texels**2)
+        first = _first(around, _rays(some, every, texels, mi.Point2f(0.5)))
+        dr.eval(first.light, first.mirrors, first.met)
+        light, solid, mirrors = array_of(first.light), np.array(first.met), np.array(first.mirrors)
+        parted = unlike(light.reshape(shape), solid.reshape(shape[:3])).ravel() & (strata > 1)
+        beneath = np.zeros(len(light), bool) if normals is None else _beneath(normals[mine], texels).ravel()
+        single = mirrors & beneath
+        for which, parts in ((single, 1), ((mirrors | parted) & ~single, strata)):
+            index = np.flatnonzero(which).astype(np.uint32)
+            light[index] = _parted(around, some, texels, index, solid[index], parts, onward, seed + mine.start)
+        found[mine] = light.reshape(shape)
+    return found
+
+
+def unlike(light: Floats, solid: Flags) -> Flags:
+    """Texels (P, E, E) that differ from a neighbour by CONTRAST of their light (P, E, E, 3), or in what is `solid`."""
+    light, there = bordered(light, 1), bordered(solid[..., None], 1)[..., 0]
+    found = np.zeros(there.shape, bool)
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :, 1:], np.s_[:, :, :-1])):
+        a, b = light[one], light[other]
+        differ = (np.abs(a - b) > CONTRAST * np.maximum(a, b)).any(axis=-1) | (there[one] != there[other])
+        found[one] |= differ
+        found[other] |= differ
+    return found[:, 1:-1, 1:-1]
+
+
+def _beneath(normals: Floats, texels: int) -> Flags:
+    """(P, texels, texels) which directions go BENEATH planes of normals (P, 3)."""
+    return np.asarray(np.moveaxis(texel_directions(texels) @ normals.T, -1, 0) < -BENEATH)
+
+
+def _parted(
+    around: Around, points: Floats, texels: int, index: Indices, solid: Flags, strata: int, onward: int, seed: int
+) -> NDArray[np.float32]:
+    """Light (k, 3) of texels `index` (k,), numbered through the maps of points, in strata x strata parts.
+
+    Parts that differ from the middle in whether they meet a surface, `solid` (k,), are left out.
+    """
+    found = np.zeros((len(index), 3), np.float32)
     samples = strata * strata
-    for mine in slices(len(found), max(1, PATHS_AT_ONCE // (samples * onward))):
+    for mine in slices(len(index), max(1, PATHS_AT_ONCE // (samples * onward))):
         width = (mine.stop - mine.start) * samples
-        sampler = independent((seed + mine.start) & 0xFFFFFFFF, width)
-        thread, u = dr.arange(mi.UInt32, width), sampler.next_2d()
-        part = thread % samples
+        own = (seed + mine.start + strata) & 0xFFFFFFFF
+        thread = dr.arange(mi.UInt32, width)
+        part, texel = thread % samples, thread // samples
+        u = mi.Point2f(0.5) if strata == 1 else independent(own, width).next_2d()
         within = mi.Point2f((part % strata + u.x) / strata, (part // strata + u.y) / strata)
-        place = dr.opaque(mi.UInt32, mine.start) + thread // samples
-        light, met = _radiance(around, _rays(points, place, texels, within), onward, seed ^ (mine.start + 1))
-        texel = dr.opaque(mi.UInt32, mine.start) + dr.arange(mi.UInt32, width // samples)
-        middle = _rays(points, texel, texels, mi.Point2f(0.5))
-        solid = rays.intersect(around.scene, middle, mi.Bool(True), rays.has_holes(around.scene)).is_valid()
-        dr.eval(solid)
-        alike = met == dr.gather(mi.Bool, solid, thread // samples)
-        count = dr.gather(mi.UInt32, dr.block_sum(dr.select(alike, mi.UInt32(1), 0), samples), thread // samples)
+        ray = _rays(points, dr.gather(mi.UInt32, mi.UInt32(index[mine]), texel), texels, within)
+        light, met = _radiance(around, ray, onward, own ^ 0xFFFFFFFF)
+        alike = met == dr.gather(mi.Bool, mi.Bool(solid[mine]), texel)
+        count = dr.gather(mi.UInt32, dr.block_sum(dr.select(alike, mi.UInt32(1), 0), samples), texel)
         share = dr.select(count > 0, dr.select(alike, dr.rcp(mi.Float(count)), 0.0), 1 / samples)
         found[mine] = block_sums(light * share, samples)
-    return found.reshape(len(points), texels, texels, 3)
+    return found
+
+
+def _first(around: Around, ray: Any) -> _First:
+    si = rays.intersect(around.scene, ray, mi.Bool(True), rays.has_holes(around.scene))
+    light = around.without_sun(si.emitter(around.scene).eval(si), ray, si)
+    mirrors = si.is_valid()
+    if around.cache is not None:
+        light += dr.select(mirrors, around.cache(si, mirrors), 0.0)
+        mirrors &= mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
+    return _First(light, mirrors, si.is_valid())
 
 
 def _radiance(around: Around, ray: Any, onward: int, seed: int) -> tuple[Any, Any]:
     """Radiance (mi.Color3f) along rays, from glossy surfaces by the mean of `onward` paths; which met a surface."""
-    si = rays.intersect(around.scene, ray, mi.Bool(True), rays.has_holes(around.scene))
-    light = around.without_sun(si.emitter(around.scene).eval(si), ray, si)
-    met = si.is_valid()
-    goes_on = mi.Bool(met)
-    if around.cache is not None:
-        light += dr.select(goes_on, around.cache(si, goes_on), 0.0)
-        goes_on &= mi.has_flag(si.bsdf(ray).flags(), mi.BSDFFlags.Smooth)
-    dr.eval(light, goes_on, met)
-    index = dr.compress(goes_on)
+    first = _first(around, ray)
+    light, met = first.light, first.met
+    dr.eval(light, first.mirrors, met)
+    index = dr.compress(first.mirrors)
     if not dr.width(index):
         return light, met
     again = dr.gather(mi.UInt32, index, dr.arange(mi.UInt32, dr.width(index) * onward) // onward)

@@ -79,5 +79,6 @@ def small_field(placing: Placing, mesh: Mesh, count: int, around: Around, seed: 
     """A light field of small maps, without a sample map."""
     found = placing.points(mesh, count, seed)
     p, n = found.positions.astype(np.float32), found.normals.astype(np.float32)
-    radiance, inverse = radiance_maps(around, p, TEXELS, 1, seed), inverse_distances(around.scene, p, TEXELS)
+    radiance = radiance_maps(around, p, TEXELS, 1, seed, normals=n)
+    inverse = inverse_distances(around.scene, p, TEXELS)
     return LightField(p, n, radiance, inverse, np.zeros((0, 0, 4), np.uint16), (0, 0), (1, 1), found.offset_m)
