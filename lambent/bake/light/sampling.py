@@ -184,6 +184,12 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
     """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended and closed."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
-    clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
-    clean = fill(blend_seams(clean, known, texels, labels), known, labels)
-    return np.minimum(stitched(clean, cuts, labels), HALF_MAX).astype(np.float16)
+    return closed(denoise_charts(irradiance, known, labels, smooth=SMOOTH)[None], known, texels, labels, cuts)[0]
+
+
+def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
+    """Denoised light maps (n, H, W, 3), filled where they are unknown, their seams blended and closed."""
+    together = np.concatenate(list(clean), axis=-1)
+    together = fill(blend_seams(together, known, texels, labels), known, labels)
+    each = np.split(together, len(clean), axis=-1)
+    return np.stack([np.minimum(stitched(one, cuts, labels), HALF_MAX).astype(np.float16) for one in each])
