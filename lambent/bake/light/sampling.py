@@ -192,4 +192,4 @@ def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: C
     together = np.concatenate(list(clean), axis=-1)
     together = fill(blend_seams(together, known, texels, labels), known, labels)
     each = np.split(together, len(clean), axis=-1)
-    return np.stack([np.minimum(stitched(one, cuts, labels), HALF_MAX).astype(np.float16) for one in each])
+    return np.array([np.minimum(stitched(one, cuts, labels), HALF_MAX) for one in each], np.float16)
