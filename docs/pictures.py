@@ -136,7 +136,7 @@ def interreflections(samples: int = 512) -> None:
 LIGHTS = (  # of light-groups.jpg: as baked, without the sun, and by night
     ((), 0.0),
     (("sun=off",), 1.0),
-    (("sun=off", "sky=0.002,12000K", "lamp_globe=1", "shelf_lamp_globe=1,2700K"), 7.0),
+    (("sun=off", "sky=0.01,12000K"), 3.0),
 )
 
 
