@@ -11,7 +11,8 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.light_mix import WHITE, Factors
 from lambent.store import contract
-from lambent.store.contract import SIDES, LightGroupRecord, group_name, light_groups
+from lambent.store.contract import SIDES
+from lambent.store.light_groups import LightGroupRecord, group_name, light_groups
 from lambent.store.store import Store
 
 NO_GROUPS = "the store holds no light by group"

@@ -20,9 +20,8 @@ from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.sun_disc import sky_without, without_sun
+from lambent.scenes.light_groups import SKY, SUN
 from lambent.store.contract import ObjectRecord
-
-SUN, SKY = "sun", "sky"  # members of groups
 
 
 @dataclass(frozen=True, eq=False)

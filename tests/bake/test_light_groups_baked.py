@@ -14,7 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.light_mix import GroupMix
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.scene import LightGroup, PointLight, Scene, SceneObject, SunSky
-from lambent.store.contract import light_groups
+from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 from tests.bake.small_scenes import BLACK, GREY, MIRROR, TINY, plane, room_with_step
 from tests.tools.z_test import assert_same_image, mean_and_variance

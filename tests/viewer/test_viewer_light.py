@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lambent.core.light_mix import GroupMix, LightMix, MixTrack
-from lambent.store.contract import LightGroupRecord
+from lambent.store.light_groups import LightGroupRecord
 from lambent.store.views import read_views
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.walk.input import WalkInput
