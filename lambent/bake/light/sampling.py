@@ -184,7 +184,8 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
     """A noisy light map (H, W, 3), denoised, filled where it is unknown, its seams blended and closed."""
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
-    return closed(denoise_charts(irradiance, known, labels, smooth=SMOOTH)[None], known, texels, labels, cuts)[0]
+    clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
+    return np.asarray(closed(clean[None], known, texels, labels, cuts)[0], np.float16)
 
 
 def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
