@@ -6,6 +6,7 @@ python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
 .venv/bin/python docs/pictures.py edit
 .venv/bin/python docs/pictures.py interreflections
 .venv/bin/python docs/pictures.py light-fields
+.venv/bin/python docs/pictures.py light-groups [STORE]
 """
 
 from __future__ import annotations
@@ -132,6 +133,34 @@ def interreflections(samples: int = 512) -> None:
     save("interreflections.jpg", np.concatenate(row, axis=1), width=1200)
 
 
+LIGHTS = (  # of light-groups.jpg: as baked, without the sun, and by night
+    ((), 0.0),
+    (("sun=off",), 1.0),
+    (("sun=off", "sky=0.01,12000K"), 3.0),
+)
+
+
+def light_groups(store: Path | None = None) -> None:
+    """`builtin:room` in three mixes of its light groups, from one bake, each with the exposure that it needs."""
+    from dataclasses import replace
+    from tempfile import TemporaryDirectory
+
+    from lambent.bake.bake import bake
+    from lambent.core.light_mix import parse_light
+    from lambent.render import Settings, images
+    from lambent.scenes import load_scene
+    from lambent.store.contract import scene_record
+    from lambent.store.store import Store
+
+    with TemporaryDirectory() as folder:
+        opened = Store.open(store) if store else bake(load_scene("builtin:room"), Path(folder), light_groups="scene")
+        camera = scene_record(opened).cameras[0]
+        settings = Settings(560, 350, exposure_ev=EXPOSURE_EV)
+        mixes = [replace(settings, light=parse_light(light), exposure_ev=EXPOSURE_EV + ev) for light, ev in LIGHTS]
+        row = [images(opened, mix).displayed(camera) for mix in mixes]
+    save("light-groups.jpg", np.concatenate(row, axis=1), width=1680)
+
+
 def light_fields() -> None:
     """What the teapot of `builtin:pavilion` mirrors: one of its maps; by one map, by B_n, marched, and traced."""
     from tempfile import TemporaryDirectory
@@ -190,5 +219,7 @@ if __name__ == "__main__":
         interreflections()
     elif sys.argv[1:] == ["light-fields"]:
         light_fields()
+    elif sys.argv[1:2] == ["light-groups"]:
+        light_groups(Path(sys.argv[2]) if len(sys.argv) > 2 else None)
     else:
         main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/demo"))

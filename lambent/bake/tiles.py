@@ -6,14 +6,14 @@ Because the seed belongs to the tile, the result is the same whatever the order,
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.progress import Progress
-from lambent.store.store import Chunk, Writer
+from lambent.store.store import Artefact, Chunk
 
 Tile = Callable[[tuple[slice, ...], int], NDArray[Any]]  # (region of the array, seed) -> its content
 
@@ -29,8 +29,18 @@ def slices(count: int, at_once: int) -> list[slice]:
     return [slice(first, min(first + at_once, count)) for first in range(0, count, at_once)]
 
 
+class TileWriter(Protocol):
+    """What `run_tiles` writes to: a `Writer`, or several as one."""
+
+    @property
+    def artefact(self) -> Artefact: ...
+    @property
+    def missing(self) -> Sequence[Chunk]: ...
+    def write(self, chunk: Chunk, data: NDArray[Any]) -> None: ...
+
+
 def run_tiles(
-    writer: Writer,
+    writer: TileWriter,
     tile: Tile,
     *,
     seed: int,

@@ -143,7 +143,7 @@ def inspect_scene(file: str, crease_deg: float | None = None) -> Facts:
 
 def inspect_store(file: str) -> Facts:
     """A store: its arrays, complete or not, and whether every chunk on disk is sound."""
-    from lambent.store.contract import light_groups
+    from lambent.store.light_groups import light_groups
     from lambent.store.store import Store
 
     store = Store.open(Path(file))

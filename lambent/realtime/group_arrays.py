@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,8 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.light_mix import WHITE, Factors
 from lambent.store import contract
-from lambent.store.contract import SIDES, LightGroupRecord, group_name, light_groups
+from lambent.store.contract import SIDES
+from lambent.store.light_groups import LightGroupRecord, group_name, light_groups
 from lambent.store.store import Store
 
 NO_GROUPS = "the store holds no light by group"
@@ -29,6 +30,7 @@ class GroupArrays:
     records: tuple[LightGroupRecord, ...]
     store: Store
     unit: float = 1.0
+    _probes: dict[str, Floats] = field(default_factory=dict)  # as stored, once they were read
 
     @cached_property
     def sides(self) -> tuple[Floats | None, ...]:
@@ -43,8 +45,10 @@ class GroupArrays:
         array = contract.probe_name(name, "groups")
         if array not in self.store:
             return None
+        if name not in self._probes:
+            self._probes[name] = self.store.read(array)
         scale = np.float32(contract.radiance_unit(self.store, array) / self.unit)
-        return np.asarray(self.store.read(array).astype(np.float32) * scale)
+        return np.asarray(self._probes[name].astype(np.float32) * scale)
 
     def number(self, member: str) -> int | None:
         """The group of the sun, the sky, or an object that emits."""

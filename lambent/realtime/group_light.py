@@ -7,21 +7,21 @@ disc, which the renderer draws by pixel (`sun_disc`): the disc is taken out of t
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.colour import HALF_MAX
 from lambent.core.irradiance import irradiance_of
 from lambent.core.plain import Triple, triple
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.sun_disc import sky_without, without_sun
-from lambent.realtime.uploads import with_alpha
+from lambent.scenes.light_groups import SKY, SUN
 from lambent.store.contract import ObjectRecord
-
-SUN, SKY = "sun", "sky"  # members of groups
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,16 +34,43 @@ class GroupLight:
 
     def light_map(self, factors: Floats) -> tuple[NDArray[np.float16] | None, ...]:
         """By side of the light map, (H, W, 4) half floats; None of a side that no light reaches."""
-        return tuple(None if side is None else with_alpha(mixed(side, factors)) for side in self.groups.sides)
+        return tuple(None if side is None else side.mixed(factors) for side in self._sides)
+
+    @cached_property
+    def _sides(self) -> tuple[_LitTexels | None, ...]:
+        return tuple(None if side is None else _LitTexels.of(side) for side in self.groups.sides)
 
     def sky(self, factors: Floats) -> tuple[Floats | None, Floats | None]:
         """The environment (6, N, N, 3) as it is seen, and without the sun's disc."""
-        whole, sun = self.scene.environment, self.scene.sun
-        if whole is None:
+        if self._bare_sky is None or self.scene.environment is None:
             return None, None
-        rest = whole if sun is None else sky_without(whole, sun)
-        tint, of_sun = self._of(SKY, factors), self._of(SUN, factors)
-        return rest * tint + (whole - rest) * of_sun, rest * tint
+        bare = self._bare_sky * self._of(SKY, factors)
+        if self._disc is None:
+            return bare, bare
+        texels, disc = self._disc
+        seen = bare.copy()
+        seen.reshape(-1, 3)[texels] += disc * self._of(SUN, factors)
+        return seen, bare
+
+    @cached_property
+    def _bare_sky(self) -> Floats | None:
+        """The environment without the sun's disc."""
+        whole, sun = self.scene.environment, self.scene.sun
+        return whole if whole is None or sun is None else sky_without(whole, sun)
+
+    @cached_property
+    def _disc(self) -> tuple[NDArray[np.intp], Floats] | None:
+        """Texels (K,) of the flattened environment that show the sun's disc, and its radiance (K, 3) there."""
+        if self.scene.environment is None or self._bare_sky is None:
+            return None
+        disc = (self.scene.environment - self._bare_sky).reshape(-1, 3)
+        texels = np.flatnonzero(disc.any(axis=1))
+        return (texels, disc[texels]) if len(texels) else None
+
+    def turns_sky(self, factors: Floats, before: Floats) -> bool:
+        """Whether the environment is another one than in the mix before."""
+        pairs = ((self._of(member, factors), self._of(member, before)) for member in (SKY, SUN))
+        return any(not np.array_equal(now, then) for now, then in pairs)
 
     def sun(self, factors: Floats) -> Triple | None:
         """W/m^2 of the sun, in units of the scene."""
@@ -71,6 +98,31 @@ class GroupLight:
     def _of(self, member: str, factors: Floats) -> Floats:
         number = self.groups.number(member)
         return np.ones(3, np.float32) if number is None else factors[number]
+
+
+@dataclass(frozen=True, eq=False)
+class _LitTexels:
+    """A side of the light map by group: light (n, K, 3) of the texels (K,) that hold any, of a map (height, width)."""
+
+    light: Floats
+    texels: NDArray[np.intp]
+    size: tuple[int, int]
+
+    @classmethod
+    def of(cls, side: Floats) -> _LitTexels:
+        """Of a map (n, H, W, 3)."""
+        flat = side.reshape(len(side), -1, 3)
+        texels = np.flatnonzero(flat.any(axis=(0, 2)))
+        return cls(np.ascontiguousarray(flat[:, texels]), texels, (side.shape[1], side.shape[2]))
+
+    def mixed(self, factors: Floats) -> NDArray[np.float16]:
+        """(H, W, 4) half floats, alpha 1."""
+        height, width = self.size
+        found = np.zeros((height * width, 4), np.float16)
+        found[:, 3] = 1
+        light = mixed(self.light, factors)
+        found[self.texels, :3] = np.minimum(light, HALF_MAX, out=light)
+        return found.reshape(height, width, 4)
 
 
 def mixed(by_group: Floats, factors: Floats) -> Floats:

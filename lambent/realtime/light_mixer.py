@@ -20,6 +20,7 @@ from lambent.realtime.group_light import GroupLight
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.resources import SceneResources
+from lambent.realtime.uploads import with_alpha
 
 MAP = -1  # the part that is no probe
 
@@ -40,6 +41,7 @@ class LightMixer:
         self._made: dict[int, bytes] = {}  # mix of each part that was made last
         self._ready: deque[tuple[int, Floats, Any]] = deque()
         self._work: Future[None] | None = None
+        self._sky_of: Floats | None = None  # mix of the sky that was made last
 
     @property
     def busy(self) -> bool:
@@ -114,8 +116,11 @@ class LightMixer:
             self.version += 1
 
     def _map(self, factors: Floats) -> Any:
-        sides = self._light.light_map(factors)
-        return sides, self._light.sky(factors)
+        sides, before = self._light.light_map(factors), self._sky_of
+        if before is not None and not self._light.turns_sky(factors, before):
+            return sides, (None, None)
+        self._sky_of = factors
+        return sides, tuple(None if sky is None else with_alpha(finite(sky)[0]) for sky in self._light.sky(factors))
 
     def _probe(self, number: int, factors: Floats) -> ProbeLight | None:
         light, owner = self._resources.objects[self._users[number][0]].light, self._owners[number]

@@ -75,7 +75,8 @@ class ProbeLight:
         self._used.add(cube)
         if cube == "prefiltered":
             return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
-        return upload(self._layouts.device, self._levels.pop(cube, None) or self._chain(cube), "rgba16float")
+        levels = self._levels.pop(cube) if cube in self._levels else self._chain(cube)
+        return upload(self._layouts.device, levels, "rgba16float")
 
     def _chain(self, cube: Cube) -> list[NDArray[np.float16]]:
         """Levels of a cube map as its texture has them."""

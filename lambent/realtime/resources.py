@@ -27,7 +27,7 @@ from lambent.realtime.structs import OBJECT_DTYPE
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import cube_texture, upload, with_alpha
+from lambent.realtime.uploads import upload, with_alpha
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 
@@ -90,9 +90,11 @@ class SceneResources:
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         sky = scene.far_light or DARK
-        self.sky_group = self.sky_group_of(sky.radiance)
+        self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)
-        self.mirrored_sky_group = self.sky_group if cleaned is sky else self.sky_group_of(cleaned.radiance)
+        self.mirrored_sky_group = (
+            self.sky_group if cleaned is sky else self.sky_group_of(with_alpha(finite(cleaned.radiance)[0]))
+        )
         lights: dict[Probe | None, ProbeLight] = {}
         beyond = neighbouring_faces(scene)
         self.objects, known = [], look_ups()
@@ -128,9 +130,9 @@ class SceneResources:
                     {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
                 )  # fmt: skip
 
-    def sky_group_of(self, radiance: Floats) -> Any:
-        """Bind group of an environment (6, N, N, 3)."""
-        cube = cube_texture(self._layouts.device, [finite(radiance)[0]])
+    def sky_group_of(self, texels: NDArray[np.float16]) -> Any:
+        """Bind group of an environment (6, N, N, 4)."""
+        cube = upload(self._layouts.device, [texels], "rgba16float")
         return self._layouts.group(self._layouts.cube, cube.create_view(dimension="cube"))
 
     @cached_property

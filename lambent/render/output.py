@@ -23,7 +23,8 @@ from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
-from lambent.store.contract import SceneRecord, light_groups, scene_record
+from lambent.store.contract import SceneRecord, scene_record
+from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 from lambent.store.views import read_views, with_views
 

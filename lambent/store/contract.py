@@ -11,7 +11,7 @@
     light_map/noise, noise_back            (H, W) float16, relative standard error of irradiance and irradiance_back
                                            before denoising; may be absent
     light_map/groups, groups_back          (n, H, W, 3) float16, irradiance by light group, in order of meta["groups"],
-                                           LightGroupRecords; irradiance and irradiance_back are the sums. May be absent
+                                           store.light_groups; irradiance, irradiance_back are the sums; may be absent
     light_map/direct, direct_back          (n, H, W, 3) float16, the part of it that comes straight from the group's
                                            emitters, through clear glass that the sun passes too; nowhere more than all
     light_map/lean                         (H, W, 3) float16, dominant light direction, world space: mean direction of
@@ -200,17 +200,6 @@ class SunRecord(_Record):
     panes: tuple[str, ...] = Field(default=(), exclude_if=lambda panes: not panes)
 
 
-class LightGroupRecord(_Record):
-    """Emitters that are dimmed together: see scenes.light_groups.
-
-    `share` is that of their luminous irradiance, the sun's direct light included, on the surfaces of the scene.
-    """
-
-    name: str = Field(min_length=1)
-    members: tuple[str, ...]
-    share: float = Field(ge=0, le=1, allow_inf_nan=False)
-
-
 class TexturesRecord(_Record):
     """See scenes.scene.MaterialTextures: PART -> its uv transform; the texels are arrays."""
 
@@ -365,29 +354,6 @@ def shared_probes(store: Store) -> dict[str, str]:
     found = said.get("owners", {}) if isinstance(said, dict) else None
     if not isinstance(found, dict) or not all(isinstance(owner, str) for owner in found.values()):
         raise UserError("broken store", file=store.folder, field=SHARED_PROBES, got=str(said)[:80], hint="bake again")
-    return found
-
-
-def group_name(side: str, *, direct: bool = False) -> str:
-    """Name of the array of a side of the light map by light group, of all light or of what is direct."""
-    return f"light_map/{side.replace('irradiance', 'direct' if direct else 'groups')}"
-
-
-def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
-    """The light groups of a store, in the order of its arrays by group; none where it was baked without."""
-    name = group_name(SIDES[0])
-    if name not in store:
-        return ()
-    said = store.artefact(name).meta.get("groups")
-    try:
-        found = tuple(map(LightGroupRecord.model_validate, said if isinstance(said, list) else ()))
-    except ValidationError as error:
-        raise invalid(error, store.folder / MANIFEST) from error
-    count = store.artefact(name).shape[0]
-    if len(found) != count or len({group.name for group in found}) != count:
-        raise UserError(
-            "broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again"
-        )
     return found
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 
 from lambent.core.camera import Camera, CameraPath
+from lambent.core.cubemap import face_directions
+from lambent.core.directions import normalize
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.environments import studio
 from lambent.scenes.geometry import merge, patch, placed, sphere
@@ -56,4 +58,34 @@ def write_small_store(folder):
             bounds=((-4.0, 0.0, -4.0), (4.0, 2.6, 4.0)),
         ),
     )  # fmt: skip
+    return folder
+
+
+SUN = (0.6, 0.64, 0.48)  # towards it
+
+
+def with_light_groups(folder):
+    """The small store with its light in three groups, a sun with a disc of 50 W/(sr m^2), and the wall as the lamp."""
+    store = Store.open(folder)
+    shares = np.array([0.25, 0.5, 0.25], np.float32)  # of lamp, sky and sun
+    sun = {"direction": SUN, "irradiance": (4.0, 4.0, 3.0), "radius_rad": 0.05}
+    names = (("lamp", "wall"), ("sky", "sky"), ("sun", "sun"))
+    groups = [{"name": n, "members": [m], "share": float(s)} for (n, m), s in zip(names, shares, strict=True)]
+    light = store.read("light_map/irradiance").astype(np.float32)
+    cube = store.read("probe/ball/radiance").astype(np.float32)
+    n = cube.shape[1]
+    w = normalize(face_directions(n))
+    disc = np.where((w @ np.array(SUN) > np.cos(0.06))[..., None], np.float32(50.0), np.float32(0.0))
+    of_probe = cube * shares.reshape(3, 1, 1, 1, 1)
+    of_probe[2] += disc
+    arrays = {
+        "light_map/irradiance": (light, {"sun": sun}),
+        "light_map/groups": (light * shares.reshape(3, 1, 1, 1), {"groups": groups}),
+        "environment/radiance": (cube + disc, {}),
+        "probe/ball/radiance": (of_probe.sum(axis=0), {"centre": [0.0, 1.0, 0.0]}),
+        "probe/ball/groups": (of_probe, {"centre": [0.0, 1.0, 0.0]}),
+    }
+    for name, (array, meta) in arrays.items():
+        store.put(name, name.split("/")[0], array.astype(np.float16), key="by hand, by group", meta=meta)
+    store.close()
     return folder

@@ -21,7 +21,8 @@ from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene
-from lambent.store.contract import DOMINANT_DIRECTION, SIDES, group_name, noise_name
+from lambent.store.contract import DOMINANT_DIRECTION, SIDES, noise_name
+from lambent.store.light_groups import group_name
 from lambent.store.store import Writer
 
 if TYPE_CHECKING:

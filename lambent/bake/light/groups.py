@@ -15,13 +15,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light.sampling import cleaned, relative_noise, sampled_halves
+from lambent.bake.light.denoise import denoise_charts, fill
+from lambent.bake.light.sampling import SMOOTH, closed, relative_noise, sampled_halves
 from lambent.bake.light.stitching import Cuts
 from lambent.bake.surfaces.texels import Texels
 from lambent.bake.tracing.rays import array_of, vectors
 from lambent.bake.tracing.sun import SunRays
 from lambent.bake.tracing.traced_scene import TracedScene
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import HALF_MAX, luminance
 from lambent.core.progress import Progress
 from lambent.store.store import Array, Artefact, Chunk, Writer
@@ -77,19 +78,33 @@ def finished_groups(
 ) -> GroupMaps:
     """The maps of `count` groups from samples of the whole (2, H, W, 4) and of parts (H, W, 3 count or 6 count).
 
-    Direct light is nowhere more than all light of its group, whose denoising is another.
+    Direct light is nowhere more than all light of its group, whose denoising is another. Maps without it only light
+    the next ones: their seams are left as they are.
     """
     halves, known = sampled_halves(raw)
     samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
-    noisy = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0)
-    finished = []
-    for number, one in enumerate(noisy):
-        progress(number, len(noisy), "denoising by group")
-        finished.append(cleaned(one, known, texels, labels, cuts) if one.any() else np.zeros(one.shape, np.float16))
-    light = np.stack(finished[:count])
-    direct = np.minimum(np.stack(finished[count:]), light) if len(finished) > count else None
+    clean = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0).copy()
+    for number, one in enumerate(clean):
+        progress(number, len(clean), "denoising by group")
+        if known.any() and one.any():
+            clean[number] = denoise_charts(one, known, labels, smooth=SMOOTH)
+    light, direct = np.zeros((count, *known.shape, 3), np.float16), None
+    lit = np.flatnonzero(clean[:count].any(axis=(1, 2, 3)))
+    if len(clean) == count:
+        light[lit] = _filled(clean[lit], known, labels)
+    else:
+        light[lit] = closed(clean[lit], known, texels, labels, cuts) if len(lit) else 0
+        direct = np.minimum(_filled(clean[count:], known, labels), light)
     whole = np.minimum(light.astype(np.float32).sum(axis=0), HALF_MAX).astype(np.float16)
     return GroupMaps(whole, light, direct, {"noise": relative_noise(halves[:, known]), "samples": samples})
+
+
+def _filled(clean: Floats, known: Flags, labels: Indices) -> NDArray[np.float16]:
+    """Maps (n, H, W, 3), filled where they are unknown."""
+    if not len(clean) or not known.any():
+        return np.zeros(clean.shape, np.float16)
+    filled = fill(np.concatenate(list(clean), axis=-1), known, labels)
+    return np.minimum(np.stack(np.split(filled, len(clean), axis=-1)), HALF_MAX).astype(np.float16)
 
 
 def group_notes(traced: TracedScene, light: Floats) -> list[dict[str, Any]]:

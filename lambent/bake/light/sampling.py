@@ -185,5 +185,12 @@ def cleaned(irradiance: Floats, known: Flags, texels: Texels, labels: Indices, c
     if not known.any():
         return np.zeros(irradiance.shape, np.float16)
     clean = denoise_charts(irradiance, known, labels, smooth=SMOOTH)
-    clean = fill(blend_seams(clean, known, texels, labels), known, labels)
-    return np.minimum(stitched(clean, cuts, labels), HALF_MAX).astype(np.float16)
+    return np.asarray(closed(clean[None], known, texels, labels, cuts)[0], np.float16)
+
+
+def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
+    """Denoised light maps (n, H, W, 3), filled where they are unknown, their seams blended and closed."""
+    together = np.concatenate(list(clean), axis=-1)
+    together = fill(blend_seams(together, known, texels, labels), known, labels)
+    each = np.split(together, len(clean), axis=-1)
+    return np.array([np.minimum(stitched(one, cuts, labels), HALF_MAX) for one in each], np.float16)

@@ -20,7 +20,7 @@ NEIGHBOURS = 24
 
 
 def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indices) -> Floats:
-    """(H, W, 3) irradiance with seams blended; hidden parts of charts (`texels.BEYOND`) only among themselves.
+    """Irradiance (H, W, C) with seams blended; hidden parts of charts (`texels.BEYOND`) only among themselves.
 
     `known` (H, W) are the texels that were sampled.
     """
@@ -35,7 +35,8 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     near = np.flatnonzero((share > 0) & (texels.spacing[lit] > 0))
     if len(index) < NEIGHBOURS or not len(near):
         return irradiance
-    values = irradiance.reshape(-1, 3)[index].astype(float)
+    channels = irradiance.shape[-1]
+    values = irradiance.reshape(-1, channels)[index].astype(float)
     spacing = np.repeat(texels.spacing[lit][near, None], NEIGHBOURS, axis=1)
     others = cKDTree(position).query(position[near], k=NEIGHBOURS)[1]
     offset = position[others] - position[near, None]
@@ -47,7 +48,7 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     weight *= beyond[others] == beyond[near][:, None]
     weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing
     mean = np.einsum("nk,nkx->nx", weight, values[others]) / weight.sum(axis=1, keepdims=True)
-    blended = irradiance.reshape(-1, 3).copy()
+    blended = irradiance.reshape(-1, channels).copy()
     blended[index[near]] += share[near, None] * (mean - values[near])
     return blended.reshape(irradiance.shape)
 

@@ -8,7 +8,7 @@ from itertools import groupby
 
 from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple
-from lambent.store.contract import LightGroupRecord
+from lambent.store.light_groups import LightGroupRecord
 from lambent.store.views import Views
 from lambent.viewer.navigation import Navigation
 

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from lambent.core.light_mix import AS_BAKED, LEAST_K, MOST_K, WHITE, GroupMix, LightMix
 from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
-from lambent.store.contract import LightGroupRecord
+from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.modes.walk.lights import Lights
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.panels.widgets import check, press, rgb, slider, wrapped

@@ -1,0 +1,45 @@
+"""The light groups of a store, and the names of its light maps by group (see `store.contract`)."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lambent.core.errors import UserError, invalid
+from lambent.store.contract import SIDES
+from lambent.store.store import MANIFEST, Store
+
+
+class LightGroupRecord(BaseModel):
+    """Emitters that are dimmed together: see scenes.light_groups.
+
+    `share` is that of their luminous irradiance, the sun's direct light included, on the surfaces of the scene.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(min_length=1)
+    members: tuple[str, ...]
+    share: float = Field(ge=0, le=1, allow_inf_nan=False)
+
+
+def group_name(side: str, *, direct: bool = False) -> str:
+    """Name of the array of a side of the light map by light group, of all light or of what is direct."""
+    return f"light_map/{side.replace('irradiance', 'direct' if direct else 'groups')}"
+
+
+def light_groups(store: Store) -> tuple[LightGroupRecord, ...]:
+    """The light groups of a store, in the order of its arrays by group; none where it was baked without."""
+    name = group_name(SIDES[0])
+    if name not in store:
+        return ()
+    said = store.artefact(name).meta.get("groups")
+    try:
+        found = tuple(map(LightGroupRecord.model_validate, said if isinstance(said, list) else ()))
+    except ValidationError as error:
+        raise invalid(error, store.folder / MANIFEST) from error
+    count = store.artefact(name).shape[0]
+    if len(found) != count or len({group.name for group in found}) != count:
+        raise UserError(
+            "broken store", file=store.folder, field=f"{name}: groups", got=str(said)[:80], hint="bake again"
+        )
+    return found

@@ -1,0 +1,73 @@
+"""Mixes of light groups: factors, colours of black bodies, tracks over time, and how they are written."""
+
+import numpy as np
+import pytest
+
+from lambent.core.colour import luminance
+from lambent.core.errors import UserError
+from lambent.core.light_mix import AS_BAKED, GroupMix, LightMix, MixTrack, black_body, parse_light
+from lambent.scenes.loaders.mitsuba.colours import colour_of
+from lambent.scenes.loaders.mitsuba.document import Element
+
+
+@pytest.mark.parametrize("kelvin", [1700, 2000, 2221, 2223, 2700, 3999, 4001, 6504, 12000, 25000])
+def test_black_bodies_have_the_colour_of_plancks_law(kelvin, tmp_path):
+    element = Element("blackbody", {"temperature": str(kelvin)}, tmp_path, 1)
+    planck = colour_of(element, None, emitted=True)
+    planck = planck / luminance(planck)
+    assert black_body(kelvin) == pytest.approx(planck, abs=0.025)
+    assert luminance(black_body(kelvin)) == pytest.approx(1)
+
+
+def test_factors_dim_and_tint_and_keep_luminance():
+    assert AS_BAKED.factor == (1, 1, 1)
+    assert GroupMix(on=False, intensity=3).factor == (0, 0, 0)
+    assert GroupMix(intensity=0.25).factor == pytest.approx((0.25,) * 3)
+    warm = np.array(GroupMix(intensity=2, temperature_k=2700).factor)
+    assert warm[0] > warm[1] > warm[2] and luminance(warm) == pytest.approx(2)
+    dark_red, red = GroupMix(colour=(0.1, 0, 0)).factor, GroupMix(colour=(1, 0, 0)).factor
+    assert dark_red == pytest.approx(red) and red[1:] == (0, 0)
+
+
+def test_a_mix_lists_what_is_not_as_baked():
+    mix = LightMix().changed("lamp", GroupMix(intensity=0.5)).changed("sky", GroupMix(intensity=1))
+    assert mix.groups == {"lamp": GroupMix(intensity=0.5)} and list(mix.factors) == ["lamp"]
+    assert mix.changed("lamp", AS_BAKED) == LightMix()
+    assert mix.of("nobody") == AS_BAKED
+
+
+def test_light_is_parsed_as_written():
+    track = parse_light(["lamp=off", "desk lamp=0.3,2700K", "a=b=#ff0000", "sky=on,2"])
+    mixes = {name: keys[0][1] for name, keys in track.groups.items()}
+    assert mixes["lamp"] == GroupMix(on=False)
+    assert mixes["desk lamp"] == GroupMix(intensity=0.3, temperature_k=2700)
+    assert mixes["a=b"] == GroupMix(colour=(1, 0, 0)) and mixes["sky"] == GroupMix(intensity=2)
+    assert all(keys[0][0] == 0 for keys in track.groups.values())
+
+
+def test_tracks_change_evenly_between_the_times_of_each_group():
+    track = parse_light(["lamp=0@2", "lamp=1@4", "sky=0.5@3"])
+    assert track.factors_at(0)["lamp"] == (0, 0, 0), "the first holds before its time"
+    assert track.factors_at(2.5)["lamp"] == pytest.approx((0.25,) * 3)
+    assert "lamp" not in track.factors_at(9) and track.factors_at(9)["sky"] == pytest.approx((0.5,) * 3)
+    assert MixTrack.of(LightMix({"lamp": GroupMix(intensity=2)})).factors_at(7)["lamp"] == pytest.approx((2,) * 3)
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (["lamp"], "not a light"), (["=0.5"], "not a light"), (["lamp="], "not a light"),
+        (["lamp=bright"], "not a light"), (["lamp=-1"], "not a light"), (["lamp=nan"], "not a light"),
+        (["lamp=1e6"], "out of range"), (["lamp=100K"], "temperature is out of range"),
+        (["lamp=#000000"], "cannot be black"), (["lamp=0.5,0.6"], "intensity twice"),
+        (["lamp=0.5", "lamp=off"], "a light twice"), (["lamp=1@x"], "not a light"),
+    ],
+)  # fmt: skip
+def test_what_is_no_light_is_refused_in_one_line(texts, message):
+    with pytest.raises(UserError, match=message):
+        parse_light(texts)
+
+
+def test_tracks_go_forwards():
+    with pytest.raises(UserError, match="times of a track"):
+        MixTrack({"lamp": ((1.0, AS_BAKED), (1.0, AS_BAKED))})

@@ -1,0 +1,120 @@
+"""The Light panel, and the mix of light groups in saved views and recorded walks."""
+
+from dataclasses import replace
+
+import pytest
+
+from lambent.core.light_mix import GroupMix, LightMix, MixTrack
+from lambent.store.light_groups import LightGroupRecord
+from lambent.store.views import read_views
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.walk.input import WalkInput
+from lambent.viewer.modes.walk.lights import RecordedLight
+from lambent.viewer.modes.walk.mode import WalkMode
+from lambent.viewer.modes.walk.views import SavedViews
+from lambent.viewer.navigation import PathPlay
+from tests.viewer.panel_driver import PanelDriver
+
+GROUPS = (
+    LightGroupRecord(name="lamp", members=("bulb_1", "bulb_2"), share=0.25),
+    LightGroupRecord(name="sky", members=("sky",), share=0.75),
+)
+HALF, OFF = LightMix({"lamp": GroupMix(intensity=0.5)}), LightMix({"lamp": GroupMix(on=False)})
+
+
+@pytest.fixture
+def panels(monkeypatch, state, geometry):
+    state.lights.groups = GROUPS
+    driver = PanelDriver(monkeypatch, WalkMode(state, WalkInput(state, geometry), Drawing(None)))
+    for header in ("Material", "View", "Scene"):
+        driver.click(header, 0.3)
+    driver.click("Light", 0.3)
+    driver.frame(2)
+    yield driver
+    driver.close()
+
+
+def test_each_group_is_switched_dimmed_and_tinted(panels, state):
+    panels.click("on##lamp", 0.1)
+    assert state.lights.mix == OFF and state.recordings.light == {"lamp": (0, 0, 0)}
+    panels.drag("##times lamp", 0.25, 0.5)
+    lamp = state.lights.mix.of("lamp")
+    assert lamp.on and lamp.intensity == pytest.approx(2, abs=0.3), "who moves a slider wants to see it"
+    panels.click("black body##sky", 0.1)
+    panels.frame()
+    panels.drag("##kelvin sky", 0.6, 0.2)
+    assert state.lights.mix.of("sky").temperature_k == pytest.approx(2600, abs=500)
+    panels.click("reset##lamp")
+    assert list(state.lights.mix.groups) == ["sky"]
+    panels.click("reset all light")
+    assert state.lights.mix == LightMix() and state.recordings.light == {}
+
+
+def test_a_store_without_groups_says_what_to_bake(panels, state):
+    state.lights.groups = ()
+    panels.frame(2)
+    assert "on##lamp" not in panels.rects and "reset all light" not in panels.rects
+
+
+def saving(state, folder):
+    """The state with views that can be saved."""
+    state.lights.groups = GROUPS
+    state.recordings.views = SavedViews(state.scene, folder)
+    return state.recordings
+
+
+def test_a_saved_view_keeps_its_mix(state, tmp_path):
+    recordings = saving(state, tmp_path)
+    state.lights.mix = HALF
+    recordings.view_name = "evening"
+    recordings.save_view()
+    assert read_views(tmp_path).lights == {"evening": HALF}
+    state.lights.visit(state.navigation, recordings.views.saved)
+    state.lights.mix = OFF
+    state.lights.visit(state.navigation, recordings.views.saved)
+    assert state.lights.mix == OFF, "whoever stands there may change it"
+    state.navigation.jump(state.scene.cameras[1])
+    state.lights.visit(state.navigation, recordings.views.saved)
+    state.navigation.jump(recordings.views.saved.cameras[0])
+    state.lights.visit(state.navigation, recordings.views.saved)
+    assert state.lights.mix == HALF
+    assert recordings.views.rename("camera", "evening", "night")
+    assert read_views(tmp_path).lights == {"night": HALF}
+    assert recordings.views.delete("camera", "night")
+    assert '"lights"' not in (tmp_path / "views.json").read_text()
+
+
+def test_light_is_recorded_with_a_walk_and_followed(state, tmp_path):
+    recordings, now = saving(state, tmp_path), [0.0]
+    state.screen.clock = lambda: now[0]
+    recordings.record()
+    for step in range(41):
+        now[0] = step * 0.1
+        camera = state.navigation.camera
+        state.navigation.camera = replace(camera, position=(0.05 * step, 1.6, 3.0))
+        state.lights.mix = OFF if step >= 20 else HALF
+        recordings.follow()
+    recordings.record()
+    recordings.save()
+    ((name, track),) = read_views(tmp_path).tracks.items()
+    assert name == state.navigation.path.path.name
+    assert track.factors_at(1.5)["lamp"] == pytest.approx((0.5,) * 3)
+    assert track.factors_at(1.95)["lamp"][0] == pytest.approx(0.25, abs=0.05)
+    assert track.factors_at(3)["lamp"] == (0, 0, 0)
+    state.lights.mix = LightMix()
+    path = recordings.views.saved.paths[0]
+    state.navigation.path = PathPlay(path, 1.0)
+    assert recordings.light["lamp"] == pytest.approx((0.5,) * 3)
+    state.navigation.path = None
+    assert recordings.light == {}
+
+
+def test_a_track_of_light_that_never_changed_is_one_key_or_none():
+    recorded = RecordedLight()
+    for step in range(5):
+        recorded.take(LightMix(), step)
+    assert recorded.track(0.0) is None
+    recorded = RecordedLight()
+    for step in range(5):
+        recorded.take(HALF, step)
+    assert recorded.track(2.0) == MixTrack({"lamp": ((0.0, GroupMix(intensity=0.5)),)})
