@@ -18,8 +18,8 @@ from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
 from lambent.core.light_mix import MixTrack
-from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.map_cache import LEAST_RECENT
+from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 

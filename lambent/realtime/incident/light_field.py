@@ -98,7 +98,7 @@ LOOK_UPS = (
 
 def check_serves(scene: BakedScene, wanted: str, store: str) -> None:
     """`UserError` where a look-up of light fields is wanted and serves no object of the scene."""
-    look_up = next((one for one in LOOK_UPS if one.NAME == wanted), None)
+    look_up = next((one for one in LOOK_UPS if wanted == one.NAME), None)
     if look_up is None:
         return
     if not scene.light_fields:
