@@ -106,6 +106,12 @@ def command(
             help="MOST or LEAST:MOST surfaces on the paths that --edit shows; 1 is direct light. [default: all]"
         ),
     ] = None,
+    recolour: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="MATERIAL=#rrggbb: another diffuse colour, which the baked light answers; path traces it. Repeatable."
+        ),
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -114,6 +120,8 @@ def command(
 
     Example: lambent render room.store --camera entrance -o entrance.png
 
+    Example: lambent render room.store --recolour wall_paint=#31457c -o blue.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
@@ -121,6 +129,7 @@ def command(
     from lambent.core.images import WRITABLE
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
+    from lambent.materials.recolour import parse_recolours
 
     if ev100 is not None:
         exposure = _exposure_of(ev100, exposure)
@@ -132,6 +141,7 @@ def command(
     settings = render.Settings(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb,
+        recolour=parse_recolours(recolour or ()),
     )  # fmt: skip
     settings.check()
     if edit is not None:

@@ -5,9 +5,9 @@
     E(edited) = D + (E - D) I(edited) / I(as baked)                                                  (ratios)
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, E = D + B, a and t their diffuse albedos of
-reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is linear:
-D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light, so that it
-keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is
+linear, so D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light,
+so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
 Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light within a patch: a ray that
 ends where a patch is twice as bright as its mean counts twice.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from lambent.core.exposure import metered
 from lambent.core.false_colour import Range, false_colour, fitting_range, with_scale
 from lambent.core.images import to_bytes
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 
@@ -62,6 +64,8 @@ class Settings:
         Memory on the GPU for the maps of light fields; by default all of them.
     field_deg : float, optional
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
+    recolour : mapping
+        Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
     """
 
     width: int = 1280
@@ -78,6 +82,7 @@ class Settings:
     projection: Projection = Projection.perspective
     field_deg: float | None = None
     light_field_mb: float | None = None
+    recolour: Mapping[str, Triple] = field(default_factory=dict)
 
     @property
     def is_false_coloured(self) -> bool:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from lambent.bake.engine import engine
 from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
+from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
@@ -26,7 +28,8 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
-        self._scene = scene_of(store, scene)
+        baked = scene_of(store, scene)
+        self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
         for name in changed_inputs(store, self._scene):
             note(f"{name} has changed since the store was baked")
         engine()

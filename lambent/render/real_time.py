@@ -14,6 +14,8 @@ from lambent.core.camera import Camera
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
+from lambent.materials.recolour import recoloured
+from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
@@ -22,6 +24,7 @@ from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.render.images import NOISE, Images, Settings
+from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
@@ -51,7 +54,14 @@ class RealTime(Images):
             planar=settings.planar, covers=moving,
             lookup=known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup"),
         )  # fmt: skip
-        self._renderer = Renderer(open_device(), read_baked(store, settings.light_field_mb))
+        baked = read_baked(store, settings.light_field_mb)
+        if settings.recolour:
+            edited = recoloured(baked.record.materials, settings.recolour)
+            baked = answered_scene(baked, read_answer(store), edited)
+            note("light and probes of other colours are estimated from the bake, not baked again")
+            if baked.light_fields:
+                note("light fields show the colours that they were baked with")
+        self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
 

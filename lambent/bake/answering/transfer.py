@@ -13,6 +13,7 @@ from lambent.bake.tiles import seed_of
 from lambent.core.answer import packed_rays
 from lambent.core.arrays import Floats, Indices
 
+MOST_RELATIVE = 4.0  # light of a texel over its patch's: more is of texels that hardly any ray meets
 LEAST_SENT = 1e-9  # of the brightest patch: darker ones send as if they were even
 RAYS_OF_TEXEL = 32
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
@@ -33,6 +34,7 @@ class Between:
             mean = patch_light[of]
             bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
             relative = np.divide(exitance[side], mean, out=there.astype(float), where=bright)
+            relative = np.minimum(relative, MOST_RELATIVE)
             self._patch[spots.index * 2 + side], self._shape[spots.index * 2 + side] = of, relative
 
     def patches_met(self, side: int, mine: Indices, count: int, seed: int) -> tuple[Indices, Floats]:
