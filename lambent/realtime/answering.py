@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Albedos, solved
+from lambent.core.answer import Albedos
 from lambent.core.arrays import Floats
 from lambent.core.irradiance import irradiance_of
 from lambent.materials.diffuse_albedos import albedos_of, edited_albedos
@@ -20,6 +20,8 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.store.answer import SeenSpots, StoredAnswer
+
+FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +56,6 @@ class AnsweredLight:
             return self._as_baked
         light = self._stored.answer.irradiance(albedos, self._reference).sum(axis=0)
         return Lit(light, *_shown(now), is_baked=False)
-
-    def stands(self, edited: Mapping[str, Material]) -> bool:
-        """Whether the solution for these materials came to an end."""
-        now = [edited.get(name, given) for name, given in zip(self._stored.materials, self._materials, strict=True)]
-        return solved(self._stored.answer.patches, edited_albedos(self._materials, now)).converged
 
     def maps(self, light: Lit) -> tuple[Floats | None, Floats | None]:
         """Light maps (H, W, 3) of both sides in the scene's units; what does not answer is as baked."""
@@ -104,16 +101,35 @@ class AnsweredLight:
             sent[crossed] += light.transmitted[material[crossed]] * other_side
         return np.asarray(sent)
 
+    def probe_irradiance(self, name: str, change: Floats) -> tuple[float, ...]:
+        """What a probe alone would give, of which its object shows the share that its light map has."""
+        baked = self._baked.probes[name].irradiance
+        return tuple(np.array(baked) + self._baked.unit * irradiance_of(change)) if baked else ()
+
+    def likely_error(self, light: Lit) -> float:
+        """How far the light may be off: root mean square over its mean, by texels.
+
+        What an edit changes is taken to be as wrong as this computes the indirect light of the bake itself.
+        """
+        answer, before, now = self._stored.answer, self._as_baked.irradiance, light.irradiance
+        indirect = (answer.baked - answer.direct).sum(axis=0)
+        computed = self._reference.sum(axis=0)
+        known = indirect > FAINT * indirect.mean()
+        wrong = np.divide(computed, indirect, out=np.ones_like(computed), where=known) - 1
+        off = np.clip(wrong, -1, 1) * (now - before)
+        return float(np.sqrt((off**2).mean()) / max(float(now.mean()), 1e-30))
+
     def probe(self, name: str, light: Lit) -> Probe:
         """A probe in other light."""
         baked = self._baked.probes[name]
         if light.is_baked:
             return baked
         change = self.probe_change(name, light)
-        irradiance = baked.irradiance
-        if irradiance:  # of which the object shows the share that its light map has
-            irradiance = tuple(np.array(irradiance) + self._baked.unit * irradiance_of(change))
-        return replace(baked, radiance=np.maximum(finite(baked.radiance)[0] + change, 0), irradiance=irradiance)
+        return replace(
+            baked,
+            radiance=np.maximum(finite(baked.radiance)[0] + change, 0),
+            irradiance=self.probe_irradiance(name, change),
+        )
 
 
 def _shown(materials: list[Material]) -> tuple[Floats, Floats]:

@@ -57,7 +57,7 @@ class FrameState:
     materials : mapping
         Materials that stand in for the store's, by name.
     maps : int
-        `Streaming.version` of light fields that have a budget: with more maps a picture is another one.
+        `Renderer.light_version`: with other light, or more maps of light fields, a picture is another one.
     lookup : str
         How a direction finds its light in a probe: auto, or a look-up of `realtime.incident`.
     lookups : mapping

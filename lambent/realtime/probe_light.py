@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
@@ -18,7 +19,7 @@ from lambent.realtime.lamps import ProbeLamps
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.passes.prefilter import prefiltered_cube
 from lambent.realtime.resident_maps import ResidentMaps
-from lambent.realtime.uploads import cube_texture
+from lambent.realtime.uploads import cube_levels, cube_texture, rewrite
 
 
 def kind_of(cube: Cube) -> str:
@@ -47,7 +48,8 @@ class ProbeLight:
 
     def __init__(self, layouts: Layouts, probe: Probe | None, sampler: Any, look_ups: dict[str, LookUp]) -> None:
         self._layouts, self._sampler, self.probe, self._look_ups = layouts, sampler, probe or DARK, look_ups
-        self._texture = cache(self._new_texture)
+        self._made: dict[Cube, Any] = {}  # textures
+        self._change: Floats | None = None  # (6, N, N, 3), what edits of materials add to the radiance
         self.table = cache(self._new_table)  # of lamps: what it is for, and the look-up that finds them
         self.streams: list[ResidentMaps] = []  # of the light field, where not all of its maps are on the GPU
         self._resources: dict[str, tuple[Any, ...]] = {}  # of look-ups, by their files
@@ -67,13 +69,36 @@ class ProbeLight:
         blur = np.log2(SMOOTH_AREA) / 2 if cube in ("smooth", "cleaned") else 0
         return float(np.log2(self.probe.radiance.shape[1] / 2) - blur)
 
+    def _texture(self, cube: Cube) -> Any:
+        if cube not in self._made:
+            self._made[cube] = self._new_texture(cube)
+        return self._made[cube]
+
     def _new_texture(self, cube: Cube) -> Any:
         if cube == "prefiltered":
             return prefiltered_cube(self._layouts, self._texture("box"), self._sampler)
-        if cube == "cleaned":
-            return cube_texture(self._layouts.device, self.lamps.chain())
-        chain = smooth_chain if cube == "smooth" else mip_chain
-        return cube_texture(self._layouts.device, chain(finite(self.probe.radiance)[0]))
+        return cube_texture(self._layouts.device, self._levels(cube, self._change))
+
+    def _levels(self, cube: Cube, change: Floats | None) -> list[Floats]:
+        """MIP levels of a cube map whose radiance has changed. Levels are linear in light; lamps stay as they are."""
+        chain = mip_chain if cube == "box" else smooth_chain
+        levels = self.lamps.chain() if cube == "cleaned" else chain(finite(self.probe.radiance)[0])
+        if change is None:
+            return levels
+        added = chain(change)
+        times = levels[0].shape[0] // 6
+        return [np.maximum(of + np.concatenate([more] * times), 0) for of, more in zip(levels, added, strict=True)]
+
+    def levels(self, change: Floats | None) -> dict[Cube, list[Floats]]:
+        """Levels of the cube maps there are, as `rewrite` takes them; in any thread."""
+        return {cube: self._levels(cube, change) for cube in tuple(self._made) if cube != "prefiltered"}
+
+    def rewrite(self, levels: Mapping[Cube, Sequence[Floats]], change: Floats | None) -> None:
+        """Show the light of `levels`, of a `change` to the radiance, in the cube maps there are and those to come."""
+        self._change = change
+        since = {cube: self._levels(cube, change) for cube in self._made.keys() - {*levels, "prefiltered"}}
+        for cube, of_cube in {**levels, **since}.items():
+            rewrite(self._layouts.device, self._made[cube], cube_levels(of_cube))
 
     @cached_property
     def aims(self) -> AimTable:

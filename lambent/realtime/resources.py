@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.realtime.baked import DARK, BakedScene, Probe
@@ -19,11 +21,11 @@ from lambent.realtime.material_buffers import MaterialBuffers
 from lambent.realtime.parts import WITHIN, neighbouring_faces
 from lambent.realtime.pipelines import VERTEX_FLOATS
 from lambent.realtime.probe_light import ProbeLight, kind_of
-from lambent.realtime.structs import OBJECT_DTYPE
+from lambent.realtime.structs import OBJECT_DTYPE, Record
 from lambent.realtime.sun import SunLight, sun_light
 from lambent.realtime.sun_disc import without_sun
 from lambent.realtime.textures import TextureCache
-from lambent.realtime.uploads import cube_texture, upload, with_alpha
+from lambent.realtime.uploads import cube_texture, rewrite, upload, with_alpha
 from lambent.store.contract import MOST_BORDERS, ObjectRecord
 
 
@@ -43,7 +45,19 @@ class ObjectResources:
 
     def __init__(self, layouts: Layouts, record: ObjectRecord, light: ProbeLight, unit: float, beyond: Ranges) -> None:
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
+        self._irradiance = light.probe.irradiance
+        self._uniforms: list[tuple[Any, Record]] = []
         self.group = cache(self._new_group)
+
+    def relight(self, irradiance: Sequence[float]) -> None:
+        """Show another irradiance of the probe, nine numbers in W/m^2, in the groups there are and those to come."""
+        self._irradiance = tuple(irradiance)
+        for uniform, data in self._uniforms:
+            self._set_irradiance(data)
+            self._layouts.device.queue.write_buffer(uniform, 0, data.tobytes())
+
+    def _set_irradiance(self, data: Record) -> None:
+        data["irradiance"].reshape(-1)[: len(self._irradiance)] = np.array(self._irradiance) / self._unit
 
     def _new_group(self, cube: Cube, look_up: LookUp, table: str = "") -> Any:
         """Group 2 with that cube map, what the look-up reads, and a table of the probe's lamps: aim, lamps or none."""
@@ -51,9 +65,11 @@ class ObjectResources:
         data = np.zeros(1, OBJECT_DTYPE)
         data["centre"][0] = (*probe.centre, self.light.half_log2_texels(cube))
         data["emission"][0, :3] = np.array(self.record.emission) / self._unit
-        data["irradiance"].reshape(-1)[: len(probe.irradiance)] = np.array(probe.irradiance) / self._unit
+        self._set_irradiance(data)
         data["borders"][0] = [*self.record.borders, *[WITHIN] * (MOST_BORDERS - len(self.record.borders))]
-        uniform = self._layouts.buffer("UNIFORM", data)
+        uniform = self._layouts.uniform(data.nbytes)
+        self._layouts.device.queue.write_buffer(uniform, 0, data.tobytes())
+        self._uniforms.append((uniform, data))
         lamps = self.light.table(table, look_up) if table else self._layouts.empty
         layout = self._layouts.object(look_up.BINDINGS, kind_of(cube))
         return self._layouts.group(layout, uniform, self.light.view(cube), lamps, *self.light.resources(look_up))
@@ -72,7 +88,10 @@ class SceneResources:
         vertices = np.concatenate([scene.positions, scene.normals, scene.tangents, scene.uv2, uv], axis=1)
         self.vertices = layouts.buffer("VERTEX", np.nan_to_num(vertices).astype(np.float32))
         self.indices = layouts.buffer("INDEX", scene.faces.astype(np.uint32))
-        self.light_view = light_layers(device, scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
+        self._light = upload(device, [layers], "rgba16float")
+        self.light_view = self._light.create_view(dimension="2d-array")
+        self.light_version = 0  # grows with every `relight`
         sky = scene.far_light or DARK
         self.sky_group = self._sky_group(sky)
         cleaned = without_sun(sky, scene.sun)
@@ -101,6 +120,26 @@ class SceneResources:
         self.mixes_parts = any(beyond.values())
         self.sun = sun_light(layouts, scene, self)
 
+    def relight(self, layers: NDArray[np.float16]) -> None:
+        """Show other light maps (n, H, W, 4), the first of `light_layers`."""
+        rewrite(self._layouts.device, self._light, [layers])
+        self.light_version += 1
+
+    def relight_probe(
+        self, name: str, levels: Mapping[Cube, Sequence[Floats]], change: Floats | None, irradiance: Sequence[float]
+    ) -> None:
+        """Show other light in an object's probe: `levels` of a `change`, as `ProbeLight` has them, and `irradiance`."""
+        light = self.light_of(name)
+        light.rewrite(levels, change)
+        for one in self.objects:
+            if one.light is light:
+                one.relight(irradiance)
+        self.light_version += 1
+
+    def light_of(self, name: str) -> ProbeLight:
+        """The light that the object of this name and those that share it are shown in."""
+        return next(one.light for one in self.objects if one.record.name == name)
+
     def _sky_group(self, sky: Probe) -> Any:
         cube = cube_texture(self._layouts.device, [finite(sky.radiance)[0]])
         return self._layouts.group(self._layouts.cube, cube.create_view(dimension="cube"))
@@ -111,12 +150,13 @@ class SceneResources:
         both = (self.scene.noise, self.scene.noise_back)
         grey = (None if noise is None else np.repeat(noise[..., None], 3, axis=-1) for noise in both)
         dark = SunLight(self._layouts)
-        view = light_layers(self._layouts.device, *grey)
+        layers = upload(self._layouts.device, [light_layers(*grey)], "rgba16float")
+        view = layers.create_view(dimension="2d-array")
         return self._layouts.group(self._layouts.light, view, dark.uniform, dark.nowhere)
 
 
-def light_layers(device: Any, front: Floats | None, back: Floats | None, direction: Floats | None = None) -> Any:
-    """View of a texture array of maps (H, W, 3): light on the front, on the back, dominant direction.
+def light_layers(front: Floats | None, back: Floats | None, direction: Floats | None = None) -> NDArray[np.float16]:
+    """(n, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction.
 
     Layers end with the last map there is, missing ones before it are black, and the shader reads all others as black.
     """
@@ -128,4 +168,4 @@ def light_layers(device: Any, front: Floats | None, back: Floats | None, directi
     for layer, values in zip(layers, maps, strict=False):
         if values is not None:
             layer[...] = with_alpha(values)
-    return upload(device, [layers], "rgba16float").create_view(dimension="2d-array")
+    return layers

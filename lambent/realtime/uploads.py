@@ -31,17 +31,27 @@ def upload(device: Any, levels: Sequence[NDArray[Any]], format: str) -> Any:
     usage = wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST
     size = (width, height, layers)
     texture = device.create_texture(size=size, format=format, mip_level_count=len(levels), usage=usage)
+    rewrite(device, texture, levels)
+    return texture
+
+
+def rewrite(device: Any, texture: Any, levels: Sequence[NDArray[Any]]) -> None:
+    """Replace the first MIP levels of a texture, and of each the first layers."""
     for level, values in enumerate(levels):
-        _, rows, columns, channels = values.shape
+        layers, rows, columns, channels = values.shape
         device.queue.write_texture(
             {"texture": texture, "mip_level": level},
             np.ascontiguousarray(values),
             {"bytes_per_row": columns * channels * values.itemsize, "rows_per_image": rows},
             (columns, rows, layers),
         )
-    return texture
 
 
 def cube_texture(device: Any, levels: Sequence[Floats], format: str = "rgba16float") -> Any:
     """Cube texture of MIP levels (6, n, n, 3) or, for r16float, (6, n, n, 1)."""
-    return upload(device, [with_alpha(level) if format == "rgba16float" else half(level) for level in levels], format)
+    return upload(device, cube_levels(levels, format), format)
+
+
+def cube_levels(levels: Sequence[Floats], format: str = "rgba16float") -> list[NDArray[np.float16]]:
+    """Levels as `cube_texture` uploads them."""
+    return [with_alpha(level) if format == "rgba16float" else half(level) for level in levels]

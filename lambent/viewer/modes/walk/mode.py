@@ -13,6 +13,7 @@ from lambent.realtime.resources import device_needs
 from lambent.store.store import Store
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
+from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.panels import compare, film, light_field, marks, material, metering, scene, view
@@ -36,7 +37,8 @@ def open_store(path: Path, movement: Movement, screen: Screen, light_field_mb: f
     state.missing = (*baked.missing, *state.missing)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
-    pictures = Pictures(Renderer(open_device(device_needs(baked)), baked), state)
+    renderer = Renderer(open_device(device_needs(baked)), baked)
+    pictures = Pictures(renderer, state, AnsweringLight(store, renderer, state.answering))
     return WalkMode(state, WalkInput(state, geometry), pictures)
 
 
@@ -132,7 +134,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     return (
         Panel(
             "Material",
-            partial(material.draw, state.selection, state.materials),
+            partial(material.draw, state.selection, state.materials, state.answering),
             "the objects, and every number of the selected one's material",
             opened=True,
         ),
