@@ -15,7 +15,6 @@ from lambent.bake.keys import key_of
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Floats
-from lambent.core.colour import HALF_MAX
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import probe_name, shared_probes
 
@@ -88,7 +87,8 @@ def bake(context: BakeContext) -> None:
 
 def _direct(context: BakeContext, side: int) -> Floats:
     """Direct light (H, W, 3) of a side, at most that of the light map; what lobes alone have sent on counts as such."""
-    from lambent.bake.light.sampling import Sampling, cleaned, sampled_halves, tile_samples
+    from lambent.bake.answering.direct import shared_by_charts
+    from lambent.bake.light.sampling import Sampling, sampled_halves, tile_samples
 
     if MAPS[side] not in context.stale(KIND):
         return np.asarray(context.store.read(MAPS[side])[0])
@@ -107,12 +107,10 @@ def _direct(context: BakeContext, side: int) -> Floats:
             progress=context.progress, what="direct light" + (", far sides" if side else ""),
         )  # fmt: skip
     writer.finish()
-    context.progress(0, 1, "denoising")
-    halves, known = sampled_halves(context.store.read(TRACED[side]))
-    clean = cleaned(halves.mean(axis=0), known, texels, labels, context.traced.cuts)
     lit = finished_maps(context)[side]
     assert lit is not None, "two-sided scenes have both maps"
-    direct = np.minimum(np.minimum(clean, lit), HALF_MAX).astype(np.float16)
+    halves, known = sampled_halves(context.store.read(TRACED[side]))
+    direct = shared_by_charts(halves.mean(axis=0), known, lit, labels)
     context.put(KIND, MAPS[side], direct[None], context.provenance())
     return direct
 
