@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from wgpu import BufferUsage
 
 from lambent.bench.views import given_or_baked
 from lambent.core.answer import Answer, answered, gathered, solved, upsampled
@@ -35,8 +34,8 @@ from lambent.materials.document import Material
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
-from lambent.realtime.layouts import Layouts
-from lambent.realtime.resources import SceneResources, light_layers
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import light_layers
 from lambent.scenes.scene import Scene
 from lambent.store.answer import StoredAnswer, answer_name, read_answer
 from lambent.store.contract import TIMINGS
@@ -248,9 +247,7 @@ def timed(
 ) -> dict[str, dict[str, float]]:
     """Medians of milliseconds of each edit's steps, after a turn that compiles them."""
     baked = read_baked(store)
-    device = open_device()
-    done = device.create_buffer(size=4, usage=BufferUsage.COPY_SRC | BufferUsage.COPY_DST)
-    resources, light = SceneResources(Layouts(device), baked), AnsweredLight(baked, stored)
+    renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
     found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
     for _ in range(turns + 1):
         for name, edit in edits.items():
@@ -260,8 +257,8 @@ def timed(
             begun = time.perf_counter()
             layers = light_layers(*light.maps(light.lit(edited)))
             computed = time.perf_counter()
-            resources.relight(layers)
-            device.queue.read_buffer(done)
+            renderer.resources.relight(layers)
+            renderer.finish()
             ended = time.perf_counter()
             found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
     return {
