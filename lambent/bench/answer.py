@@ -137,7 +137,9 @@ class Truth:
         self.scene = traced.scene
         sides, labels = traced.in_view(1.0)
         self._sides = sides
-        self._chosen = _drawn(sides.valid.any(axis=1), labels.reshape(-1)[sides.texels.index], effort.texels)
+        self._chosen = _drawn(
+            np.asarray(sides.valid.any(axis=1)), labels.reshape(-1)[sides.texels.index], effort.texels
+        )
         self.at = np.searchsorted(stored.texels, sides.texels.index[self._chosen] * 2)
         self._contact = self._contacts()
         self._before = self._traced({})
@@ -181,11 +183,12 @@ class Truth:
             answered(direct[None], half[None], *gathered_light)[0] - true
             for half, true in zip(before, after, strict=True)
         )
-        naive = (half - true for half, true in zip(before, after, strict=True))
+        naive = [half - true for half, true in zip(before, after, strict=True)]
+        shown, as_baked = [map_after - half for half in after], [map_before - half for half in before]
         mean, local = after.mean(), np.maximum(after.mean(axis=0), LEAST * after.mean())
         one, other = ours
         whole = (one + other) / 2
-        own, left = figures(one, other, mean, local), figures(*naive, mean, local)
+        own, left = figures(one, other, mean, local), figures(naive[0], naive[1], mean, local)
         contacts = np.abs(whole / local)[self._contact]
         return {
             "rms": own["rms"],
@@ -194,8 +197,8 @@ class Truth:
             "p95_contacts": percent(np.quantile(contacts, 0.95)) if len(contacts) else None,
             "naive_rms": left["rms"],
             "naive_relative_rms": left["relative_rms"],
-            "shown_rms": figures(*(map_after - half for half in after), mean, local)["rms"],
-            "baked_rms": figures(*(map_before - half for half in before), before.mean(), local)["rms"],
+            "shown_rms": figures(shown[0], shown[1], mean, local)["rms"],
+            "baked_rms": figures(as_baked[0], as_baked[1], before.mean(), local)["rms"],
             "noise": percent(np.sqrt(((one - other) ** 2).mean()) / 2 / mean),
         }
 

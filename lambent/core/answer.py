@@ -92,7 +92,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
 
     def exitance() -> Floats:
         out = light * reflected
-        return out + light[:, patches.paired] * transmitted if crosses else out
+        return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
         sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)

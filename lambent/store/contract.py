@@ -22,6 +22,7 @@
                                            An object in the document SHARED_PROBES has no probe; it shows another's
     probe/OBJECT/distance                  (6, N, N) float32, metres along the unit direction; FAR where nothing is hit
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
+    answer/...                             what the light answers edited materials with: store.answer
     light_field/OBJECT/points, normals     (P, 3) float32, see core.light_field
     light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
                                            without the disc of meta["sun"] of light_map/irradiance

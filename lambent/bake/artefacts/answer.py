@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_maps
 from lambent.bake.artefacts.probe import sharing
@@ -162,7 +163,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
         return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
 
-    def rays(region: tuple[slice, ...], seed: int) -> Floats:
+    def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
         return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
@@ -175,8 +176,9 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         writer.finish()
     context.progress(0, 1, "texels that answer")
     codes, near = neighbours(spots, points, how.block)
-    for part, values in (("texels", codes), ("near", near.points), ("shares", near.shares)):
-        context.put(KIND, answer_name(part), values, context.provenance())
+    context.put(KIND, answer_name("texels"), codes, context.provenance())
+    context.put(KIND, answer_name("near"), near.points, context.provenance())
+    context.put(KIND, answer_name("shares"), near.shares, context.provenance())
 
 
 def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:

@@ -67,5 +67,8 @@ def _with_materials(traced: TracedScene, materials: dict[str, Material]) -> Trac
 def _in_a_line(sides: Sides, chosen: Indices) -> Sides:
     """Some texels as a map of one row."""
     t = sides.texels
-    own = (values[chosen] for values in (t.face, t.positions, t.normals, t.flat, t.spacing))
-    return Sides(Texels(len(chosen), 1, np.arange(len(chosen)), *own), sides.sign, sides.valid[chosen])
+    line = Texels(
+        len(chosen), 1, np.arange(len(chosen)), t.face[chosen], t.positions[chosen], t.normals[chosen], t.flat[chosen],
+        t.spacing[chosen],
+    )  # fmt: skip
+    return Sides(line, sides.sign, sides.valid[chosen])
