@@ -41,7 +41,7 @@ def test_red_walls_redden_the_room_and_its_reflection(store: Store) -> None:
     assert baked.irradiance is not None and found.irradiance is not None
     before, after = (one.reshape(-1, 3).mean(axis=0) for one in (baked.irradiance, found.irradiance))
     assert after[0] == pytest.approx(before[0], rel=0.05) and after[1] < 0.8 * before[1]
-    probe = found.probes["ball"].radiance.astype(float).mean(axis=(0, 1, 2))
+    probe = np.median(found.probes["ball"].radiance.astype(float), axis=(0, 1, 2))  # most of it walls, little lamp
     assert probe[1] < 0.5 * probe[0] and probe.min() >= 0
     assert 0 < AnsweredLight(baked, stored).likely_error(AnsweredLight(baked, stored).lit(edited)) < 0.3
 
