@@ -198,6 +198,6 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
         if radiance.meta.get("object_left_out", True):
             own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
         found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
-        for part, values in zip(SEEN, (found.spots, found.tint, found.sun), strict=True):
-            context.put(KIND, probe_spots_name(name, part), values, context.provenance())
+        for part in SEEN:
+            context.put(KIND, probe_spots_name(name, part), getattr(found, part), context.provenance())
     context.progress(len(names), len(names), "what probes see")
