@@ -83,8 +83,8 @@ def command(
         str,
         typer.Option(
             help="Where reflected rays find their light: auto, planes, distance or plain (of probes), or light_field, "
-            "light_field-1, -bn, -br, -average, -angle, -nearest; -surface shows the object itself from it, too; -choice, "
-            "which point answers."
+            "light_field-1, -bn, -br, -average, -angle, -nearest; -surface shows the object itself from it, too; "
+            "-choice, which point answers."
         ),
     ] = "auto",
     light_field_mb: Annotated[
@@ -103,8 +103,8 @@ def command(
     sky_turn: Annotated[
         float,
         typer.Option(
-            help="Degrees by which the sky, its sun and what light fields see of both turn about the vertical; light on "
-            "surfaces stays as baked."
+            help="Degrees by which the sky, its sun and what light fields see of both turn about the vertical; "
+            "light on surfaces stays as baked."
         ),
     ] = 0.0,
     projection: Annotated[
@@ -125,6 +125,12 @@ def command(
             help="MOST or LEAST:MOST surfaces on the paths that --edit shows; 1 is direct light. [default: all]"
         ),
     ] = None,
+    recolour: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="MATERIAL=#rrggbb: another diffuse colour, which the baked light answers; path traces it. Repeatable."
+        ),
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -135,6 +141,8 @@ def command(
 
     Example: lambent render room.store --light sun=off --light lamp=0.5,2700K -o evening.png
 
+    Example: lambent render room.store --recolour wall_paint=#31457c -o blue.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
@@ -143,6 +151,7 @@ def command(
     from lambent.core.light_mix import parse_light
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
+    from lambent.materials.recolour import parse_recolours
 
     if ev100 is not None:
         exposure = _exposure_of(ev100, exposure)
@@ -155,6 +164,7 @@ def command(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
+        recolour=parse_recolours(recolour or ()),
     )  # fmt: skip
     settings.check()
     if edit is not None:

@@ -5,9 +5,9 @@
     E(edited) = D + (E - D) I(edited) / I(as baked)                                                  (ratios)
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, E = D + B, a and t their diffuse albedos of
-reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is linear:
-D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light, so that it
-keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is
+linear, so D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light,
+so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
 Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light within a patch: a ray that
 ends where a patch is twice as bright as its mean counts twice.
@@ -29,6 +29,7 @@ TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a sol
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
 MOST_ALBEDO = 0.97  # of an edited surface
 MOST_RATIO = 64.0  # of the light after an edit, and one over it before
+MOST_EXCESS = 1.5
 DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
 
 
@@ -91,7 +92,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
 
     def exitance() -> Floats:
         out = light * reflected
-        return out + light[:, patches.paired] * transmitted if crosses else out
+        return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
         sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)
@@ -223,10 +224,14 @@ class Answer:
         """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
         if albedos.same_as(self.albedos):
             return self.baked
-        ratio = ratios(upsampled(self.indirect(albedos), self.near), reference)
-        return answered(self.direct, self.baked, ratio)
+        return answered(self.direct, self.baked, upsampled(self.indirect(albedos), self.near), reference)
 
 
-def answered(direct: Floats, baked: Floats, ratio: Floats) -> NDArray[np.float32]:
-    """D + (E - D) times the ratio of indirect light, all (G, T, 3)."""
-    return np.asarray(direct + (baked - direct) * ratio, np.float32)
+def answered(direct: Floats, baked: Floats, edited: Floats, reference: Floats) -> NDArray[np.float32]:
+    """D + (E - D) times the ratio of the gathered light `edited` over `reference`, all (G, ..., 3).
+
+    Of indirect light that is more than MOST_EXCESS times what was gathered, the rest stays as baked: lobes have
+    focused it, or it comes from something so near that the points that gather do not see it.
+    """
+    stays = np.maximum(direct, baked - MOST_EXCESS * reference)
+    return np.asarray(stays + (baked - stays) * ratios(edited, reference), np.float32)

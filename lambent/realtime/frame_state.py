@@ -58,7 +58,7 @@ class FrameState:
     materials : mapping
         Materials that stand in for the store's, by name.
     maps : int
-        `Streaming.version` of light fields that have a budget: with more maps a picture is another one.
+        `Renderer.light_version`: with other light, or more maps of light fields, a picture is another one.
     light : mapping
         Factors of light groups, by name and channel; a group that is left out is as baked.
     mixed : int

@@ -143,6 +143,11 @@ class Renderer:
         self._gpu_ms, self._counts["encode_ms"] = times, encode_s * 1e3
         return context.radiance
 
+    @property
+    def light_version(self) -> int:
+        """Grows with every change of light and maps: of another one a picture is another picture."""
+        return self.streaming.version + self.resources.light_version
+
     def outline(self) -> Outline:
         """What draws outlines of the scene's objects."""
         return Outline(self._layouts, self.resources, self._clusters)

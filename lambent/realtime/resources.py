@@ -89,6 +89,7 @@ class SceneResources:
         layers = light_layers(scene.irradiance, scene.irradiance_back, scene.dominant_direction)
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
+        self.light_version = 0  # grows with every answer of light to edited materials
         sky = scene.far_light or DARK
         self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)
@@ -130,6 +131,10 @@ class SceneResources:
                     {"bytes_per_row": width * 8, "rows_per_image": height}, (width, height, 1),
                 )  # fmt: skip
 
+    def light_of(self, name: str) -> ProbeLight:
+        """The light that the object of this name and those that share it are shown in."""
+        return next(one.light for one in self.objects if one.record.name == name)
+
     def sky_group_of(self, texels: NDArray[np.float16]) -> Any:
         """Bind group of an environment (6, N, N, 4)."""
         cube = upload(self._layouts.device, [texels], "rgba16float")
@@ -146,7 +151,7 @@ class SceneResources:
 
 
 def light_layers(front: Floats | None, back: Floats | None, direction: Floats | None = None) -> NDArray[np.float16]:
-    """Layers (k, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction.
+    """(n, H, W, 4) of maps (H, W, 3): light on the front, on the back, dominant direction.
 
     Layers end with the last map there is, missing ones before it are black, and the shader reads all others as black.
     """

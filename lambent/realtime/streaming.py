@@ -62,7 +62,7 @@ class Streaming:
 
     @property
     def statistics(self) -> dict[str, Any]:
-        """The policy of the caches; maps of all light fields with a budget; how many are resident, their MB; hits and misses of frames' reads."""
+        """The policy of the caches; maps of light fields with a budget, those resident, their MB; hits and misses."""
         caches = list(self._caches())
         if not caches:
             return {}

@@ -1,8 +1,8 @@
 """A baked scene under its sky turned about the vertical: relighting by light fields (thesis R, "Relighting").
 
-What is seen of the sky turns at once: behind everything, in light fields, where they say that nothing is hit, and in probes
-whose distances say so. The sun turns with it, and its direct light and shadows are drawn anew. What the light map holds
-stays as it was baked: the diffuse light of the sky, and all that surfaces throw on each other.
+What is seen of the sky turns at once: behind everything, in light fields, where they say that nothing is hit, and in
+probes whose distances say so. The sun turns with it, and its direct light and shadows are drawn anew. What the light
+map holds stays as it was baked: the diffuse light of the sky, and all that surfaces throw on each other.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.cubemap import face_directions, sample
 from lambent.core.directions import normalize
-from lambent.core.light_field_shading import Sky, turned, under_sky
+from lambent.core.light_field_lookup import Sky
+from lambent.core.light_field_shading import turned, under_sky
 from lambent.core.plain import triple
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import mip_chain

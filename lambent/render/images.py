@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from lambent.core.images import to_bytes
 from lambent.core.light_mix import MixTrack
 from lambent.core.map_cache import LEAST_RECENT
 from lambent.core.photometry import LUMINANCE, Quantity, photometric
+from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 
@@ -74,6 +76,8 @@ class Settings:
         Of a fisheye or a cylinder: field of view across the width, in degrees; 180 and 360 by default.
     seed : int
         Of the path tracer, 0 or more: other seeds have independent noise.
+    recolour : mapping
+        Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
     """
 
     width: int = 1280
@@ -94,6 +98,7 @@ class Settings:
     light: MixTrack | None = None
     sky_turn_deg: float = 0.0
     light_field_cache: str = LEAST_RECENT
+    recolour: Mapping[str, Triple] = field(default_factory=dict)
 
     @property
     def is_false_coloured(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,6 +12,7 @@ from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
+from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.store.source import changed_inputs, scene_of
@@ -32,7 +34,8 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
-        self._scene = scene_of(store, scene)
+        baked = scene_of(store, scene)
+        self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
         for name in changed_inputs(store, self._scene):
             note(f"{name} has changed since the store was baked")
         engine()

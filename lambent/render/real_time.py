@@ -16,6 +16,8 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
+from lambent.materials.recolour import recoloured
+from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
@@ -27,6 +29,7 @@ from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
+from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
@@ -57,9 +60,18 @@ class RealTime(Images):
             lookup=settings.lookup,
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
-        baked = under_turned_sky(
-            read_baked(store, settings.light_field_mb, settings.light_field_cache), settings.sky_turn_deg
-        )
+        baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
+        if settings.recolour:
+            if settings.light is not None and settings.light.groups:
+                raise UserError(
+                    "other colours answer light as baked", field="--recolour", hint="leave out the mix of light"
+                )
+            edited = recoloured(baked.record.materials, settings.recolour)
+            baked = answered_scene(baked, read_answer(store), edited)
+            note("light and probes of other colours are estimated from the bake, not baked again")
+            if baked.light_fields:
+                note("light fields show the colours that they were baked with")
+        baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:

@@ -28,6 +28,7 @@
     probe/OBJECT/groups                    (n, 6, N, N, 3) float16, its radiance by light group, units as above; absent
                                            where light_map/groups is
     probe/OBJECT/planes                    (P, 4) float32, bounding planes (n, d): n.x + d = 0, n towards the centre
+    answer/...                             what the light answers edited materials with: store.answer
     light_field/OBJECT/points, normals     (P, 3) float32, see core.light_field
     light_field/OBJECT/radiance            (P, E, E, 3) float16, octahedral maps (core.octahedral), units as above,
                                            without the disc of meta["sun"] of light_map/irradiance

@@ -104,7 +104,10 @@ def test_the_command_offers_every_kind_there_is(toy: str) -> None:
         own = {str(kind) for kind in importlib.reload(command).Kind}
         artefacts.__path__.append(toy)
     of_views = {"view_points", "visibility", "transport", "relighting", "interreflection"}
-    assert own == {"geometry", "environment", "light_map", "probe", "light_field", *of_views} and offered == {*own, toy}
+    assert own == {"geometry", "environment", "light_map", "probe", "light_field", "answer", *of_views} and offered == {
+        *own,
+        toy,
+    }
 
 
 def kinds(**needs: tuple[str, ...]) -> dict[str, SimpleNamespace]:

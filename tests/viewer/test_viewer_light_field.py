@@ -190,7 +190,7 @@ def test_a_click_on_a_disc_keeps_the_selection(state, geometry, field):
 
 
 def test_the_choice_of_points_is_not_refined(renderer, screen):
-    """At rest the picture stays one of the integrator that was chosen: the mean of two points' colours is that of none."""
+    """At rest the picture stays that of the chosen integrator: the mean of two points' colours is that of none."""
     state = WalkState.of(renderer.scene.record, "walk", screen)
     state.navigation.camera, screen.pace.adaptive = CAMERA, False
     counts = {}

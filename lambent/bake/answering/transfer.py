@@ -13,6 +13,8 @@ from lambent.bake.tiles import seed_of
 from lambent.core.answer import packed_rays
 from lambent.core.arrays import Floats, Indices
 
+MOST_RELATIVE = 16.0  # light of a texel over its patch's, such as of a spot of sun in shade
+MOST_UNLIT = 1.0  # the same where no light was sampled: the patch's light is that of its other texels
 LEAST_SENT = 1e-9  # of the brightest patch: darker ones send as if they were even
 RAYS_OF_TEXEL = 32
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
@@ -33,6 +35,7 @@ class Between:
             mean = patch_light[of]
             bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
             relative = np.divide(exitance[side], mean, out=there.astype(float), where=bright)
+            relative = np.minimum(relative, np.where(spots.lit[side], MOST_RELATIVE, MOST_UNLIT))
             self._patch[spots.index * 2 + side], self._shape[spots.index * 2 + side] = of, relative
 
     def patches_met(self, side: int, mine: Indices, count: int, seed: int) -> tuple[Indices, Floats]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_maps
 from lambent.bake.artefacts.probe import sharing
@@ -15,7 +16,6 @@ from lambent.bake.keys import key_of
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
 from lambent.core.arrays import Floats
-from lambent.core.colour import HALF_MAX
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
 from lambent.store.contract import probe_name, shared_probes
 
@@ -88,7 +88,8 @@ def bake(context: BakeContext) -> None:
 
 def _direct(context: BakeContext, side: int) -> Floats:
     """Direct light (H, W, 3) of a side, at most that of the light map; what lobes alone have sent on counts as such."""
-    from lambent.bake.light.sampling import Sampling, cleaned, sampled_halves, tile_samples
+    from lambent.bake.answering.direct import shared_by_charts
+    from lambent.bake.light.sampling import Sampling, sampled_halves, tile_samples
 
     if MAPS[side] not in context.stale(KIND):
         return np.asarray(context.store.read(MAPS[side])[0])
@@ -107,12 +108,10 @@ def _direct(context: BakeContext, side: int) -> Floats:
             progress=context.progress, what="direct light" + (", far sides" if side else ""),
         )  # fmt: skip
     writer.finish()
-    context.progress(0, 1, "denoising")
-    halves, known = sampled_halves(context.store.read(TRACED[side]))
-    clean = cleaned(halves.mean(axis=0), known, texels, labels, context.traced.cuts)
     lit = finished_maps(context)[side]
     assert lit is not None, "two-sided scenes have both maps"
-    direct = np.minimum(np.minimum(clean, lit), HALF_MAX).astype(np.float16)
+    halves, known = sampled_halves(context.store.read(TRACED[side]))
+    direct = shared_by_charts(halves.mean(axis=0), known, lit, labels)
     context.put(KIND, MAPS[side], direct[None], context.provenance())
     return direct
 
@@ -164,7 +163,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
         return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
 
-    def rays(region: tuple[slice, ...], seed: int) -> Floats:
+    def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
         return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
@@ -177,8 +176,9 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         writer.finish()
     context.progress(0, 1, "texels that answer")
     codes, near = neighbours(spots, points, how.block)
-    for part, values in (("texels", codes), ("near", near.points), ("shares", near.shares)):
-        context.put(KIND, answer_name(part), values, context.provenance())
+    context.put(KIND, answer_name("texels"), codes, context.provenance())
+    context.put(KIND, answer_name("near"), near.points, context.provenance())
+    context.put(KIND, answer_name("shares"), near.shares, context.provenance())
 
 
 def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
@@ -198,6 +198,6 @@ def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
         if radiance.meta.get("object_left_out", True):
             own = set().union(*(family(scene.parts, one) for one in (name, *sharing(owners, name))))
         found = eyes.look(np.array(radiance.meta["centre"]), radiance.shape[1], frozenset(own))
-        for part, values in zip(SEEN, (found.spots, found.tint, found.sun), strict=True):
-            context.put(KIND, probe_spots_name(name, part), values, context.provenance())
+        for part in SEEN:
+            context.put(KIND, probe_spots_name(name, part), getattr(found, part), context.provenance())
     context.progress(len(names), len(names), "what probes see")

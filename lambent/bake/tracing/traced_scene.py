@@ -43,6 +43,7 @@ class TracedScene:
         self, atlas: Atlas, merged: dict[str, Floats], two_sided: list[bool], progress: Progress = silent
     ) -> None:
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
+        self.two_sided = two_sided
         self._two_sided = np.repeat(two_sided, [len(o.mesh.faces) for o in self.scene.objects])
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
         self._whole: Any = None

@@ -64,7 +64,9 @@ class PlanarPass:
             return None
         found = context.resources.reflector_lamps.of(view)
         mine = [draw for draw in context.draws if view.has(draw.item.record)]
-        served = found is not None and any(
+        if found is None:
+            return None
+        served = any(
             found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
             for draw in mine
         )

@@ -40,15 +40,17 @@ class Stage(Pair):
         materials = {"A": subject.material}
         if subject.compared is not None:
             materials["B"] = subject.compared
-        self.shown = tuple(self._picture(which) for which in materials)
+        pictures = [self._picture(which) for which in materials]
+        self.shown = tuple(pictures)
         size, camera = size_px(place, pixel_ratio), state.navigation.camera
         # A last: its statistics are the window's.
-        for picture, material in reversed(list(zip(self.shown, materials.values(), strict=True))):
+        for picture, material in reversed(list(zip(pictures, materials.values(), strict=True))):
             picture.update(state.look.frame(camera, size, {subject.name: material}))
 
     def save(self) -> None:
         """Write the picture of A, and of B where there is one."""
         for picture in self.shown:
+            assert isinstance(picture, Picture), "as `update` made them"
             picture.save(self._state.editor.subject.name)
 
     def _have_light(self) -> None:

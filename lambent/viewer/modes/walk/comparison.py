@@ -1,7 +1,8 @@
 """The picture A beside B, another integrator's or the path tracer's, and how far the two are apart.
 
 B is, unless chosen otherwise, the unbiased `qmc`, which accumulates while nothing moves: the error is then that of A's
-few samples. By the path tracer it is that of the bake as well. Figures compare what a display shows; the map of differences compares luminances.
+few samples. By the path tracer it is that of the bake as well. Figures compare what a display shows; the map of
+differences compares luminances.
 """
 
 from __future__ import annotations

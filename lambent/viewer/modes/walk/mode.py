@@ -15,6 +15,7 @@ from lambent.realtime.turned_sky import under_turned_sky
 from lambent.store.store import Store
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
+from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import SHORTCUTS, WalkInput
 from lambent.viewer.modes.walk.panels import compare, film, light_field, lights, marks, material, metering, scene, view
@@ -35,7 +36,8 @@ def open_store(
 ) -> WalkMode:  # fmt: skip
     """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`.
 
-    `light_field_mb` is for the maps of light fields on the GPU, in caches of a `policy` of `core.map_cache`; by `sky_turn_deg` the sky is turned.
+    `light_field_mb` is for the maps of light fields on the GPU, in caches of a `policy` of `core.map_cache`; the sky
+    is turned by `sky_turn_deg`.
     """
     store = Store.open(path)
     baked = under_turned_sky(read_baked(store, light_field_mb, policy), sky_turn_deg)
@@ -47,7 +49,8 @@ def open_store(
     state.missing = (*baked.missing, *state.missing)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
-    pictures = Pictures(Renderer(open_device(device_needs(baked)), baked), state)
+    renderer = Renderer(open_device(device_needs(baked)), baked)
+    pictures = Pictures(renderer, state, AnsweringLight(store, renderer, state.answering))
     return WalkMode(state, WalkInput(state, geometry), pictures)
 
 
@@ -144,7 +147,7 @@ def panels(state: WalkState) -> tuple[Panel, ...]:
     return (
         Panel(
             "Material",
-            partial(material.draw, state.selection, state.materials),
+            partial(material.draw, state.selection, state.materials, state.answering),
             "the objects, and every number of the selected one's material",
             opened=True,
         ),

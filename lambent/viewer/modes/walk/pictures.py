@@ -16,6 +16,7 @@ from lambent.core.plain import triple
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.mode import Divider
+from lambent.viewer.modes.walk.answering import AnsweringLight
 from lambent.viewer.modes.walk.comparison import AS_A, REFERENCE
 from lambent.viewer.modes.walk.filming import QUALITIES, SIZES, Filming, film_file
 from lambent.viewer.modes.walk.glare import GlareDrawing
@@ -30,15 +31,16 @@ from lambent.viewer.work import POLL_S
 
 MIX_S = 0.01  # between two looks at a mix of light that is being made
 METER_S = 0.2  # between two readings of the meter while something moves
+ANSWER_S = 0.01  # between two looks at light that is being computed
 SHARED = 0.5  # of the frame time that each of two pictures may take
 
 
 class Pictures(Pair):
     """The picture A; B, its renderer and that of films are made when they are first wanted."""
 
-    def __init__(self, renderer: Renderer, state: WalkState) -> None:
+    def __init__(self, renderer: Renderer, state: WalkState, answering: AnsweringLight | None = None) -> None:
         super().__init__(renderer.device)
-        self._renderer, self._state = renderer, state
+        self._renderer, self._state, self._answering = renderer, state, answering
         self._a = Picture(renderer, state.screen)
         renderer.waits = False  # for maps: the picture is drawn again when they are there
         self._b: Picture | None = None
@@ -76,6 +78,8 @@ class Pictures(Pair):
         """Draw what is due, and read the picture for the meter where it is looked at."""
         state = self._state
         self._film()
+        if self._answering is not None:
+            self._answering.update(state.materials.edits.edited)
         wanted = self._frame(size_px(place, pixel_ratio))
         self._outlining.update(wanted, state.selection.record)
         if self._traced is not None and not (state.comparison.is_traced and state.films.under_way is None):
@@ -106,13 +110,16 @@ class Pictures(Pair):
         state = self._state
         frame = state.look.frame(state.navigation.camera, size, state.materials.edits.edited)
         light = state.recordings.light
-        return replace(frame, maps=self._renderer.streaming.version, light=light, mixed=self._renderer.mixer.version)
+        return replace(frame, maps=self._renderer.light_version, light=light, mixed=self._renderer.mixer.version)
 
     def wait_s(self) -> float | None:
         if self._state.films.under_way is not None or self._glare.busy:
             return 0.0
         loading = MIX_S if self._renderer.mixer.busy else POLL_S if self._renderer.streaming.busy else None
-        return least(super().wait_s(), loading, 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None)
+        answers = ANSWER_S if self._answering is not None and self._answering.busy else None
+        return least(
+            super().wait_s(), loading, answers, 0.1 if len(self.shown) == 2 and self._state.comparison.busy else None
+        )
 
     def save(self) -> None:
         """Write the picture A, and the error map where one is shown."""
@@ -128,7 +135,9 @@ class Pictures(Pair):
             screen.say(f"saved {name}-error.png")
 
     def close(self) -> None:
-        """Cancel FLIP, path tracing and the film under way."""
+        """Cancel FLIP, path tracing, the film under way, and light that is being computed."""
+        if self._answering is not None:
+            self._answering.close()
         self._state.comparison.forget()
         if self._traced is not None:
             self._traced.close()

@@ -15,6 +15,7 @@ from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import document_file, with_account
 from lambent.viewer.edits import MaterialEdits, rescue
 from lambent.viewer.look import Look
+from lambent.viewer.modes.walk.answering import Answering
 from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.filming import Films
 from lambent.viewer.modes.walk.light_fields import FieldView
@@ -133,6 +134,7 @@ class WalkState:
     marks: Marks
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
+    answering: Answering = field(default_factory=Answering)
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)

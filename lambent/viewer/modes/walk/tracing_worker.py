@@ -2,9 +2,10 @@
 
 python -m lambent.viewer.modes.walk.tracing_worker STORE DEGREES, by which the sky is turned
 
-Every line on stdin is a `Wish` as a JSON object; a newer one ends those before it, at the next pass, and the end of stdin
-ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or "number", that of
-the wish, "samples", "width" and "height", followed by the bytes of the mean so far, (height, width, 3) float32.
+Every line on stdin is a `Wish` as a JSON object; a newer one ends those before it, at the next pass, and the end of
+stdin ends the process. Every line on stdout is a JSON object: "error", a line for the user; "what", a step; or
+"number", that of the wish, "samples", "width" and "height", followed by the bytes of the mean so far, float32 of
+(height, width, 3).
 """
 
 from __future__ import annotations

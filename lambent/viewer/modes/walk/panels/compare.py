@@ -17,8 +17,8 @@ def draw(comparison: Comparison) -> None:
         imgui.text_wrapped("Off: the picture refines by itself while nothing moves.")
         return
     meaning = (
-        "integrator of B; qmc is unbiased and accumulates while nothing moves, path traces the scene itself, beside the "
-        "window; A stays that of motion"
+        "integrator of B; qmc is unbiased and accumulates while nothing moves, path traces the scene itself, beside "
+        "the window; A stays that of motion"
     )
     comparison.integrator = choice("with B", comparison.integrator, (*INTEGRATORS, TRACED), meaning)
     if comparison.is_traced:

@@ -1,0 +1,74 @@
+"""Irradiance at some texels of a light map, path traced with other materials: what edited light is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.bake.light.sampling import Sampling, tile_samples
+from lambent.bake.surfaces.texels import Sides, Texels
+from lambent.bake.tracing.traced_scene import TracedScene
+from lambent.core.arrays import Floats, Indices
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Material
+
+DEPTH = 24
+AT_ONCE = 1024  # texels: a tile of theirs is traced at once
+
+
+@dataclass(frozen=True, eq=False)
+class Retraced:
+    """irradiance (n, 3) W/m^2 without direct sun, and halves (2, n, 3), whose difference is its noise."""
+
+    irradiance: Floats
+    halves: Floats
+
+    @property
+    def noise(self) -> float:
+        """Root mean square error over the mean."""
+        error = np.sqrt(((self.halves[0] - self.halves[1]) ** 2).mean()) / 2
+        return float(error / self.irradiance.mean())
+
+
+def retraced(
+    traced: TracedScene, sides: Sides, chosen: Indices, materials: dict[str, Material], paths: int, seed: int,
+    progress: Progress = silent,
+) -> Retraced:  # fmt: skip
+    """Irradiance at texels `chosen` (n,) of a side, with these materials in place of the scene's of the same names.
+
+    `paths` is a multiple of 128. Points of texels are those that the light map's samples have.
+    """
+    edited = _with_materials(traced, materials)
+    scene, unseen = edited.whole(diffuse=True), edited.unseen(diffuse=True)
+    per_pass = 64
+    how = Sampling((paths, paths), 0.0, DEPTH, per_pass, unseen=unseen)
+    parts: list[NDArray[np.float32]] = []
+    for first in range(0, len(chosen), AT_ONCE):
+        progress(first, len(chosen), "path tracing what is compared with")
+        mine = chosen[first : first + AT_ONCE]
+        line = _in_a_line(sides, mine)
+        region = tuple(slice(0, size) for size in (2, 1, len(mine), 4))
+        parts.append(tile_samples(scene, line, region, seed + first, how)[:, 0])
+    raw = np.concatenate(parts, axis=1)
+    halves = raw[..., :3] / np.maximum(raw[..., 3:], 1)
+    return Retraced(halves.mean(axis=0), halves)
+
+
+def _with_materials(traced: TracedScene, materials: dict[str, Material]) -> TracedScene:
+    """The same texels of a scene with other materials."""
+    if not materials:
+        return traced
+    scene = replace(traced.scene, materials={**traced.scene.materials, **materials})
+    return TracedScene(replace(traced.atlas, scene=scene), traced.merged, traced.two_sided, traced.progress)
+
+
+def _in_a_line(sides: Sides, chosen: Indices) -> Sides:
+    """Some texels as a map of one row."""
+    t = sides.texels
+    line = Texels(
+        len(chosen), 1, np.arange(len(chosen)), t.face[chosen], t.positions[chosen], t.normals[chosen], t.flat[chosen],
+        t.spacing[chosen],
+    )  # fmt: skip
+    return Sides(line, sides.sign, sides.valid[chosen])

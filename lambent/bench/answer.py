@@ -1,0 +1,283 @@
+"""`answer`: how exactly and how fast baked light answers other colours, against path tracing with those colours.
+
+Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
+`rms` and `mean_error` over the mean of the truth, `relative_rms` and `p95_contacts` texel by texel (over at least
+LEAST of that mean). The light that is answered from is path traced, too, with the same random numbers, so that errors
+are those of the answer alone: `shown_rms` has those of the light map besides, of which `baked_rms` is there before
+any edit. `rms` and `relative_rms` are roots of mean products of the errors in two independent halves of the paths,
+which noise (`noise`, of one whole) does not enter. `naive` is the light as it was baked.
+
+Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
+Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
+after which the next frame shows the light.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lambent.bench.views import given_or_baked
+from lambent.core.answer import Answer, answered, gathered, solved, upsampled
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.geometry import triangle_areas
+from lambent.core.plain import Triple
+from lambent.core.progress import Progress, silent
+from lambent.materials.diffuse_albedos import edited_albedos
+from lambent.materials.document import Material
+from lambent.realtime.answering import AnsweredLight
+from lambent.realtime.baked import read_baked
+from lambent.realtime.device import open_device
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import light_layers
+from lambent.scenes.scene import Scene
+from lambent.store.answer import StoredAnswer, answer_name, read_answer
+from lambent.store.contract import TIMINGS
+from lambent.store.store import Store
+
+if TYPE_CHECKING:
+    from lambent.bake.context import BakeContext
+
+NAME = "answer"
+LEAST = 0.01  # of the mean light, in relative errors
+CONTACT_M, CONTACT_SHARE, CONTACT_RAYS = 0.1, 0.25, 64
+SEED = 1
+Edit = Mapping[str, Triple]  # diffuse colours, linear RGB, by material
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Texels that are compared, paths from each, edits at most, turns of timing, and the scene baked without inputs."""
+
+    texels: int = 5000
+    paths: int = 2048
+    edits: int = 6
+    turns: int = 5
+    scene: str = "builtin:room"
+
+
+FULL, QUICK = Effort(), Effort(300, 256, 2, 5, "builtin:box")
+
+
+def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent) -> dict[str, Any]:
+    """Rows of the inputs, baked stores; without one, of a scene that is baked here in `preview`."""
+    with given_or_baked(inputs, effort.scene, progress) as stores:
+        rows = [row for store in stores for row in rows_of(store, effort, progress)]
+    return {"rows": rows, "summary": {f"{row['scene']} {row['edit']}": row["rms"] for row in rows}}
+
+
+def edits_of(scene: Scene, most: int) -> dict[str, Edit]:
+    """Edits of the spec's scenes by name; elsewhere some colours for the materials of the largest area."""
+    known = ROOM if scene.materials.keys() >= ROOM_MATERIALS else {}
+    whole = {
+        "everything half": {name: _times(m.kd, 0.5) for name, m in scene.materials.items()},
+        "everything white": {name: (0.85, 0.85, 0.85) for name, m in scene.materials.items() if any(m.kd)},
+    }
+    if known:
+        return dict(list({**known, **whole}.items())[:most])
+    area: dict[str, float] = dict.fromkeys(scene.materials, 0.0)
+    for o in scene.objects:
+        area[o.material] += float(triangle_areas(o.mesh.corners).sum())
+    largest = sorted((name for name in area if any(scene.materials[name].kd)), key=lambda name: -area[name])
+    single = {f"{name} {word}": {name: colour} for name in largest for word, colour in COLOURS.items()}
+    return dict(list({**dict(list(single.items())[: max(most - 2, 1)]), **whole}.items())[:most])
+
+
+COLOURS: dict[str, Triple] = {"blue": (0.03, 0.06, 0.2), "light": (0.8, 0.8, 0.8), "black": (0.02, 0.02, 0.02)}
+ROOM: dict[str, Edit] = {
+    "walls dark blue": {"wall_paint": (0.03, 0.06, 0.2)},
+    "floor terracotta": dict.fromkeys(("tile_light", "tile_dark"), (0.45, 0.15, 0.07)),
+    "rug white": {"rug": (0.8, 0.8, 0.8)},
+    "wood black": dict.fromkeys(("oak", "dark_oak", "varnished_wood"), (0.02, 0.02, 0.02)),
+}
+ROOM_MATERIALS = {name for edit in ROOM.values() for name in edit}
+
+
+def _times(colour: Triple, factor: float) -> Triple:
+    return colour[0] * factor, colour[1] * factor, colour[2] * factor
+
+
+def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
+    """One row per edit of a store's scene."""
+    stored = read_answer(store)
+    truth = Truth(store, stored, effort, progress)
+    edits = edits_of(truth.scene, effort.edits)
+    times = timed(store, stored, truth.scene.materials, edits, effort.turns)
+    arrays = [a for a in store.artefacts() if a.name.startswith(answer_name("")) and a.kind != "raw"]
+    cost = {
+        "precompute_s": float(store.documents.get(TIMINGS, {}).get("answer", np.nan)),
+        "bytes": sum(int(np.prod(a.shape)) * np.dtype(a.dtype).itemsize for a in arrays),
+        "patches": len(stored.answer.patches.material),
+        "texels": len(truth.at),
+    }
+    rows = []
+    for number, (name, edit) in enumerate(edits.items()):
+        progress(number, len(edits), name)
+        rows.append({"scene": truth.scene.name, "edit": name, **truth.errors(edit), **times[name], **cost})
+    return rows
+
+
+def changed(materials: Mapping[str, Material], edit: Edit) -> dict[str, Material]:
+    """The materials of an edit."""
+    return {name: materials[name].model_copy(update={"kd": colour}) for name, colour in edit.items()}
+
+
+class Truth:
+    """Some texels of a store, and their light path traced before edits and after."""
+
+    def __init__(self, store: Store, stored: StoredAnswer, effort: Effort, progress: Progress) -> None:
+        self._context, self._stored, self._effort, self._progress = context_of(store), stored, effort, progress
+        traced = self._context.traced
+        self.scene = traced.scene
+        sides, labels = traced.in_view(1.0)
+        self._sides = sides
+        self._chosen = _drawn(
+            np.asarray(sides.valid.any(axis=1)), labels.reshape(-1)[sides.texels.index], effort.texels
+        )
+        self.at = np.searchsorted(stored.texels, sides.texels.index[self._chosen] * 2)
+        self._contact = self._contacts()
+        self._before = self._traced({})
+        answer = stored.answer
+        self._reference = answer.reference()
+        self._direct = answer.direct[:, self.at].sum(axis=0)
+
+    def _traced(self, edited: dict[str, Material]) -> Floats:
+        """Halves (2, n, 3) of path traced irradiance."""
+        from lambent.bake.reference.at_texels import retraced
+
+        how = self._effort
+        found = retraced(self._context.traced, self._sides, self._chosen, edited, how.paths, SEED, self._progress)
+        return found.halves.astype(float)
+
+    def _contacts(self) -> Flags:
+        """(n,) texels that touch something."""
+        from lambent.bake.tracing.rays import cosine_directions, distances, leaving
+
+        t, whole = self._sides.texels, self._context.traced.whole(diffuse=True)
+        p, n, flat = (
+            np.repeat(of[self._chosen, 0].astype(float), CONTACT_RAYS, axis=0)
+            for of in (t.positions, t.normals, t.flat)
+        )
+        found = distances(whole, leaving(whole, p, flat, cosine_directions(n)))
+        return np.asarray((found.reshape(-1, CONTACT_RAYS) < CONTACT_M).mean(axis=1) > CONTACT_SHARE)
+
+    def errors(self, edit: Edit) -> dict[str, Any]:
+        """The fields of a row that are errors."""
+        given, names = self.scene.materials, self._stored.materials
+        edited = changed(given, edit)
+        albedos = edited_albedos([given[name] for name in names], [edited.get(name, given[name]) for name in names])
+        answer = self._stored.answer
+        computed = upsampled(answer.indirect(albedos), answer.near)
+        after, before = self._traced(edited), self._before
+        direct = np.minimum(self._direct, before.mean(axis=0))
+        gathered_light = [light[:, self.at].sum(axis=0)[None] for light in (computed, self._reference)]
+        map_before = answer.baked[:, self.at].sum(axis=0)
+        map_after = answered(self._direct[None], map_before[None], *gathered_light)[0]
+        ours = (
+            answered(direct[None], half[None], *gathered_light)[0] - true
+            for half, true in zip(before, after, strict=True)
+        )
+        naive = [half - true for half, true in zip(before, after, strict=True)]
+        shown, as_baked = [map_after - half for half in after], [map_before - half for half in before]
+        mean, local = after.mean(), np.maximum(after.mean(axis=0), LEAST * after.mean())
+        one, other = ours
+        whole = (one + other) / 2
+        own, left = figures(one, other, mean, local), figures(naive[0], naive[1], mean, local)
+        contacts = np.abs(whole / local)[self._contact]
+        return {
+            "rms": own["rms"],
+            "relative_rms": own["relative_rms"],
+            "mean_error": percent(whole.mean() / mean),
+            "p95_contacts": percent(np.quantile(contacts, 0.95)) if len(contacts) else None,
+            "naive_rms": left["rms"],
+            "naive_relative_rms": left["relative_rms"],
+            "shown_rms": figures(shown[0], shown[1], mean, local)["rms"],
+            "baked_rms": figures(as_baked[0], as_baked[1], before.mean(), local)["rms"],
+            "noise": percent(np.sqrt(((one - other) ** 2).mean()) / 2 / mean),
+        }
+
+
+def percent(share: float) -> float:
+    """With two decimals."""
+    return round(100 * float(share), 2)
+
+
+def figures(one: Floats, other: Floats, mean: float, local: Floats) -> dict[str, float]:
+    """rms and relative_rms of the error that two halves (n, 3) have in common; 0 where that is lost in noise."""
+    both = one * other
+    return {
+        "rms": percent(np.sqrt(max(float(both.mean()), 0.0)) / mean),
+        "relative_rms": percent(np.sqrt(max(float((both / local**2).mean()), 0.0))),
+    }
+
+
+def _drawn(lit: Flags, label: Indices, count: int) -> Indices:
+    """Texels drawn at random of those that viewers see."""
+    from lambent.bake.surfaces.texels import BEYOND
+
+    seen = np.flatnonzero(lit & (label < BEYOND))
+    return np.sort(np.random.default_rng(SEED).permutation(seen)[:count])
+
+
+def context_of(store: Store) -> BakeContext:
+    """The bake of a store, as far as its geometry and light map go."""
+    from lambent.bake.bake import found
+    from lambent.bake.context import BakeContext
+    from lambent.bake.cuts import cut_for_viewers
+    from lambent.bake.engine import engine
+    from lambent.bake.methods import METHODS
+    from lambent.bake.probes.division import divided
+    from lambent.bake.quality import quality_named
+    from lambent.bake.timing import untimed
+    from lambent.scenes.textures import prepared
+    from lambent.store.source import scene_of
+
+    engine()
+    scene = scene_of(store)
+    ready = replace(scene, textures=prepared(scene.textures))
+    as_baked = cut_for_viewers(divided(ready, store, silent, untimed), store, untimed)
+    return BakeContext(as_baked, store, found(), quality_named("preview"), store.documents.get(METHODS, {}))
+
+
+def timed(
+    store: Store, stored: StoredAnswer, materials: Mapping[str, Material], edits: Mapping[str, Edit], turns: int
+) -> dict[str, dict[str, float]]:
+    """Medians of milliseconds of each edit's steps, after a turn that compiles them."""
+    baked = read_baked(store)
+    renderer, light = Renderer(open_device(), baked), AnsweredLight(baked, stored)
+    found: dict[str, list[dict[str, float]]] = {name: [] for name in edits}
+    for _ in range(turns + 1):
+        for name, edit in edits.items():
+            edited = changed(materials, edit)
+            now = [edited.get(one, materials[one]) for one in stored.materials]
+            found[name].append(_steps(stored.answer, now, [materials[one] for one in stored.materials]))
+            begun = time.perf_counter()
+            layers = light_layers(*light.maps(light.lit(edited)))
+            computed = time.perf_counter()
+            renderer.resources.show_light_map(list(layers))
+            renderer.finish()
+            ended = time.perf_counter()
+            found[name][-1] |= {"upload_ms": 1e3 * (ended - computed), "edit_to_picture_ms": 1e3 * (ended - begun)}
+    return {
+        name: {key: round(statistics.median(run[key] for run in runs[1:]), 2) for key in runs[0]}
+        for name, runs in found.items()
+    }
+
+
+def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[str, float]:
+    """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
+    marks = [time.perf_counter()]
+    solution = solved(answer.patches, edited_albedos(given, now))
+    marks.append(time.perf_counter())
+    light = gathered(answer.rays, solution.exitance)
+    marks.append(time.perf_counter())
+    upsampled(light, answer.near)
+    marks.append(time.perf_counter())
+    steps = dict(zip(("solve_ms", "gather_ms", "upsample_ms"), (1e3 * np.diff(marks)).tolist(), strict=True))
+    return {**steps, "sweeps": float(solution.sweeps)}

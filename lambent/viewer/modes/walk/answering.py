@@ -1,0 +1,151 @@
+"""Light that answers edited materials while the camera goes on: computed in a thread, shown as soon as it is there.
+
+The light map comes first, the probes after it, each when it is ready. An edit that comes in between drops the probes of
+the one before: the light map is never behind by more than one computation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress
+from lambent.materials.document import Material
+from lambent.realtime.answering import AnsweredLight, Lit
+from lambent.realtime.cube_mips import finite
+from lambent.realtime.probe_light import ProbeLight
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import light_layers
+from lambent.store.answer import has_answer, read_answer
+from lambent.store.store import Store
+from lambent.viewer.work import Work
+
+WITHOUT = "the light of other surfaces stays as baked: this store has no answer (`lambent bake --only answer`)"
+
+WITH_GROUPS = "the light of other surfaces stays as baked: this store has light groups to mix instead"
+
+
+@dataclass
+class Answering:
+    """What the panel shows: whether light answers, a line on it, and the share by which it may be off."""
+
+    possible: bool = False
+    on: bool = True
+    said: str = WITHOUT
+    likely_error: float | None = None
+
+    @property
+    def note(self) -> str:
+        """A line for the panel."""
+        if self.likely_error is None or not self.on:
+            return self.said
+        return f"light of other surfaces: estimated, off by about {100 * self.likely_error:.1f} %"
+
+
+@dataclass(frozen=True, eq=False)
+class _Maps:
+    light: Lit
+    layers: NDArray[np.float16]
+    likely_error: float | None
+
+
+class AnsweringLight:
+    """Brings the light of edited materials onto the GPU. All calls come from the thread of the window."""
+
+    def __init__(self, store: Store, renderer: Renderer, shown: Answering) -> None:
+        self._store, self._renderer, self._shown = store, renderer, shown
+        self._answer: AnsweredLight | None = None  # made in the thread, with the first edit
+        self._of: Mapping[str, Material] = {}
+        self._work: Work | None = None
+        self._probes_of: Lit | None = None  # whose probes are to come
+        self._as_baked: dict[str, ProbeLight] | None = None  # by object with a probe, before the first edit
+        self._users: dict[str, list[int]] = {}  # numbers of the objects that show each
+        shown.possible = has_answer(store) and renderer.scene.groups is None  # a mix and an edit change the same light
+        if shown.possible:
+            shown.said = "light of other surfaces: as baked"
+        elif renderer.scene.groups is not None:
+            shown.said = WITH_GROUPS
+
+    @property
+    def busy(self) -> bool:
+        """Whether light is being computed."""
+        return self._work is not None
+
+    def update(self, edited: Mapping[str, Material]) -> None:
+        """Take what is finished, and begin what these materials ask for."""
+        if not self._shown.possible:
+            return
+        wanted = edited if self._shown.on else {}
+        if self._work is not None and self._work.poll():
+            self._work = None
+        if wanted != self._of and self._work is not None and self._probes_of is not None:
+            self._work.cancel()  # probes of an edit before; what is done of them stays until the next
+        if self._work is not None:
+            return
+        if wanted != self._of:
+            self._of, self._probes_of = dict(wanted), None
+            self._work = Work(lambda progress: self._maps(dict(wanted)), self._show_maps, self._failed)
+        elif self._probes_of is not None:
+            light, self._probes_of = self._probes_of, None
+            self._begin_probes(light)
+
+    def close(self) -> None:
+        """Stop computing."""
+        if self._work is not None:
+            self._work.cancel()
+            self._work.wait()
+            self._work = None
+
+    def _maps(self, edited: Mapping[str, Material]) -> _Maps:
+        """In the thread: the light maps of edited materials."""
+        if self._answer is None:
+            self._answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
+        light = self._answer.lit(edited)
+        layers = light_layers(*self._answer.maps(light))
+        return _Maps(light, layers, None if light.is_baked else self._answer.likely_error(light))
+
+    def _show_maps(self, maps: _Maps) -> None:
+        self._renderer.resources.show_light_map(list(maps.layers))
+        self._renderer.resources.light_version += 1
+        self._shown.likely_error = maps.likely_error
+        self._probes_of = maps.light
+
+    def _begin_probes(self, light: Lit) -> None:
+        answer, resources = self._answer, self._renderer.resources
+        assert answer is not None, "maps come before probes"
+        if self._as_baked is None:
+            self._as_baked = {name: resources.light_of(name) for name in answer.probes}
+            shown = [item.light for item in resources.objects]
+            self._users = {
+                name: [k for k, one in enumerate(shown) if one is light] for name, light in self._as_baked.items()
+            }
+        baked = self._as_baked
+
+        def run(progress: Progress) -> dict[str, ProbeLight]:
+            found = {}
+            for number, name in enumerate(answer.probes):
+                progress(number, len(answer.probes), "probes")
+                found[name] = baked[name] if light.is_baked else _answered(baked[name], answer, name, light)
+            return found
+
+        def show(found: dict[str, ProbeLight]) -> None:
+            for name, made in found.items():
+                for item in (resources.objects[k] for k in self._users[name]):
+                    item.relight(made, item.emission)
+            resources.light_version += 1
+
+        self._work = Work(run, show, self._failed)
+
+    def _failed(self, error: UserError) -> None:
+        self._shown.possible, self._shown.said = False, f"the light of other surfaces stays as baked: {error}"
+
+
+def _answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
+    """A probe's light in other light of the surfaces that it sees."""
+    change = answer.probe_change(name, light)
+    radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
+    return baked.relit(radiance, answer.probe_irradiance(name, change))

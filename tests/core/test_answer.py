@@ -1,0 +1,127 @@
+"""Light that answers: radiosity against linear algebra, gathering and ratios against sums by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.answer import (
+    MOST_EXCESS,
+    MOST_WEIGHT,
+    Albedos,
+    Answer,
+    Neighbours,
+    Patches,
+    answered,
+    gathered,
+    packed_rays,
+    packed_weights,
+    ratios,
+    solved,
+    unpacked_weights,
+    upsampled,
+)
+
+
+def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
+    rng = np.random.default_rng(3)
+    transfer = rng.random((count, count)) ** 4
+    transfer /= transfer.sum(axis=1, keepdims=True)  # a closed room
+    other = np.arange(count)
+    if paired:
+        other[:10] = np.roll(np.arange(10), 5)
+    direct = rng.random((groups, count, 3)).astype(np.float32) ** 8
+    return Patches(rng.integers(0, 4, count), other, direct, transfer.astype(np.float32))
+
+
+def albedos(seed: int = 5) -> Albedos:
+    rng = np.random.default_rng(seed)
+    return Albedos(rng.random((4, 3)) * 0.6, rng.random((4, 3)) * 0.3)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_the_solution_is_that_of_the_linear_system(paired: bool) -> None:
+    room, colours = patches(paired=paired), albedos()
+    found = solved(room, colours, tolerance=1e-6)
+    assert found.converged
+    for group in range(2):
+        for channel in range(3):
+            across = np.eye(30)[room.paired] * (room.paired != np.arange(30))[:, None]
+            sends = np.diag(colours.reflected[room.material, channel])
+            sends = sends + np.diag(colours.transmitted[room.material, channel]) @ across
+            light = np.linalg.solve(np.eye(30) - room.transfer @ sends, room.direct[group, :, channel])
+            assert np.allclose(found.exitance[group, :, channel], sends @ light, rtol=2e-4)
+
+
+def test_dark_corners_are_solved_as_well_as_bright_ones() -> None:
+    """A chain of patches, each of which sees the next one alone: the last light has gone through all of them."""
+    count = 12
+    chain = np.zeros((count, count), np.float32)
+    chain[np.arange(1, count), np.arange(count - 1)] = 0.01
+    direct = np.zeros((1, count, 3), np.float32)
+    direct[0, 0] = 1
+    room = Patches(np.zeros(count, int), np.arange(count), direct, chain)
+    found = solved(room, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
+    assert np.allclose(found.exitance[0, :, 0], 0.5 * 0.005 ** np.arange(count), rtol=1e-3)
+
+
+def test_a_solution_that_does_not_come_to_an_end_says_so() -> None:
+    room = Patches(np.zeros(2, int), np.arange(2), np.ones((1, 2, 3), np.float32), np.full((2, 2), 0.5, np.float32))
+    assert not solved(room, Albedos(np.full((1, 3), 1.0), np.zeros((1, 3)))).converged
+
+
+def test_weights_keep_their_relative_size_in_a_byte() -> None:
+    weights = np.geomspace(0.1, MOST_WEIGHT, 200)
+    assert np.allclose(unpacked_weights(packed_weights(weights)), weights, rtol=0.06)
+    assert unpacked_weights(packed_weights(np.array([0.0, 99.0]))).tolist() == [0.0, MOST_WEIGHT]
+
+
+def test_gathering_sums_what_rays_end_on() -> None:
+    rng = np.random.default_rng(0)
+    patch, weight = rng.integers(0, 700, (5, 64)), rng.random((5, 64)) * 2
+    weight[:, ::7] = 0
+    light = rng.random((2, 700, 3)).astype(np.float32)
+    expected = (weight[None, ..., None] * light[:, patch]).mean(axis=2)
+    assert np.allclose(gathered(packed_rays(patch, weight), light), expected, rtol=0.01)
+
+
+def test_texels_show_means_of_their_points() -> None:
+    near = Neighbours(np.array([[0, 1], [2, 2]], np.uint32), np.array([[255, 85], [10, 0]], np.uint8))
+    light = np.arange(9, dtype=np.float32).reshape(1, 3, 3)
+    assert np.allclose(upsampled(light, near), [[[0.75, 1.75, 2.75], [6, 7, 8]]])
+
+
+def test_ratios_of_no_light_are_one_and_bounded() -> None:
+    reference = np.array([[[1.0, 2.0, 0.0]]])
+    assert ratios(np.array([[[0.5, 4e9, 5.0]]]), reference).tolist() == [[[0.5, 64.0, 1.0]]]
+
+
+def test_direct_light_stays_and_so_does_what_was_not_gathered() -> None:
+    one = np.ones((1, 1, 3), np.float32)
+    assert np.allclose(answered(one, 3 * one, one, 2 * one), 2.0), "half of the indirect light"
+    found = answered(0 * one, 10 * one, 0 * one, 2 * one)
+    assert np.allclose(found, 10 - 2 * MOST_EXCESS), "the excess over what was gathered"
+
+
+def small_answer() -> Answer:
+    rng, room = np.random.default_rng(1), patches(1)
+    rays = packed_rays(rng.integers(0, 30, (9, 32)), np.ones((9, 32)))
+    near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))
+    baked = (1 + rng.random((1, 50, 3))).astype(np.float32)
+    return Answer(room, rays, near, 0.3 * baked, baked, albedos())
+
+
+def test_before_the_first_edit_nothing_changes() -> None:
+    answer = small_answer()
+    reference = answer.reference()
+    same = Albedos(answer.albedos.reflected.copy(), answer.albedos.transmitted.copy())
+    assert answer.irradiance(same, reference) is answer.baked
+    nearly = answered(answer.direct, answer.baked, reference, reference)
+    assert np.allclose(nearly, answer.baked, rtol=1e-6)
+
+
+def test_darker_walls_make_all_of_the_room_darker() -> None:
+    answer = small_answer()
+    half = Albedos(answer.albedos.reflected / 2, answer.albedos.transmitted / 2)
+    found = answer.irradiance(half, answer.reference())
+    assert (found < answer.baked).all() and (found >= answer.direct - 1e-6).all()

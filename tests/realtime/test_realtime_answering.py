@@ -1,0 +1,70 @@
+"""Light maps and probes of edited materials: nothing changes before an edit, and both ways to show an edit agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera
+from lambent.materials.recolour import recoloured
+from lambent.realtime.answering import AnsweredLight, answered_scene
+from lambent.realtime.baked import read_baked
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import light_layers
+from lambent.store.answer import read_answer
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, room_with_step
+
+VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return bake(room_with_step(), tmp_path_factory.mktemp("step") / "s", quality=TINY)
+
+
+def test_before_an_edit_arrays_are_those_of_the_store(store: Store) -> None:
+    baked, stored = read_baked(store), read_answer(store)
+    same = answered_scene(baked, stored, {})
+    assert same.irradiance is baked.irradiance
+    assert all(same.probes[name].radiance is probe.radiance for name, probe in baked.probes.items())
+    light = AnsweredLight(baked, stored)
+    assert not light.probe_change("ball", light.as_baked).any() and light.likely_error(light.as_baked) == 0
+
+
+def test_red_walls_redden_the_room_and_its_reflection(store: Store) -> None:
+    baked, stored = read_baked(store), read_answer(store)
+    edited = recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)})
+    found = answered_scene(baked, stored, edited)
+    assert baked.irradiance is not None and found.irradiance is not None
+    before, after = (one.reshape(-1, 3).mean(axis=0) for one in (baked.irradiance, found.irradiance))
+    assert after[0] == pytest.approx(before[0], rel=0.05) and after[1] < 0.8 * before[1]
+    probe = np.median(found.probes["ball"].radiance.astype(float), axis=(0, 1, 2))  # most of it walls, little lamp
+    assert probe[1] < 0.5 * probe[0] and probe.min() >= 0
+    assert 0 < AnsweredLight(baked, stored).likely_error(AnsweredLight(baked, stored).lit(edited)) < 0.3
+
+
+def test_light_that_is_changed_on_the_gpu_is_that_of_a_new_scene(store: Store) -> None:
+    baked, stored = read_baked(store), read_answer(store)
+    edited = recoloured(baked.record.materials, {"grey": (0.5, 0.05, 0.05)})
+    renderer, answer = _renderer(store), AnsweredLight(baked, stored)
+    first = renderer.image(VIEW)
+    light, version = answer.lit(edited), renderer.light_version
+    renderer.resources.relight(light_layers(*answer.maps(light)))
+    change = answer.probe_change("ball", light)
+    levels = renderer.resources.light_of("ball").levels(change)
+    assert levels, "the first picture has made cube maps"
+    renderer.resources.relight_probe("ball", levels, change, answer.probe_irradiance("ball", change))
+    assert renderer.light_version > version
+    shown = FrameState(VIEW.camera, 96, 64, materials=edited)
+    relit, anew = renderer.image(shown), Renderer(renderer.device, answered_scene(baked, stored, edited)).image(shown)
+    assert np.abs(relit - first).max() > 0.05 * first.mean()
+    assert np.allclose(relit, anew, rtol=0.02, atol=0.01 * anew.mean())
+
+
+def _renderer(store: Store) -> Renderer:
+    from lambent.realtime.device import open_device
+
+    return Renderer(open_device(), store)
