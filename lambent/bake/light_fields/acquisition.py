@@ -79,7 +79,7 @@ def radiance_maps(
         beneath = np.zeros(len(light), bool) if normals is None else _beneath(normals[mine], texels).ravel()
         single = mirrors & beneath
         for which, parts in ((single, 1), ((mirrors | parted) & ~single, strata)):
-            index = np.flatnonzero(which).astype(np.uint32)
+            index = np.flatnonzero(which)
             light[index] = _parted(around, some, texels, index, solid[index], parts, onward, seed + mine.start)
         found[mine] = light.reshape(shape)
     return found
@@ -118,7 +118,7 @@ def _parted(
         part, texel = thread % samples, thread // samples
         u = mi.Point2f(0.5) if strata == 1 else independent(own, width).next_2d()
         within = mi.Point2f((part % strata + u.x) / strata, (part // strata + u.y) / strata)
-        ray = _rays(points, dr.gather(mi.UInt32, mi.UInt32(index[mine]), texel), texels, within)
+        ray = _rays(points, dr.gather(mi.UInt32, mi.UInt32(index[mine].astype(np.uint32)), texel), texels, within)
         light, met = _radiance(around, ray, onward, own ^ 0xFFFFFFFF)
         alike = met == dr.gather(mi.Bool, mi.Bool(solid[mine]), texel)
         count = dr.gather(mi.UInt32, dr.block_sum(dr.select(alike, mi.UInt32(1), 0), samples), texel)

@@ -88,7 +88,7 @@ def _blocks_needed(total: Floats, squares: Floats, samples: int, noise: float) -
     """
     mean = luminance(total / samples)
     variance = np.maximum(luminance(squares / samples) - mean**2, 0) / samples
-    allowed = noise * np.maximum(mean, max(np.median(mean), 1e-12))  # also of black texels and infinite noise
+    allowed = noise * np.maximum(mean, max(float(np.median(mean)), 1e-12))  # also of black texels and infinite noise
     return np.asarray(np.clip(variance / allowed**2, 1, MOST))
 
 
