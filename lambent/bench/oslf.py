@@ -1,7 +1,7 @@
 """Errors of reflections from an offset surface light field, by method; how often a cache of its maps misses.
 
 Every look-up of `core.light_field_lookup` against traced mirror rays of the teapot's pixels in the pavilion, as in
-tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.7. Look-ups count texels of radiance and distance.
+tables 6.1 and 6.2 of thesis R; caches as in its tables 6.3 to 6.6. Look-ups count texels of radiance and distance.
 Pixels are means over the same places for all: what is compared is the look-up, not its sampling.
 """
 
@@ -31,6 +31,7 @@ NAME = "oslf"
 POWERS = (1, 4, 8, 16)
 ONE, FOUR = March(candidates=1), March()
 PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # distances, that at infinity among them, and the radiance
+SCATTERED = 100  # samples of a BRDF
 TILE = 16  # pixels: a renderer's order of shading
 PREVIEW = Quality("preview")
 SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
@@ -86,7 +87,7 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
                 rows.append({**said, "method": method.name, "look_ups": method.look_ups, **found})
             rows += surface_rows(field, place, view, said)
             if number == 0:
-                rows += list(caches(place, view, effort.capacities))
+                rows += list(caches(field, place, view, effort.capacities))
     progress(1, 1, "done")
     return {"rows": rows, "summary": summary(rows)}
 
@@ -140,24 +141,33 @@ def raw_mb(field: LightField) -> float:
     return round((field.radiance.nbytes + field.inverse_distance.nbytes + field.sample_map.nbytes) / 1e6, 1)
 
 
-def caches(place: Place, view: LightFieldView, capacities: tuple[int, ...]) -> Iterator[dict[str, Any]]:
-    """Misses in percent of the maps read, for the surface (the first point) and reflections (all four), pixel by pixel.
+def caches(
+    field: LightField, place: Place, view: LightFieldView, capacities: tuple[int, ...]
+) -> Iterator[dict[str, Any]]:
+    """Misses in percent of what is read, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
 
-    Whole maps are read, in rows of pixels as the thesis's renderer shades, or in tiles.
+    Maps are read whole: for the surface (the first point), for reflections (all four), and for SCATTERED samples of a
+    BRDF, with the points in the outer loop: each map is read so often in a row. Of the sample map, rows are read.
     """
     pixel, first = np.unique(view.shown.pixel, return_index=True)
     row, column = np.divmod(pixel, view.size[0])
     across = column // TILE
     orders = {"rows": np.lexsort((column, row)), "tiles": np.lexsort((column, row, across, row // TILE))}
-    for what, count in (("surface", 1), ("reflection", 4)):
+    sample_rows = np.floor(view.shown.uv2[first, 1:] * field.grid[0]).astype(np.int64)
+    points = place.points[first]
+    for what, of, again in (
+        ("sample map", sample_rows, 1), ("surface", points[:, :1], 1), ("reflection", points, 1),
+        ("BRDF", points, SCATTERED),
+    ):  # fmt: skip
         for order, pixels in orders.items():
-            wanted = place.points[first[pixels], :count]
+            wanted = of[pixels]
             reads = wanted[wanted != NO_POINT].tolist()
             for capacity in capacities:
                 missed = {name: misses(reads, make(capacity)) for name, make in POLICIES.items()}
                 missed["known future"] = fewest_misses(reads, capacity)
-                percent = {name: round(100 * found / len(reads), 3) for name, found in missed.items()}
-                yield {"reads": what, "order": order, "maps": capacity, "count": len(reads), "miss_percent": percent}
+                percent = {name: round(100 * found / (len(reads) * again), 4) for name, found in missed.items()}
+                count = len(reads) * again
+                yield {"reads": what, "order": order, "maps": capacity, "count": count, "miss_percent": percent}
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

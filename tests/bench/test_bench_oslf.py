@@ -73,7 +73,7 @@ def test_the_whole_run_is_json(mi: Any) -> None:
     report = oslf.run(replace(oslf.QUICK, size=(48, 48), paths=1))
     assert json.loads(json.dumps(report))["summary"]["64 x 32"]["march 4"][0] < 1
     cached = [row for row in report["rows"] if "reads" in row]
-    assert len(cached) == 2 * 2 * len(oslf.QUICK.capacities)
+    assert len(cached) == 4 * 2 * len(oslf.QUICK.capacities)  # of four kinds of reads, in two orders
     for row in cached:
         missed = row["miss_percent"]
         assert 0 < missed["known future"] <= min(missed["least-recent"], missed["adaptive"]) <= 100
