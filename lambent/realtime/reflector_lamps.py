@@ -60,10 +60,11 @@ class ReflectorLamps:
         data = np.zeros((), PLANE_LAMPS_DTYPE)
         data["to_column"], data["to_row"] = self._frame.texel_rows()
         data["size"][:2] = self._frame.size
+        shown = {item.record.name: item.emission for item in self._resources.objects}  # as a mix of light has them
         for k, (lamp, spread, radius_m) in enumerate(zip(self.lamps, self._spreads, self._radii_m, strict=True)):
             data["centres"][k] = *lamp.centre, inside_share(view, lamp.middles)
             data["spreads"][3 * k : 3 * k + 3, :3] = spread
-            data["emissions"][k] = *np.array(lamp.emission) / self._resources.scene.unit, radius_m
+            data["emissions"][k] = *np.array(shown[lamp.object]) / self._resources.scene.unit, radius_m
             data["channels"][k, self.objects.index(lamp.object)] = 1
         return data
 

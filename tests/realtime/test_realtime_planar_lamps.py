@@ -215,6 +215,18 @@ def test_light_is_kept_and_nothing_pops_from_mirror_to_matte(device: Any) -> Non
     assert (change < 3 * usual + 0.002).all(), (change / usual).max()
 
 
+def test_a_lamp_is_as_bright_as_its_object(device: Any) -> None:
+    """Switched off and on again, as a mix of light does."""
+    renderer = Renderer(device, dark({"globe": TWO["globe"]}, ROUND))
+    state = replace(floor_state(ROUND, 64, 48), n=3, integrator="lamps")
+    (item,) = (one for one in renderer.resources.objects if one.record.name == "globe")
+    lit, emission = renderer.image(state), item.emission
+    item.relight(item.light, (0.0, 0.0, 0.0))
+    assert lit.max() > 0 and not renderer.image(replace(state, mixed=1)).any()
+    item.relight(item.light, emission)
+    np.testing.assert_array_equal(renderer.image(replace(state, mixed=2)), lit)
+
+
 def test_mirrors_and_other_integrators_keep_the_buffer(device: Any) -> None:
     """A lobe narrower than all lamps is drawn as without them, to the bit."""
     narrow = Lobe(mx=0.004, my=0.004, r0=0.9)
