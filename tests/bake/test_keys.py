@@ -31,6 +31,7 @@ from lambent.scenes.scene import (
     DirectionalLight,
     ImageEnvironment,
     LightFieldWish,
+    LightGroup,
     MaterialTextures,
     Mesh,
     PointLight,
@@ -45,10 +46,11 @@ from lambent.store.store import Store
 from tests.bake.small_scenes import GREY, MIRROR, TINY
 
 NOTHING: tuple[str, ...] = ()
-PROBES = ("probe/",)
+PROBES = ("probe/", "answer/probe/")
 FIELDS = ("light_field/",)
-BAKED = ("light_map/", *PROBES, *FIELDS)
-OF_BALL = ("probe/ball/",)
+ANSWER = ("answer/",)
+BAKED = ("light_map/", *PROBES, *FIELDS, *ANSWER)
+OF_BALL = ("probe/ball/", "answer/probe/ball/")
 CAMERA = Camera("front", (0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
 SEEN = View(CAMERA, 8, 6)
 REFLECTED = tuple(SEEN.name("relighting", part) for part in ("spans", "points", "values", "errors", "lamps"))
@@ -131,13 +133,14 @@ IMAGE: Answers = {
 }
 CONSTANT: Answers = {"radiance": ((1.0, 1.0, 1.1), SKY)}
 POINT: Answers = {
+    "name": ("renamed", NOTHING),  # of its light group
     "position": ((0.0, 2.0, 0.1), LIGHTS),
     "intensity": ((5.0, 5.0, 4.0), LIGHTS),
     "direction": ((0.0, -0.6, 0.8), LIGHTS),
     "inner_deg": (5.0, LIGHTS),
     "outer_deg": (40.0, LIGHTS),
 }
-DIRECTIONAL: Answers = {"direction": ((0.0, -0.6, 0.8), LIGHTS), "irradiance": ((1.0, 1.0, 0.5), LIGHTS)}
+DIRECTIONAL: Answers = {"name": ("renamed", NOTHING), "direction": ((0.0, -0.6, 0.8), LIGHTS), "irradiance": ((1.0, 1.0, 0.5), LIGHTS)}
 WISH: Answers = {
     "points": (9, FIELDS),
     "texels": (12, FIELDS),
@@ -160,6 +163,7 @@ SCENE: Answers = {
     "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
     "light_fields": ({"ball": LightFieldWish(), "other ball": LightFieldWish()}, FIELDS),
     "reflector_rules": ((ReflectorRule("floor", use=False),), NOTHING),
+    "light_groups": ((LightGroup("all", ("sky",)),), NOTHING),  # sorted by them where a bake is asked to
     "parts": ({"ball": "balls"}, NOTHING),  # given by the names of the objects, which are in the key
     "borders": ({"ball": ((1.0, 0.0, 0.0, 0.0),)}, NOTHING),  # given by the faces of the parts, likewise
     "origin": ("builtin:room", NOTHING),
@@ -240,6 +244,14 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
         "onward": (3, FIELDS),
         "levels": (1, FIELDS),
         "blocks": (False, FIELDS),
+    },
+    "answer": {
+        "patches": (8, ANSWER),
+        "patch_rays": (64, ANSWER),
+        "gather_rays": (32, ANSWER),
+        "block": (2, ANSWER),
+        "direct_samples": (16, ANSWER),
+        "importance_rays": (8, ANSWER),
     },
 }
 

@@ -129,7 +129,7 @@ class AnsweringLight:
             found = {}
             for number, name in enumerate(answer.probes):
                 progress(number, len(answer.probes), "probes")
-                found[name] = baked[name] if light.is_baked else _answered(baked[name], answer, name, light)
+                found[name] = baked[name] if light.is_baked else answered(baked[name], answer, name, light)
             return found
 
         def show(found: dict[str, ProbeLight]) -> None:
@@ -144,7 +144,7 @@ class AnsweringLight:
         self._shown.possible, self._shown.said = False, f"the light of other surfaces stays as baked: {error}"
 
 
-def _answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
+def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
     """A probe's light in other light of the surfaces that it sees."""
     change = answer.probe_change(name, light)
     radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
