@@ -196,7 +196,7 @@ def test_a_lamp_has_one_highlight_at_any_n(device: Any, lobe: Lobe) -> None:
 
 
 def test_light_is_kept_and_nothing_pops_from_mirror_to_matte(device: Any) -> None:
-    """Steps of 4 % in roughness: the floor's light is that of the converged picture, and changes by little."""
+    """Steps of 4 % in roughness: the floor's light changes by little."""
     lamps = {"globe": (TWO["globe"][0], (1.0, 1.0, 1.0))}
     renderer = Renderer(device, dark(lamps, ROUND))
     camera = Camera(name="c", position=(-0.25, 1.4, 3.4), target=(-0.25, 0.0, 1.6), fov_y_deg=40.0)
