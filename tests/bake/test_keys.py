@@ -140,7 +140,11 @@ POINT: Answers = {
     "inner_deg": (5.0, LIGHTS),
     "outer_deg": (40.0, LIGHTS),
 }
-DIRECTIONAL: Answers = {"name": ("renamed", NOTHING), "direction": ((0.0, -0.6, 0.8), LIGHTS), "irradiance": ((1.0, 1.0, 0.5), LIGHTS)}
+DIRECTIONAL: Answers = {
+    "name": ("renamed", NOTHING),
+    "direction": ((0.0, -0.6, 0.8), LIGHTS),
+    "irradiance": ((1.0, 1.0, 0.5), LIGHTS),
+}
 WISH: Answers = {
     "points": (9, FIELDS),
     "texels": (12, FIELDS),
