@@ -173,12 +173,11 @@ def _traced(context: BakeContext) -> Traced:
     wishes = context.scene.light_fields.items()
     bare = [name for name, wish in wishes if settings_of(context, wish).levels == 1]
     depth = MIRROR_DEPTH if levels == 1 else levels
-    if not _cached(context):
-        maps_seen, depth = None, context.settings("light_map").max_depth
-    else:
-        maps_seen = maps
+    cached = _cached(context)
+    maps_seen = maps if cached else None
+    depth = depth if cached else context.settings("light_map").max_depth
     seen = around(traced, maps_seen, depth, bare if levels == 1 else ())
-    kind = {"diffuse": not _cached(context)}
+    kind = {"diffuse": not cached}
     placing = Placing(traced.builder(**kind), traced.whole(**kind))
     unit = unit_of(context.scene, maps[0], traced.sun)
     return Traced(placing, seen, unit, seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare))

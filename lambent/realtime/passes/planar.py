@@ -63,9 +63,9 @@ class PlanarPass:
         if not how.clears_views:
             return None
         found = context.resources.reflector_lamps.of(view)
-        mine = [draw for draw in context.draws if view.has(draw.item.record)]
         if found is None:
             return None
+        mine = [draw for draw in context.draws if view.has(draw.item.record)]
         served = any(
             found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
             for draw in mine
