@@ -39,6 +39,18 @@ def is_bent(corners: list[Any], middles: list[Any]) -> Any:
     return bent
 
 
+def is_beyond(corners: list[Any], middles: list[Any], part: tuple[Any, Any]) -> Any:
+    """Whether a piece meets no node of a part [begin, end) of the first curve, nor does what it would be cut into.
+
+    An angle that is quadratic leaves the range of its corners and middles by less than an edge's bend; twice the
+    largest bend and the width of a hat function are left as margin.
+    """
+    at, between = [w[0] for w in corners], [w[0] for w in middles]
+    bends = [dr.abs(m - (x + y) / 2) for m, x, y in zip(between, at, (*at[1:], at[0]), strict=True)]
+    margin = 2 * _most(bends) + 2
+    return (_most([*at, *between]) + margin < mi.Float(part[0])) | (_least([*at, *between]) - margin > mi.Float(part[1]))
+
+
 def is_broad(corners: list[Any]) -> Any:
     """Whether a piece spans so many directions that its quotient may differ much from that at its middle."""
     a, b, c = corners

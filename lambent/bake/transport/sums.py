@@ -18,6 +18,7 @@ from lambent.bake.transport.pieces import (
     corners_of,
     first_part,
     is_bent,
+    is_beyond,
     is_broad,
     is_last_part,
     next_part,
@@ -52,13 +53,15 @@ def accumulate(  # type: ignore[no-untyped-def]
             while busy:
                 ends, between = corners_of(a, b, c, where)
                 corners, middles = [[steps(w) for w in _lifted(few, up, wide)] for few in (ends, between)]
-                if _is_coarse(where, ends, is_bent(corners, middles), wide):
+                elsewhere = is_beyond(corners, middles, part)
+                if ~elsewhere & _is_coarse(where, ends, is_bent(corners, middles), wide):
                     where = first_part(where)
                 else:
                     light = power * share_of(where)
                     if dr.hint(wide is not None, mode="scalar"):
                         light = _of_piece(light, power, wide, ends, between, up, local, height, quotient)
-                    _add_piece(row, part, light, angles(corners, middles, counts), counts)
+                    if ~elsewhere:
+                        _add_piece(row, part, light, angles(corners, middles, counts), counts)
                     while (where[0] > 0) & is_last_part(where):
                         where = parent(where)
                     busy = where[0] > 0
