@@ -86,7 +86,7 @@ def test_a_kind_of_artefact_is_one_file(toy: str, tmp_path: Path) -> None:
     corners = store.read("geometry/positions")[store.read("geometry/faces")]
     np.testing.assert_array_equal(store.read("areas/m2"), triangle_areas(corners).astype(np.float32))
     assert "unwrapping" not in steps and begun + steps.count(toy) == -(-whole // 100) + 2, "each chunk is baked once"
-    assert store.documents["timings"].keys() == {"geometry", "parts", "reflectors", toy}
+    assert store.documents["timings"].keys() == {"geometry", "parts", "backs", "reflectors", toy}
     assert store.documents["last_run"].keys() == {toy, "other"}
     baked()
     assert toy not in steps, "it is up to date"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lambent.bake.backs import backs_of
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import group_inputs, key_of, light_inputs, material_inputs
@@ -79,6 +80,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
             effort.append(["nor the sun through panes", REVISION_OF_PANES])
+    if backs := sorted(backs_of(context.store)):
+        effort.append(["seen from behind", backs])
     grouped = sorts_light(context.methods)
     if grouped:
         effort.append(["by group", REVISION_OF_GROUPS, group_inputs(context.scene)])
