@@ -193,7 +193,7 @@ def test_slices_of_a_frame_are_the_frame(device: Any) -> None:
 
 @pytest.mark.parametrize("radius_deg", [0.27, 5.0])
 def test_no_sun_gets_into_a_closed_room_of_sheets(device: Any, radius_deg: float) -> None:
-    """Walls and ceiling without thickness touch along their joints; a plane outside makes the map's texels 2 cm wide."""
+    """Walls and ceiling without thickness touch; a plane outside makes the texels of the map 2 cm wide."""
     room = placed(turned_inwards(box((4, 3, 4))), (0, 1.5, 0))
     inside = Camera(name="inside", position=(-1.5, 1.2, 1.2), target=(1.0, 1.6, -1.0), fov_y_deg=80.0)
     baked = scene({"room": room, "plane": placed(floor(200.0), (0, -0.01, 0))}, radius_deg, cameras=(inside,))
