@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import cast
 
 from lambent.bake import artefacts
+from lambent.bake.backs import find_backs
 from lambent.bake.bounces import Bounces
 from lambent.bake.context import Artefact, BakeContext
 from lambent.bake.cuts import cut_for_viewers
@@ -132,6 +133,7 @@ def bake(
         undivided = scene
         if "geometry" in order:
             scene = cut_for_viewers(divided(scene, store, progress, timed), store, timed)
+            find_backs(scene, store, timed, anew=not resume)
         store.set_document("changes", changes)
         write_source(store, scene)
         if not resume:

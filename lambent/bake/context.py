@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
+from lambent.bake.backs import backs_of, crossed_by_light
 from lambent.bake.bounces import Bounces
 from lambent.bake.engine import engine
 from lambent.bake.quality import Quality
@@ -30,7 +31,6 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import ImageEnvironment, Scene
-from lambent.store.contract import is_two_sided
 from lambent.store.store import Array, Store, Writer
 
 if TYPE_CHECKING:
@@ -125,10 +125,9 @@ class BakeContext:
 
     @cached_property
     def two_sided(self) -> list[bool]:
-        """By object, whether light crosses it, so that its back has a light map too."""
-        masked = {name for name, textures in self.scene.textures.items() if textures.opacity}
-        materials = self.scene.materials
-        return [is_two_sided(materials[o.material], masked=o.material in masked) for o in self.scene.objects]
+        """By object, whether light crosses it or viewers see it from behind, so that its back has a light map too."""
+        backs = backs_of(self.store)
+        return [one or o.name in backs for o, one in zip(self.scene.objects, crossed_by_light(self.scene), strict=True)]
 
     @cached_property
     def traced(self) -> TracedScene:

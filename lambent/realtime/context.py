@@ -36,6 +36,7 @@ class FrameContext:
     draws: list[Draw]
     views: list[PlanarView]  # of the planar reflectors that have a buffer in this frame
     counts: Counter[str]  # draw_calls
+    waits: bool = True  # for what is drawn once and takes seconds
     shown: Any = None  # view that the display image is drawn into, if any
     radiance: Any = None  # texture of linear light, as the passes before left it
     prior: Any = None  # texture of the last frame of few samples, where it is shown beside a progressive mean

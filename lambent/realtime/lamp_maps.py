@@ -7,7 +7,7 @@ in a mirrored view could tell: it does not hold what its eye does not see.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +26,7 @@ LONGER_PX = 512  # texels along the longer side of a map
 STEP_PX = 64  # rows that can be read back are multiples of this
 COARSE = 24  # places along each side where the shape of a lamp is summed over all its triangles
 THIN = 1e-3  # of a lamp's height: what is nearer to its places than that blocks nothing
-AT_ONCE = 16  # places of a lamp: layers of a texture
+AT_ONCE = 4  # places of a lamp: layers of a texture, which are drawn before the first is read
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +107,18 @@ def lamp_map(
     layouts: Layouts, resources: Any, lamps: list[PlaneLamp], frame: PlaneFrame, plane: Floats, clearance_m: float
 ) -> NDArray[np.float16]:
     """(rows, columns, MOST) sr of each lamp that the middles of texels see; `resources` is a `SceneResources`."""
+    steps = lamp_map_steps(layouts, resources, lamps, frame, plane, clearance_m)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return np.asarray(end.value)
+
+
+def lamp_map_steps(
+    layouts: Layouts, resources: Any, lamps: list[PlaneLamp], frame: PlaneFrame, plane: Floats, clearance_m: float
+) -> Generator[None, None, NDArray[np.float16]]:
+    """The same as a generator that yields after every place of a lamp and returns the map."""
     width, height = frame.size
     edge = np.linspace(0, 1, COARSE)
     coarse = frame.points(*(side.ravel() for side in np.meshgrid(edge * width, edge * height)))
@@ -119,6 +131,7 @@ def lamp_map(
             weight = frame.received(places[at], areas[at])
             whole += weight
             seen += weight * (layer == 0)
+            yield
         found[..., channel] = seen / whole * _solid_angles(lamp, frame, coarse)
     return found
 

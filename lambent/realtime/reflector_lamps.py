@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
@@ -10,10 +11,11 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe
-from lambent.realtime.lamp_maps import PlaneFrame, lamp_map
+from lambent.realtime.lamp_maps import PlaneFrame, lamp_map_steps
 from lambent.realtime.layouts import Layouts
 from lambent.realtime.planar_view import PlanarView
 from lambent.realtime.plane_lamps import PlaneLamp, lamps_of, over
+from lambent.realtime.slices import SLICE_S
 from lambent.realtime.structs import PLANE_LAMPS_DTYPE, Record
 
 OUT_FROM = 0.5  # of a lamp's radius, as in shaders/planar_lamps.wgsl: narrower lobes leave all lamps in the buffer
@@ -22,7 +24,7 @@ GRID = 5  # places along each side of a reflector from which lamps' shapes are s
 
 
 class ReflectorLamps:
-    """The lamps over one side of one reflector, at least one. The map is drawn when it is first asked for."""
+    """The lamps over one side of one reflector, at least one. `draw_map` draws their map, which takes seconds."""
 
     def __init__(
         self, layouts: Layouts, resources: Any, lamps: list[PlaneLamp], outline: Floats, plane: Floats,
@@ -30,8 +32,10 @@ class ReflectorLamps:
     ) -> None:  # fmt: skip
         self.lamps = lamps
         self.objects = list(dict.fromkeys(lamp.object for lamp in lamps))  # in the order of their channels
-        self._layouts, self._resources, self._plane, self._clearance_m = layouts, resources, plane, clearance_m
+        self._layouts, self._resources = layouts, resources
         self._frame = PlaneFrame.about(outline, plane[:3])
+        self.map: Any = None  # buffer of the solid angles that the reflector's points see
+        self._drawing = lamp_map_steps(layouts, resources, lamps, self._frame, plane, clearance_m)
         width, height = self._frame.size
         columns, rows = np.meshgrid(np.linspace(0, width, GRID), np.linspace(0, height, GRID))
         grid = self._frame.points(columns, rows).reshape(-1, 3)
@@ -49,11 +53,15 @@ class ReflectorLamps:
         """Whether a mirrored view would show any of them, if nothing hid it."""
         return any(inside_share(view, lamp.middles) > 0 for lamp in self.lamps)
 
-    @cached_property
-    def map(self) -> Any:
-        """Buffer of the solid angles that the reflector's points see."""
-        given = self._layouts, self._resources, self.lamps, self._frame, self._plane, self._clearance_m
-        return self._layouts.buffer("STORAGE", lamp_map(*given))
+    def draw_map(self, seconds: float = float("inf")) -> bool:
+        """Go on with the map for about so long; whether it is there."""
+        end = time.perf_counter() + seconds
+        while self.map is None and time.perf_counter() < end:
+            try:
+                next(self._drawing)
+            except StopIteration as done:
+                self.map = self._layouts.buffer("STORAGE", done.value)
+        return self.map is not None
 
     def record(self, view: PlanarView) -> Record:
         """Record of PLANE_LAMPS_DTYPE for one frame."""
@@ -76,6 +84,7 @@ class LampsOverReflectors:
         """`resources` is a `SceneResources`."""
         self._layouts, self._resources = layouts, resources
         self._found: dict[Any, ReflectorLamps | None] = {}
+        self._under_way: list[ReflectorLamps] = []  # whose maps frames asked for that did not wait
 
     @cached_property
     def _lamps(self) -> list[PlaneLamp]:
@@ -92,6 +101,20 @@ class LampsOverReflectors:
             given = self._layouts, self._resources, lamps, outline, plane, clearance_m
             self._found[key] = ReflectorLamps(*given) if lamps else None
         return self._found[key]
+
+    def have_map(self, lamps: ReflectorLamps, *, waits: bool) -> bool:
+        """Whether the map of lamps is there, which a frame may wait for; else `follow` draws it beside frames."""
+        if lamps.draw_map(float("inf") if waits else 0.0):
+            return True
+        if lamps not in self._under_way:
+            self._under_way.append(lamps)
+        return False
+
+    def follow(self) -> None:
+        """Go on with the maps that frames asked for, for a slice; the picture changes when one is there."""
+        if self._under_way and self._under_way[0].draw_map(SLICE_S):
+            self._under_way.pop(0)
+            self._resources.light_version += 1
 
 
 def inside_share(view: PlanarView, places: Floats) -> float:

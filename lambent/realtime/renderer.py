@@ -60,9 +60,9 @@ class Renderer:
     ----------
     scene : BakedScene
     waits : bool
-        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out, and for its
-        mix of light groups. Else the nearest maps stand in, the mix comes part by part, and `streaming.version` and
-        `mixer.version` grow when more is ready.
+        Whether a frame waits for the maps of light fields that it needs, where a budget leaves some out, for its mix
+        of light groups, and for the maps of lamps over planar reflectors. Else the nearest maps stand in, the mix comes
+        part by part, lamps stay in mirrored views, and `light_version` and `mixer.version` grow when more is ready.
     missing : tuple of str
         What the store lacks, in plain words.
     """
@@ -257,6 +257,7 @@ class Renderer:
             factor *= self._unit(state)
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         self.mixer.follow(state.light, waits=self.waits)
+        self.resources.reflector_lamps.follow()
         views = self._planar_views(state, data)
         draws = draws_of(state, self.resources, {part.object for view in views for part in view.reflector.parts})
         self.streaming.follow(draws, data, self._clusters, waits=self.waits)
@@ -265,7 +266,7 @@ class Renderer:
         target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float")
         context = FrameContext(
             slicing, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
-            draws, views, Counter(), shown=target_view,
+            draws, views, Counter(), waits=self.waits, shown=target_view,
         )  # fmt: skip
         if state.accumulate is not None and state.prior > 0 and self._few and self._few.size == target.radiance.size:
             context.prior = self._few

@@ -86,7 +86,7 @@ def test_a_kind_of_artefact_is_one_file(toy: str, tmp_path: Path) -> None:
     corners = store.read("geometry/positions")[store.read("geometry/faces")]
     np.testing.assert_array_equal(store.read("areas/m2"), triangle_areas(corners).astype(np.float32))
     assert "unwrapping" not in steps and begun + steps.count(toy) == -(-whole // 100) + 2, "each chunk is baked once"
-    assert store.documents["timings"].keys() == {"geometry", "parts", "reflectors", toy}
+    assert store.documents["timings"].keys() == {"geometry", "parts", "backs", "reflectors", toy}
     assert store.documents["last_run"].keys() == {toy, "other"}
     baked()
     assert toy not in steps, "it is up to date"
@@ -160,12 +160,12 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 fa0bd107 1e05c44f 53d12a44 47219bc7",
-    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 6d3ab68c 1cfc0b4c c51c9818 ba97d072",
-    ("normal", "paths", "cached"): "6161cd22 5095e777 86bc134f 58315108 1436755b 3ade5257",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 75e36e29 996ea6cb fd8b8b94 533a4482",
-    ("final", "paths", "cached"): "a38141f9 cef94a2c 07328f74 7d81318f 619c9768 e786bab2",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c f1574cdd d033539b 86db8d0c 7eade4bd",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 fa0bd107 831189ee e5a0bf40 0aea342e",
+    ("preview", "photons", "traced"): "1dec1a65 4cae5d96 6d3ab68c f87f05fa 33cff346 255bf322",
+    ("normal", "paths", "cached"): "6161cd22 5095e777 86bc134f b8c5136c 234455f9 a8ba7855",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 75e36e29 4cdea744 d0ef8ca6 9d871238",
+    ("final", "paths", "cached"): "a38141f9 cef94a2c 07328f74 34c98c48 ec9dbab8 b672cc17",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c f1574cdd e0ee89a5 2d93bb65 ca4df0bf",
 }
 
 

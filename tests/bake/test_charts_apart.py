@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.bake.surfaces.atlas import Atlas, merged, unwrap
-from lambent.bake.surfaces.layers import APART, BEHIND, in_first_layer, layers_of
+from lambent.bake.surfaces.layers import APART, BEHIND, in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry import cross_2d, triangle_areas
 from lambent.scenes import load_scene
@@ -133,3 +133,21 @@ def test_parts_of_a_chart_that_pass_within_a_texel_are_parted() -> None:
     assert in_first_layer(flat, world).all()
     world[2:, :, 2] = 2.5 * APART
     assert list(in_first_layer(flat, world)) == [True, True, False, False]
+
+
+def test_charts_that_lie_flat_are_one_layer() -> None:
+    """Turned and sheared parts of planes are flat; a fold, a stretch and a spiral are not."""
+    rng = np.random.default_rng(0)
+    flat, _ = square(0.0)
+    turned = np.concatenate([flat, np.zeros((2, 3, 1))], axis=2) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    bent = np.concatenate([flat, np.zeros((2, 3, 1))], axis=2)
+    bent[1, 2, 2] = 9.0
+    corners = np.concatenate([flat, flat, flat + 9, 0 * flat])
+    places = np.concatenate([turned, bent, 2 * turned, turned])
+    assert lie_flat(corners, places, np.repeat(np.arange(4), 2)).tolist() == [True, False, False, False]
+    assert lie_flat(corners[:0], places[:0], np.zeros(0, int)).size == 0
+    for _ in range(50):
+        corners = 6 * rng.random((5, 3, 2))
+        places = corners @ rng.normal(scale=0.6, size=(2, 3)) + rng.normal(scale=0.3, size=(5, 3, 3))
+        if lie_flat(corners, places, np.zeros(5, int))[0]:
+            assert in_first_layer(corners, places).all()

@@ -23,7 +23,9 @@ def two_charts(height: float) -> tuple[Texels, np.ndarray, np.ndarray]:
     position = np.stack([column + 0.5 - GAP * second, height * second, row + 0.5], axis=-1)
     points = np.repeat(position[:, None], POINTS, axis=1).astype(np.float32)
     up = np.broadcast_to(np.float32([0, 1, 0]), points.shape)
-    texels = Texels(width, N, index, np.zeros((len(index), POINTS), int), points, up, up, np.ones(len(index)))
+    texels = Texels(
+        width, N, index, np.zeros((len(index), POINTS), int), points, up, up, np.ones(len(index)), np.ones(len(index))
+    )
     return texels, labels, np.where(labels == 1, 1.2, 1.0)[..., None] * np.ones(3)
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from lambent.bake.bake import bake
 from lambent.bake.light.sampling import cleaned
 from lambent.bake.light.stitching import Cuts, cuts_of, stitched
 from lambent.bake.surfaces.atlas import merged, unwrap
 from lambent.bake.surfaces.texels import BEYOND, chart_labels, texels_of
 from lambent.core.directions import normalize
-from lambent.scenes.geometry import box, placed, sphere
-from lambent.scenes.scene import Mesh, Scene, SceneObject
-from tests.bake.small_scenes import GREY
+from lambent.scenes.geometry import box, grid, merge, patch, placed, sphere
+from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject
+from tests.bake.small_scenes import BLACK, GREY, TINY
 
 Floats = NDArray[np.floating]
 TOWARDS = normalize(np.array([0.3, 0.8, 0.5]))
@@ -66,8 +69,58 @@ def test_hidden_parts_darkness_and_nothing_stay() -> None:
     image = np.random.default_rng(0).random((8, 8, 3))
     cuts = Cuts(np.array([[0.2, 0.3]]), np.array([[0.8, 0.7]]))
     hidden = np.full((8, 8), BEYOND)
-    assert np.array_equal(stitched(image, cuts, hidden), image)
-    assert not stitched(0 * image, cuts, np.zeros((8, 8), int)).any()
-    moved = stitched(image, cuts, np.zeros((8, 8), int))
+    full = np.ones((8, 8))
+    assert np.array_equal(stitched(image, cuts, hidden, full), image)
+    assert not stitched(0 * image, cuts, np.zeros((8, 8), int), full).any()
+    moved = stitched(image, cuts, np.zeros((8, 8), int), full)
     assert steps(moved, cuts)[0] < 0.1 * steps(image, cuts)[0] and np.isfinite(moved).all()
     assert (moved != image).any(axis=-1).sum() <= 8
+
+
+def test_a_sliver_follows_the_broad_side() -> None:
+    """A cut between columns 2 and 5, the second one a sliver of a tenth of the light."""
+    image, along = np.ones((8, 8, 3)), (np.arange(1, 7) + 0.5) / 8
+    image[:, 4:] = 0.1
+    area_m2 = np.ones((8, 8))
+    area_m2[:, 4:] = 0.1
+    cuts = Cuts(*(np.stack([np.full(6, (column + 0.5) / 8), along], axis=1) for column in (2, 5)))
+    moved = stitched(image, cuts, np.zeros((8, 8), int), area_m2)
+    assert np.array_equal(moved[:, :4], image[:, :4])
+    assert steps(moved, cuts).max() < 0.02
+    both = stitched(image, cuts, np.zeros((8, 8), int), np.ones((8, 8)))
+    assert np.allclose(both[1:7, 2], both[1:7, 5], rtol=0.05) and 0.4 < both[1:7, 2].mean() < 0.7
+
+
+def tile(half: float, chamfer: float, deep: float) -> Mesh:
+    """Top at y = 0 and, as surfaces of their own, chamfers whose normals lean from sideways to upwards, and sides."""
+    top = half - chamfer
+    rings = np.array([
+        [(-r, y, -r), (-r, y, r), (r, y, r), (r, y, -r), (-r, y, -r)]
+        for r, y in ((half, -deep), (half, -chamfer), (top, 0.0))
+    ])  # fmt: skip
+    parts = [patch((-top, 0, top), (2 * top, 0, 0), (0, 0, -2 * top))]
+    for k, out in enumerate([(-1, 0, 0), (0, 0, 1), (1, 0, 0), (0, 0, -1)]):
+        for low, upper in ((0, out), (1, (0, 1, 0))):
+            corners = rings[[low, low + 1]][:, [k, k + 1]]
+            normals = np.array([[out, out], [upper, upper]], float)
+            parts.append(grid(corners, normals, (1, 0, 0), corners[..., [0, 2]]))
+    return merge(parts)
+
+
+def test_chamfers_leave_no_lines_on_a_floor_of_tiles(tmp_path: Path) -> None:
+    """Tops of tiles under an even sky receive pi, also where they meet the chamfers, whose light is less."""
+    one, step = tile(0.3, 0.003, 0.01), 0.602
+    tiles = merge(placed(one, (step * x, 0, step * z)) for x in (-1, 0, 1) for z in (-1, 0, 1))
+    even = ConstantEnvironment((1.0, 1.0, 1.0))
+    scene = Scene("tiles", (SceneObject("tiles", tiles, "black"),), {"black": BLACK}, environment=even)
+    store = bake(scene, tmp_path / "s", quality=TINY.changed("tiles", geometry={"texels": 100}), only=("light_map",))
+    image = store.read("light_map/irradiance")[..., 1].astype(float)
+    geometry = {name: store.read(f"geometry/{name}") for name in ("positions", "uv2", "faces")}
+    corners = geometry["positions"][geometry["faces"]]
+    top = (corners[..., 1] > -1e-6).all(axis=1)
+    weights = np.random.default_rng(0).dirichlet((0.3, 0.3, 0.3), (top.sum(), 400))  # mostly near the borders
+    uv = np.einsum("fnc,fcx->fnx", weights, geometry["uv2"][geometry["faces"][top]].astype(float)).reshape(-1, 2)
+    height, width = image.shape
+    found = map_coordinates(image, [uv[:, 1] * height - 0.5, uv[:, 0] * width - 0.5], order=1, mode="nearest")
+    assert found.mean() == pytest.approx(np.pi, rel=0.01)
+    assert np.quantile(found, 0.01) > 0.95 * np.pi

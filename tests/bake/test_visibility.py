@@ -92,7 +92,7 @@ def test_hidden_points_and_texels_by_hand() -> None:
     """A row of five texels of one chart: seen, half seen, and three hidden; then another chart."""
     index = np.arange(6)
     vectors = np.zeros((6, POINTS, 3), np.float32)
-    texels = Texels(6, 1, index, np.zeros((6, POINTS), int), vectors, vectors, vectors, np.ones(6))
+    texels = Texels(6, 1, index, np.zeros((6, POINTS), int), vectors, vectors, vectors, np.ones(6), np.ones(6))
     in_view = np.zeros((6, POINTS), bool)
     in_view[0], in_view[1, :2] = True, True
     labels = np.array([[3, 3, 3, 3, 3, 4]])

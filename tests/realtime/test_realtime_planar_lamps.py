@@ -236,6 +236,22 @@ def test_mirrors_and_other_integrators_keep_the_buffer(device: Any) -> None:
     np.testing.assert_array_equal(lamps, rings)
 
 
+def test_frames_that_do_not_wait_show_lamps_as_mirrored_until_their_map_is_there(device: Any) -> None:
+    state = replace(floor_state(ROUND, 64, 48), n=3, integrator="lamps")
+    scene = planar_scene.planar_scene(ROUND, TWO)
+    expected = Renderer(device, scene).image(state)
+    renderer = Renderer(device, scene)
+    renderer.waits, before = False, renderer.light_version
+    first = renderer.image(state)
+    np.testing.assert_array_equal(first, renderer.image(replace(state, integrator="rings")))
+    assert np.abs(first - expected).max() > 0.01 * expected.max()
+    for _ in range(1000):
+        renderer.image(replace(state, integrator="diffuse"))  # frames of any kind go on with the map
+        if renderer.light_version > before:
+            break
+    np.testing.assert_array_equal(renderer.image(state), expected)
+
+
 def test_a_lamp_that_leaves_the_view_does_not_go_out(device: Any) -> None:
     """While a camera turns, the mirrored view loses the lamp: the floor's light goes on in small steps."""
     renderer = Renderer(device, planar_scene.planar_scene(ROUND, TWO))

@@ -24,6 +24,7 @@ from lambent.realtime.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, merge, patch, placed
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import SunRecord
+from tests.bake.small_scenes import turned_inwards
 from tests.realtime import test_realtime_planar as planar
 
 Floats = NDArray[np.floating]
@@ -188,6 +189,16 @@ def test_slices_of_a_frame_are_the_frame(device: Any) -> None:
     for _ in renderer.slices(state, target.create_view(), Cut()):
         pass
     assert np.array_equal(whole, pixels(device, target))
+
+
+@pytest.mark.parametrize("radius_deg", [0.27, 5.0])
+def test_no_sun_gets_into_a_closed_room_of_sheets(device: Any, radius_deg: float) -> None:
+    """Walls and ceiling without thickness touch; a plane outside makes the texels of the map 2 cm wide."""
+    room = placed(turned_inwards(box((4, 3, 4))), (0, 1.5, 0))
+    inside = Camera(name="inside", position=(-1.5, 1.2, 1.2), target=(1.0, 1.6, -1.0), fov_y_deg=80.0)
+    baked = scene({"room": room, "plane": placed(floor(200.0), (0, -0.01, 0))}, radius_deg, cameras=(inside,))
+    found = drawn(device, baked, inside, frames=4)
+    assert found.mean() < 2.2e-4, "a third of the light that got in where depths alone were compared"
 
 
 def test_first_square_holds_what_cameras_see_and_the_last_all() -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lambent.bake.backs import backs_of
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import group_inputs, key_of, light_inputs, material_inputs
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 KIND = "light_map"
 NEEDS = ("geometry",)
-REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 4, 2, 3, 1, 1
+REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 4, 3, 3, 1, 1
 IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
@@ -79,6 +80,8 @@ def keys(context: BakeContext) -> dict[str, str]:
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
             effort.append(["nor the sun through panes", REVISION_OF_PANES])
+    if backs := sorted(backs_of(context.store)):
+        effort.append(["seen from behind", backs])
     grouped = sorts_light(context.methods)
     if grouped:
         effort.append(["by group", REVISION_OF_GROUPS, group_inputs(context.scene)])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lambent.bake.artefacts.light_map import finished_groups, finished_maps
+from lambent.bake.backs import backs_of
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import geometry_inputs, key_of
@@ -50,12 +51,14 @@ SETTINGS = {
 def keys(context: BakeContext) -> dict[str, str]:
     how: Settings = context.settings(KIND)
     scene, light = context.scene, context.keys("light_map")["light_map/irradiance"]
-    owners, found = _owners(context), dict[str, str]()
+    owners, backs, found = _owners(context), backs_of(context.store), dict[str, str]()
     for name in _objects(context):
         if name in owners:
             continue
         inputs = [light, name, scene.probe_centres.get(name), how.texels, how.samples, how.noise, context.seed]
         inputs += sharing(owners, name)
+        if name in backs:
+            inputs.append("from both sides")
         if not _cached(context):
             inputs += [context.methods["probes"], context.settings("light_map").max_depth]
         key = key_of(KIND, REVISION, *inputs)
@@ -74,7 +77,8 @@ def bake(context: BakeContext) -> None:
 
     front, back = finished_maps(context)
     front_or_none = front if _cached(context) else None
-    probes = ProbeSet(context.traced, front_or_none, back, context.settings("light_map").max_depth)
+    depth = context.settings("light_map").max_depth
+    probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store))
     if sorts_light(context.methods):
         probes.sort_light(*(finished_groups(context) if _cached(context) else (None, None)))
     for i, name in enumerate(missing):

@@ -62,9 +62,15 @@ class LightMapCache:
         return [by_front * front + by_back * back for front, back in irradiance]
 
     def irradiance(self, si: Any, active: Any) -> Any:
-        """Irradiance on the normal's side."""
-        found = mi.Color3f(self._front.eval(light_map_uv(si, active), active))
-        return found if self._sun is None else found + dr.maximum(self._sun(si, active), 0)
+        """Irradiance on the side that a ray came from; on backs without a light map, that of the front."""
+        outside, uv2 = mi.Frame3f.cos_theta(si.wi) > 0, light_map_uv(si, active)
+        found = mi.Color3f(self._front.eval(uv2, active))
+        if self._back is not None:
+            found = dr.select(outside, found, mi.Color3f(self._back.eval(uv2, active)))
+        if self._sun is None:
+            return found
+        sun = self._sun(si, active)
+        return found + dr.maximum(dr.select(outside, sun, -sun), 0)
 
 
 class GroupedCache(LightMapCache):

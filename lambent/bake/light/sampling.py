@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lambent.bake.light.denoise import denoise_charts, fill
 from lambent.bake.light.seams import blend_seams
 from lambent.bake.light.stitching import Cuts, stitched
-from lambent.bake.surfaces.texels import POINTS, Sides, Texels
+from lambent.bake.surfaces.texels import POINTS, Sides, Texels, area_of_texels
 from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.rays import block_sums, independent, vectors
 from lambent.bake.tracing.sun import Sun
@@ -193,4 +193,5 @@ def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: C
     together = np.concatenate(list(clean), axis=-1)
     together = fill(blend_seams(together, known, texels, labels), known, labels)
     each = np.split(together, len(clean), axis=-1)
-    return np.array([np.minimum(stitched(one, cuts, labels), HALF_MAX) for one in each], np.float16)
+    area_m2 = area_of_texels(texels)
+    return np.array([np.minimum(stitched(one, cuts, labels, area_m2), HALF_MAX) for one in each], np.float16)

@@ -2,7 +2,8 @@
 
 Charts are denoised apart, so two that share an edge in the scene disagree a little along it. Near the border of its
 chart a texel therefore takes the mean of the texels around it in the scene, whichever chart they belong to: both sides
-of a seam take the same mean.
+of a seam take the same mean. Texels count by the area of the surface in them: the chamfer of a tile has as many texels
+along an edge as the tile, and hardly any area.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ def blend_seams(irradiance: Floats, known: Flags, texels: Texels, labels: Indice
     along = np.linalg.norm(offset, axis=2) / (RADIUS * spacing)
     facing = np.maximum(np.einsum("nkx,nx->nk", normal[others], normal[near]), 0) ** 8
     weight = np.exp(-(lift**2 + along**2) / 2) * facing
+    weight *= np.minimum(texels.area_m2[lit][others] / spacing**2, 1)
     beyond = labels.reshape(-1)[index] >= BEYOND
     weight *= beyond[others] == beyond[near][:, None]
     weight[:, 0] += 1e-6  # the texel itself, or its twin at the same place: never a sum of nothing

@@ -3,6 +3,9 @@
 Charts of a few texels differ along their cuts whatever their texels hold, because each side interpolates its own. The
 texels that look-ups along cuts touch are moved as little as possible, relative to their light, so that the look-ups
 agree: linear least squares (Iwanicki 2013, "Lighting technology of The Last of Us", has the same for light maps).
+
+Where one side is a sliver, such as the chamfer of a tile, it follows the broad side: a chamfer's texels hold the dark
+of the joint as well, which the broad side would show as a line.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.surfaces.texels import BEYOND
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.colour import luminance
 
 SMOOTH = 0.98  # least cosine between the normals on both sides of a cut: elsewhere light may change abruptly
@@ -22,6 +25,7 @@ PER_TEXEL = 2.0  # samples along a cut
 MOST_SAMPLES = 64  # of one edge
 AGREE = 30.0  # weight of a sample's agreement, over that of a texel's own light
 FILLED = 0.05  # weight of the light of texels that hold none of their own
+NARROW = 0.25  # a side whose texels hold less than this share of the other side's area follows that
 DARK = 0.01  # of the mean light: differences below it do not matter
 STEPS, RESIDUE = 100, 1e-3  # of conjugate gradients
 
@@ -57,35 +61,62 @@ def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
     return Cuts(*(side[edge, 0] * (1 - t) + side[edge, 1] * t for side in (a, b)))
 
 
-def stitched(irradiance: Floats, cuts: Cuts, labels: Indices) -> Floats:
-    """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay."""
-    from scipy.sparse import csr_matrix, diags
-    from scipy.sparse.linalg import LinearOperator, cg
+def stitched(irradiance: Floats, cuts: Cuts, labels: Indices, area_m2: Floats) -> Floats:
+    """(H, W, 3) light map whose look-ups agree along cuts; parts of charts that no viewer sees (BEYOND) stay.
 
+    `area_m2` (H, W) is the surface in each texel. Sides alike meet half-way; then slivers follow the sides beside them,
+    which stay.
+    """
     height, width = irradiance.shape[:2]
     here, there = (_footprint(uv, width, height) for uv in (cuts.here, cuts.there))
     texel = np.concatenate([here[0], there[0]], axis=1)
     share = np.concatenate([here[1], -there[1]], axis=1)
     keep = ~((labels.reshape(-1)[texel] >= BEYOND) & (share != 0)).any(axis=1)
-    touched, number = np.unique(texel[keep], return_inverse=True)
+    on_surface = np.abs(share) * area_m2.reshape(-1)[texel]
+    sides = np.stack([on_surface[:, :4].sum(axis=1), on_surface[:, 4:].sum(axis=1)], axis=1)
+    narrow = sides < NARROW * sides[:, ::-1]
+    like, unlike = keep & ~narrow.any(axis=1), keep & narrow.any(axis=1)
+    own = np.where(labels.reshape(-1) >= 0, 1.0, FILLED)
+    met = _close(irradiance, texel[like], share[like], own, np.ones(own.shape, bool))
+    of_sliver, counts = np.repeat(narrow[unlike], 4, axis=1), share[unlike] != 0
+    moving = np.zeros(own.shape, bool)
+    moving[texel[unlike][of_sliver & counts]] = True
+    moving[texel[unlike][~of_sliver & counts]] = False
+    return _close(met, texel[keep], share[keep], np.full(own.shape, FILLED), moving)
+
+
+def _close(irradiance: Floats, texel: NDArray[Any], share: Floats, own: Floats, moving: Flags) -> Floats:
+    """The light map (H, W, 3) with its sums of `share` times `texel`, both (n, 8), brought to 0 by `moving` texels.
+
+    `own` (H W,) is the weight of a texel's own light, `moving` (H W,) whether it may change.
+    """
+    from scipy.sparse import csr_matrix, diags
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    in_use = (moving[texel] & (share != 0)).any(axis=1)
+    touched, number = np.unique(texel[in_use], return_inverse=True)
     if not len(touched):
         return irradiance
+    number, share = number.reshape(-1, texel.shape[1]), share[in_use]
     values = irradiance.reshape(-1, 3)[touched].astype(float)
-    light = luminance(values)
-    relative = 1 / np.maximum(light, DARK * max(float(luminance(irradiance).mean()), 1e-12)) ** 2
-    own = np.where(labels.reshape(-1)[touched] >= 0, 1.0, FILLED) * relative
-    number = number.reshape(-1, texel.shape[1])
-    weight = np.sqrt(AGREE * relative[number].min(axis=1))[:, None] * share[keep]
+    least = DARK * max(float(luminance(irradiance).mean()), 1e-12)
+    relative = 1 / np.maximum(luminance(values), least) ** 2
+    of_row = relative[number].min(axis=1)
+    np.minimum.at(relative, number, of_row[:, None])  # darkness beside light is no reason to stay dark
+    weight = np.sqrt(AGREE * of_row)[:, None] * share
     rows = np.arange(0, weight.size + 1, weight.shape[1])
     apart = csr_matrix((weight.ravel(), number.ravel(), rows), shape=(len(weight), len(touched)))
-    system = (apart.T @ apart + diags(own)).tocsr()
+    free = moving[touched]
+    hold = (own[touched] * relative)[free]
+    by_free, by_fixed = apart[:, free], apart[:, ~free]
+    system = (by_free.T @ by_free + diags(hold)).tocsr()
+    aim = hold[:, None] * values[free] - by_free.T @ (by_fixed @ values[~free])
     scale = 1 / system.diagonal()
     first = LinearOperator(system.shape, matvec=lambda v: scale * v)
     found = irradiance.reshape(-1, 3).astype(float)
     for channel in range(3):
-        found[touched, channel], _ = cg(
-            system, own * values[:, channel], x0=values[:, channel], rtol=RESIDUE, maxiter=STEPS, M=first
-        )
+        start = values[free, channel]
+        found[touched[free], channel], _ = cg(system, aim[:, channel], x0=start, rtol=RESIDUE, maxiter=STEPS, M=first)
     return np.asarray(np.maximum(found, 0).reshape(irradiance.shape), irradiance.dtype)
 
 

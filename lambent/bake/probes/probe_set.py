@@ -40,16 +40,17 @@ class ProbeSet:
     """Bakes the probes of a scene from its light map (H, W, 3), or, where that is None, path traced whole.
 
     With the light map a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
-    paths have at most `max_depth` vertices.
+    paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind, too.
     """
 
     def __init__(
-        self, traced: TracedScene, irradiance: Floats | None, irradiance_back: Floats | None, max_depth: int
-    ) -> None:
+        self, traced: TracedScene, irradiance: Floats | None, irradiance_back: Floats | None, max_depth: int,
+        backs: frozenset[str] = frozenset(),
+    ) -> None:  # fmt: skip
         whole_paths = irradiance is None
         self._traced, self._depth = traced, max_depth if whole_paths else MIRROR_DEPTH
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
-        self._scene = self._builder.scene
+        self._scene, self._backs = self._builder.scene, backs
         self._left_out: tuple[frozenset[str], Any] | None = None
         self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
@@ -79,9 +80,12 @@ class ProbeSet:
         found = []
         for name in names:
             o = self._scene.object(name)
+            points, normals = spread(o.mesh, max(RAYS // len(names), LEAST_POINTS))
+            if name in self._backs:
+                points, normals = np.concatenate([points, points]), np.concatenate([normals, -normals])
             found.append(mirrored(
-                *spread(o.mesh, max(RAYS // len(names), LEAST_POINTS)), self._traced.places,
-                self._scene.materials[o.material], self._whole, self._cache, MIRROR_DEPTH, own, seed,
+                points, normals, self._traced.places, self._scene.materials[o.material], self._whole, self._cache,
+                MIRROR_DEPTH, own, seed,
             ))  # fmt: skip
         return together([rays for rays in found if rays is not None])
 

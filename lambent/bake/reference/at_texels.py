@@ -69,6 +69,6 @@ def _in_a_line(sides: Sides, chosen: Indices) -> Sides:
     t = sides.texels
     line = Texels(
         len(chosen), 1, np.arange(len(chosen)), t.face[chosen], t.positions[chosen], t.normals[chosen], t.flat[chosen],
-        t.spacing[chosen],
+        t.spacing[chosen], t.area_m2[chosen],
     )  # fmt: skip
     return Sides(line, sides.sign, sides.valid[chosen])

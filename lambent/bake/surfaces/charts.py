@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xatlas
 
-from lambent.bake.surfaces.layers import in_first_layer, layers_of
+from lambent.bake.surfaces.layers import in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.errors import UserError
@@ -138,12 +138,15 @@ def _charts(mesh: Mesh, piece: Piece, found: tuple[Floats, Indices, Floats], siz
     corners = _in_texels(world, uv[indices].astype(float), label)
     lost = ~np.isfinite(corners).all(axis=(1, 2)) | _is_stretched(world, corners)
     charts = []
+    flat = np.zeros(label.max(initial=-1) + 1, bool)
+    sound = lie_flat(corners[~lost], world[~lost], label[~lost])
+    flat[: len(sound)] = sound
     for mine in _groups(np.where(lost, -1, label)):
         if not lost[mine[0]]:
             kept = mine
-            while not (inside := in_first_layer(corners[kept], world[kept])).all():  # a smaller chart lies anew
-                kept = kept[inside]
-            lost[np.setdiff1d(mine, kept)] = True
+            while not flat[label[mine[0]]] and not (inside := in_first_layer(corners[kept], world[kept])).all():
+                kept = kept[inside]  # a smaller chart lies anew
+            lost[np.setdiff1d(mine, kept, assume_unique=True) if len(kept) < len(mine) else []] = True
             charts.append(Chart(piece.owner, piece.faces[kept], corners[kept], first + indices[kept]))
     charts.append(Chart(piece.owner, piece.faces[lost], np.zeros((lost.sum(), 0, 2)), first + indices[lost]))
     return charts

@@ -14,6 +14,7 @@ from lambent.bake.surfaces.packing import meets, near, snapped
 from lambent.core.arrays import Flags, Floats, Indices
 
 BEHIND = 2.0  # texels between the depths of projected faces that share a texel, at most
+REACH = 3.6  # texels between places from which look-ups touch one texel, at most, and some more
 APART = 4.0  # texels between places of one surface that share a texel, along each axis, at most
 
 
@@ -32,6 +33,36 @@ def layers_of(corners: Floats, depths: Floats) -> list[Indices]:
         found.append(np.sort(left[first]))
         left = left[~first]
     return found
+
+
+def lie_flat(corners: Floats, places: Floats, chart: Indices) -> Flags:
+    """Which charts (max + 1,) are one layer for certain, because an affine map takes them to the surface.
+
+    `chart` (F,) is the number of the chart of each face; `corners` (F, 3, 2) and `places` (F, 3, 3) are in texels.
+    Look-ups touch a texel from within REACH of each other, so places of one texel are no further apart than |A| REACH
+    and twice what the map A, found by least squares, leaves.
+    """
+    if not len(chart):
+        return np.zeros(0, bool)
+    of, count = np.repeat(chart, 3), int(chart.max()) + 1
+    number = np.maximum(np.bincount(of, minlength=count), 1)
+
+    def summed(values: Floats) -> Floats:
+        return np.stack([np.bincount(of, column, minlength=count) for column in values.T], axis=1)
+
+    uv, xyz = corners.reshape(-1, 2), places.reshape(-1, 3)
+    uv = uv - (summed(uv) / number[:, None])[of]
+    xyz = xyz - (summed(xyz) / number[:, None])[of]
+    uu, uv_, vv = summed(np.stack([uv[:, 0] ** 2, uv[:, 0] * uv[:, 1], uv[:, 1] ** 2], axis=1)).T
+    ux, vx = summed(uv[:, :1] * xyz), summed(uv[:, 1:] * xyz)
+    determinant = uu * vv - uv_**2
+    found = determinant > 1e-9 * uu * vv
+    scale = np.where(found, 1 / np.where(found, determinant, 1), 0)[:, None]
+    along_u, along_v = (ux * vv[:, None] - vx * uv_[:, None]) * scale, (vx * uu[:, None] - ux * uv_[:, None]) * scale
+    remainder = np.zeros(count)
+    np.maximum.at(remainder, of, np.abs(uv[:, :1] * along_u[of] + uv[:, 1:] * along_v[of] - xyz).max(axis=1))
+    longest = np.sqrt(along_u**2 + along_v**2).max(axis=1)
+    return np.asarray(found & (longest * REACH + 2 * remainder <= APART))
 
 
 def in_first_layer(corners: Floats, places: Floats, most: float = APART) -> Flags:

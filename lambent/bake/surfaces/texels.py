@@ -34,7 +34,8 @@ class Texels:
 
     index (K,) int64 is row * width + column; face (K, POINTS) int64 counts through the merged geometry; positions,
     normals (shading) and flat (of the triangle) are (K, POINTS, 3) float32. Each point stands for an equal share of
-    area. spacing (K,) is the size of a texel in metres.
+    area. spacing (K,) is the size of a texel in metres, area_m2 (K,) the surface in the texel's square: less than
+    spacing^2 at borders of charts, 0 where a texel is only touched by look-ups.
     """
 
     width: int
@@ -45,6 +46,7 @@ class Texels:
     normals: Floats
     flat: Floats
     spacing: Floats
+    area_m2: Floats
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,15 @@ def texels_of(geometry: dict[str, Floats], width: int, height: int) -> Texels:
     order = np.argsort(index)
     index, face, weights = index[order], face[order], weights[order]
     weights = _off_borders(geometry, face, weights)
-    return Texels(width, height, index, face, *_surface(geometry, face, weights), np.sqrt(size[face[:, 0]]))
+    area_m2 = np.bincount(own.cell, own.area, minlength=width * height)[index]
+    return Texels(width, height, index, face, *_surface(geometry, face, weights), np.sqrt(size[face[:, 0]]), area_m2)
+
+
+def area_of_texels(texels: Texels) -> Floats:
+    """(H, W) area in m^2 of the surface in each texel's square."""
+    found = np.zeros(texels.width * texels.height)
+    found[texels.index] = texels.area_m2
+    return found.reshape(texels.height, texels.width)
 
 
 def _points(

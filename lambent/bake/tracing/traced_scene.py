@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from lambent.bake.backs import crossed_by_light
 from lambent.bake.light.cache import GroupedCache, LightMapCache
 from lambent.bake.light.stitching import Cuts, cuts_of
 from lambent.bake.sky.sun import FoundSun, is_sun, sun_of
@@ -36,7 +37,7 @@ from lambent.scenes.light_groups import SortedLights, sorted_lights
 class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the geometry of the atlas in one, as in `atlas.merged`.
 
-    `two_sided` is, of each object, whether its back has a light map too.
+    `two_sided` is, of each object, whether its back has a light map too: where light crosses it, or viewers see it.
     """
 
     def __init__(
@@ -44,7 +45,8 @@ class TracedScene:
     ) -> None:
         self.atlas, self.scene, self.merged, self.progress = atlas, atlas.scene, merged, progress
         self.two_sided = two_sided
-        self._two_sided = np.repeat(two_sided, [len(o.mesh.faces) for o in self.scene.objects])
+        counts = [len(o.mesh.faces) for o in self.scene.objects]
+        self._two_sided, self._crossed = np.repeat(two_sided, counts), np.repeat(crossed_by_light(self.scene), counts)
         self._builder: tuple[tuple[bool, bool], SceneBuilder] | None = None
         self._whole: Any = None
         self._sampling: EmitterSampling | None = None
@@ -164,6 +166,8 @@ class TracedScene:
             self.progress(0, 1, "visibility")
             whole = self.whole(**self._at_hand)
             found = self._of_points(sides.valid, sign, lambda p, n: seen(whole, self.places, p, n))
+            if sign < 0:
+                sides = replace(sides, valid=sides.valid & (found | self._crossed[self.texels.face]))
             valid, labels = without_hidden(self.texels, sides.valid, found, self.labels)
             self._views[sign] = replace(sides, valid=valid), labels
         return self._views[sign]

@@ -94,6 +94,21 @@ def texel_sizes(scene: Scene, pieces: list[Piece], texels: int) -> Floats:
     return sizes
 
 
+def seen_from_behind(scene: Scene, least: float) -> list[str]:
+    """Names of opaque objects, sorted, whose backs are more than a share `least` of all that viewers see."""
+    opaque = _opaque(scene)
+    corners = scene.corners[opaque]
+    traced = bare_scene(corners) if len(opaque) else None
+    viewers = viewers_of(scene, traced)
+    if viewers is None:
+        return []
+    ray, face, _ = _met(traced, viewers.eyes, RAYS)
+    behind = (triangle_normals(corners[face]) * ray).sum(axis=1) > 0
+    owner = np.repeat(np.arange(len(scene.objects)), [len(o.mesh.faces) for o in scene.objects])[opaque]
+    counts = np.bincount(owner[face[behind]], minlength=len(scene.objects))
+    return sorted(scene.objects[number].name for number in np.flatnonzero(counts > least * len(face)))
+
+
 def _opaque(scene: Scene) -> Indices:
     """Numbers of all triangles through which nothing is seen."""
     clear = [scene.materials[o.material].transmits or _has_holes(scene, o.material) for o in scene.objects]
@@ -107,12 +122,17 @@ def _has_holes(scene: Scene, material: str) -> bool:
 
 def _seen(traced: Any, eyes: Floats, count: int) -> tuple[Indices, Floats]:
     """Triangles (M,) that so many rays from the eyes meet, and how far away (M,)."""
+    return _met(traced, eyes, count)[1:]
+
+
+def _met(traced: Any, eyes: Floats, count: int) -> tuple[Floats, Indices, Floats]:
+    """Directions (M, 3) of the rays from the eyes, of so many, that meet a triangle, which (M,), how far away (M,)."""
     rng = np.random.default_rng(0)
     z, phi = 1 - 2 * rng.random(count), 2 * np.pi * rng.random(count)
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(phi), z, np.sqrt(1 - z**2) * np.sin(phi)], axis=-1)
     met = traced.ray_intersect_preliminary(rays_from(eyes[np.arange(count) % len(eyes)], directions))
     hit = np.flatnonzero(np.array(met.is_valid()))
-    return np.array(met.prim_index)[hit].astype(np.int64), np.array(met.t)[hit].astype(float)
+    return directions[hit], np.array(met.prim_index)[hit].astype(np.int64), np.array(met.t)[hit].astype(float)
 
 
 def _looked_back(traced: Any, surfaces: list[Floats], eyes: Floats, nearest: float) -> tuple[Floats, Floats]:

@@ -59,7 +59,10 @@ class PlanarPass:
         yield
 
     def _lamps_of(self, context: FrameContext, view: PlanarView, how: Integrator) -> ReflectorLamps | None:
-        """The lamps that leave a mirrored view, None where no lobe of its reflector is wide enough for any."""
+        """The lamps that leave a mirrored view; None where no lobe of its reflector is wide enough for any.
+
+        They stay in the view until their map is there, too, where the frame does not wait for it.
+        """
         if not how.clears_views:
             return None
         found = context.resources.reflector_lamps.of(view)
@@ -70,7 +73,9 @@ class PlanarPass:
             found.serve(draw.material.lobes, context.resources.materials[draw.item.record.material].textures.rough)
             for draw in mine
         )
-        return found if served and found.are_within(view) else None
+        if not (served and found.are_within(view)):
+            return None
+        return found if context.resources.reflector_lamps.have_map(found, waits=context.waits) else None
 
     def _encode_hits(
         self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, lamps: ReflectorLamps | None,

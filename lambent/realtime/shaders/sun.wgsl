@@ -3,7 +3,8 @@
 // (realtime/panes.py) tint what they let through.
 //
 // Penumbras are as wide as the sun's disc makes them behind the mean of the blockers (Fernando 2005, "Percentage-closer
-// soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself.
+// soft shadows"). The plane of the surface is followed from texel to texel, so that it does not shadow itself. Under the
+// edge of a sheet that touches the surface, texels beyond that edge do not count: what they show is farther from the sun.
 
 #include "vertex.wgsl"
 #include "sun_record.wgsl"
@@ -23,7 +24,8 @@ const SUN_SEARCH = 8u;       // taps that look for blockers
 const SUN_TAPS = 16u;        // taps that are compared
 const SUN_LEAST_PX = 1.5;    // texels: least radius of either
 const SUN_STEEPEST = 20.0;   // slope, depth over width, beyond which a surface is not followed
-const SUN_BIAS_PX = 0.7;     // texels, by which what is nearer to the sun casts no shadow
+const SUN_BIAS_PX = 0.3;     // texels, by which what is nearer to the sun casts no shadow
+const SUN_BEYOND_PX = 2.0;   // texels, by which what is farther from the sun is no part of the surface
 const SUN_ROUNDING = 4e-7;   // of the depths' span
 const PANE_LOOKS = 8u;       // taps that look for panes
 const PANE_TAPS = 6u;        // that are averaged
@@ -137,28 +139,40 @@ fn sun_visibility(p_world: vec3f, n_world: vec3f) -> f32 {
 
     var blockers = 0.0;
     var rise_m = 0.0;
+    var nearest_m = 1e30;
+    var touches = false;
     var open = 0.0;
+    var open_here = 0.0;
+    var here = 0.0;
     var spread = radius * inverseSqrt(f32(SUN_SEARCH));
     let first = first_sun_tap();
     var tap = first;
     turns = select(SUN_SEARCH, 0u, is_shaded || is_lit);
     for (var k = 0u; k < turns; k++) {
-        let rise = sun_rise(at, spread * sqrt(tap.order) * tap.across);
+        let reach = select(spread, min(spread, SUN_LEAST_PX), k == 0u); // the first finds what touches the surface
+        let rise = sun_rise(at, reach * sqrt(tap.order) * tap.across);
         let blocks = select(0.0, 1.0, rise > bias_m);
         tap = next_sun_tap(tap);
         if (k < SUN_SEARCH) {
             blockers += blocks;
             rise_m += blocks * rise;
+            nearest_m = select(nearest_m, min(nearest_m, rise), rise > bias_m);
+            touches |= k == 0u && rise > bias_m && px_per_m * rise < SUN_LEAST_PX;
         } else {
+            let on_surface = select(0.0, 1.0, rise > -SUN_BEYOND_PX * at.texel_m);
             open += 1.0 - blocks;
+            open_here += (1.0 - blocks) * on_surface;
+            here += on_surface;
         }
         if (k == SUN_SEARCH - 1u) {
-            spread = max(px_per_m * rise_m / max(blockers, 1.0), SUN_LEAST_PX) * inverseSqrt(f32(SUN_TAPS));
+            let behind_m = select(rise_m / max(blockers, 1.0), 0.0, touches);
+            spread = max(px_per_m * behind_m, SUN_LEAST_PX) * inverseSqrt(f32(SUN_TAPS));
             tap = first;
             turns = select(SUN_SEARCH, SUN_SEARCH + SUN_TAPS, blockers > 0.0);
         }
     }
-    return select(select(open / f32(SUN_TAPS), 1.0, blockers == 0.0), 0.0, is_shaded);
+    let share = select(open / f32(SUN_TAPS), open_here / max(here, 1.0), px_per_m * nearest_m < SUN_LEAST_PX && here > 0.0);
+    return select(select(share, 1.0, blockers == 0.0), 0.0, is_shaded);
 }
 
 // The texel of panes `offset` of them away from a point's own.

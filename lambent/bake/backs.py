@@ -1,0 +1,42 @@
+"""Opaque objects that viewers see from behind, whose backs get a light map too.
+
+A sheet without thickness, such as a shelf, is seen from both sides, and a file may hold a box whose faces look inwards.
+Only points on such backs that viewers see are lit: of a wall's far side nothing is sampled.
+"""
+
+from __future__ import annotations
+
+from lambent.bake.engine import engine
+from lambent.bake.keys import geometry_inputs, key_of
+from lambent.bake.timing import Timed, untimed
+from lambent.scenes.scene import Scene
+from lambent.store.contract import is_two_sided
+from lambent.store.store import Store
+
+BACKS = "backs"  # document: its key, and the objects
+LEAST = 2e-4  # share of all that viewers see, below which a back is left black
+
+
+def find_backs(scene: Scene, store: Store, timed: Timed = untimed, *, anew: bool = False) -> None:
+    """Note in the store whose backs are seen: as before where geometry is the same, whatever cameras, unless `anew`."""
+    clear = sorted(name for name, material in scene.materials.items() if material.transmits)
+    key = key_of(BACKS, 1, clear, [o.material for o in scene.objects], *geometry_inputs(scene))
+    if not anew and store.documents.get(BACKS, {}).get("key") == key:
+        return
+    engine()  # before Mitsuba is imported
+    from lambent.bake.tracing.viewed import seen_from_behind
+
+    with timed(BACKS):
+        found = seen_from_behind(scene, LEAST)
+    store.set_document(BACKS, {"key": key, "objects": found})
+
+
+def backs_of(store: Store) -> frozenset[str]:
+    """Names of the opaque objects whose backs are seen; none before they were looked for."""
+    return frozenset(store.documents.get(BACKS, {}).get("objects", []))
+
+
+def crossed_by_light(scene: Scene) -> list[bool]:
+    """By object, whether light crosses it: all of its back is lit, as far as light gets there."""
+    masked = {name for name, textures in scene.textures.items() if textures.opacity}
+    return [is_two_sided(scene.materials[o.material], masked=o.material in masked) for o in scene.objects]
