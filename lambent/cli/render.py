@@ -131,6 +131,9 @@ def command(
             help="MATERIAL=#rrggbb: another diffuse colour, which the baked light answers; path traces it. Repeatable."
         ),
     ] = None,
+    variant: Annotated[
+        str, typer.Option(help="Variant of the scene: its materials and its mix of the light, which answers.")
+    ] = "",
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -142,6 +145,8 @@ def command(
     Example: lambent render room.store --light sun=off --light lamp=0.5,2700K -o evening.png
 
     Example: lambent render room.store --recolour wall_paint=#31457c -o blue.png
+
+    Example: lambent render house.store --variant walnut -o walnut.png
 
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
@@ -164,7 +169,7 @@ def command(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
-        recolour=parse_recolours(recolour or ()),
+        recolour=parse_recolours(recolour or ()), variant=variant,
     )  # fmt: skip
     settings.check()
     if edit is not None:

@@ -78,6 +78,9 @@ class Settings:
         Of the path tracer, 0 or more: other seeds have independent noise.
     recolour : mapping
         Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
+    variant : str
+        Name of one of the scene's variants: its materials, under those of `recolour`, and its mix of the light, where
+        `light` has none. The light answers it.
     """
 
     width: int = 1280
@@ -99,6 +102,7 @@ class Settings:
     sky_turn_deg: float = 0.0
     light_field_cache: str = LEAST_RECENT
     recolour: Mapping[str, Triple] = field(default_factory=dict)
+    variant: str = ""
 
     @property
     def is_false_coloured(self) -> bool:

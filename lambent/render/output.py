@@ -23,6 +23,7 @@ from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
+from lambent.scenes.variants import variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
@@ -93,8 +94,9 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = _opened(store)
     view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
+    settings = _with_mix_of_variant(settings, opened, note)
     if camera is not None and settings.light is None and (mix := read_views(opened.folder).lights.get(view.name)):
-        settings = _lit(settings, opened, MixTrack.of(mix), note)
+        settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
     write_still(drawn, file, view, progress)
     seconds = time.perf_counter() - began
@@ -164,8 +166,9 @@ def film(
     check_writable(file, (FILM, *SEQUENCES))
     opened, record = _opened(store)
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
+    settings = _with_mix_of_variant(settings, opened, note)
     if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
-        settings = _lit(settings, opened, track, note)
+        settings = _lit(settings, opened, track, "saved with the walk", note)
     if file.suffix.lower() == FILM:
         width, height = even_size(settings.width, settings.height)
         settings = replace(settings, width=width, height=height)
@@ -202,7 +205,7 @@ def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
-    settings = exposed(settings, store)
+    settings = _with_mix_of_variant(exposed(settings, store), store, note)
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.integrator == PATH_TRACER:
@@ -214,14 +217,22 @@ def images(
     return RealTime(store, settings, moving, note)
 
 
-def _lit(settings: Settings, store: Store, light: MixTrack, note: Note) -> Settings:
-    """Settings with the light of a saved view or walk, where the store can show it and the integrator does."""
+def _with_mix_of_variant(settings: Settings, store: Store, note: Note) -> Settings:
+    """Settings with the mix of their variant, if it has one and they have none."""
+    if not settings.variant or settings.light is not None or settings.integrator == PATH_TRACER:
+        return settings
+    mix = variant_named(scene_record(store).variants, settings.variant).light
+    return _lit(settings, store, MixTrack.of(mix), "of the variant", note) if mix.groups else settings
+
+
+def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:
+    """Settings with a mix that was not asked for by name, where the store can show it and the integrator does."""
     if settings.integrator == PATH_TRACER:
-        note("the path tracer traces the light of the scene, not the mix that was saved with the view")
+        note(f"the path tracer traces the light of the scene, not the mix {whose}")
         return settings
     missing = sorted(set(light.groups) - {group.name for group in light_groups(store)})
     if missing:
-        note(f"the mix saved with the view is left out: the store has no light group {', '.join(missing)}")
+        note(f"the mix {whose} is left out: the store has no light group {', '.join(missing)}")
         return settings
     return replace(settings, light=light)
 

@@ -15,6 +15,8 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
 from lambent.scenes.turned_sky import under_turned_sky
+from lambent.scenes.variants import dressed, variant_named
+from lambent.store.contract import scene_record
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
 
@@ -35,6 +37,11 @@ class PathTraced(Images):
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
         baked = scene_of(store, scene)
+        if settings.variant:
+            variant = variant_named(scene_record(store).variants, settings.variant)
+            baked = dressed(baked, variant)
+            if variant.light.groups:
+                note("the path tracer traces the light of the scene, not the mix of the variant")
         self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
         for name in changed_inputs(store, self._scene):
             note(f"{name} has changed since the store was baked")

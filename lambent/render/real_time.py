@@ -17,8 +17,8 @@ from lambent.core.errors import UserError
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
-from lambent.realtime.answering import answered_scene
-from lambent.realtime.baked import read_baked
+from lambent.realtime.answering import answered_scene, dressed_scene
+from lambent.realtime.baked import BakedScene, read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
@@ -29,7 +29,8 @@ from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
-from lambent.store.answer import read_answer
+from lambent.scenes.variants import variant_named
+from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
@@ -61,16 +62,7 @@ class RealTime(Images):
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
-        if settings.recolour:
-            if settings.light is not None and settings.light.groups:
-                raise UserError(
-                    "other colours answer light as baked", field="--recolour", hint="leave out the mix of light"
-                )
-            edited = recoloured(baked.record.materials, settings.recolour)
-            baked = answered_scene(baked, read_answer(store), edited)
-            note("light and probes of other colours are estimated from the bake, not baked again")
-            if baked.light_fields:
-                note("light fields show the colours that they were baked with")
+        baked = _dressed(baked, store, settings, note)
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
@@ -115,3 +107,27 @@ class RealTime(Images):
             width, height = (max(1, round(share * size)) for size in frame.size)
             exposure_ev = self.exposed(self._renderer.image(replace(frame, width=width, height=height)))
         return draw(replace(frame, exposure_ev=exposure_ev))
+
+
+def _dressed(baked: BakedScene, store: Store, settings: Settings, note: Callable[[str], None]) -> BakedScene:
+    """The scene with the materials of the settings' variant, and other colours, and its light as it answers them."""
+    record = baked.record
+    looks = variant_named(record.variants, settings.variant).looks if settings.variant else {}
+    edited = {name: look.material for name, look in looks.items()}
+    edited |= recoloured({**record.materials, **edited}, settings.recolour)
+    if not edited:
+        return baked
+    dressed = dressed_scene(baked, edited, looks)
+    if settings.recolour and settings.light is not None and settings.light.groups:
+        raise UserError("other colours answer light as baked", field="--recolour", hint="leave out the mix of light")
+    if baked.groups is not None:
+        note("light and probes stay as baked: the store has light groups to mix instead")
+        return dressed
+    if not settings.recolour and not has_answer(store):
+        note(f"light and probes stay as baked: {NO_ANSWER}")
+        return dressed
+    lit = answered_scene(baked, read_answer(store), edited)
+    note("light and probes of other materials are estimated from the bake, not baked again")
+    if baked.light_fields:
+        note("light fields show the materials that they were baked with")
+    return replace(dressed, irradiance=lit.irradiance, irradiance_back=lit.irradiance_back, probes=lit.probes)

@@ -35,6 +35,7 @@ from lambent.store.store import Store
 NO_PATCH = 0xFFFF
 NO_SPOT = 0xFFFFFFFF
 DIRECT = ("direct", "direct_back")  # by side
+NO_ANSWER = "the store has no light that answers them (`lambent bake --only answer`)"
 LAST = "answer/shares"  # written last but for probes
 
 

@@ -7,6 +7,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from lambent.materials.document import Material, load_material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
-from lambent.scenes.loaders.contents import DAYLIGHT, Contents
+from lambent.scenes.loaders.contents import DAYLIGHT, Contents, lights_that_stay
 from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
@@ -35,6 +36,7 @@ from lambent.scenes.loaders.scene_toml.schema import (
     SceneDocument,
     known_keys,
 )
+from lambent.scenes.loaders.scene_toml.variants import variants_told
 from lambent.scenes.scene import (
     Environment,
     ImageEnvironment,
@@ -48,6 +50,7 @@ from lambent.scenes.scene import (
     SceneObject,
     bounds_of,
 )
+from lambent.scenes.variants import with_variants
 
 _DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
@@ -74,16 +77,21 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     objects, centres, planes, light_fields = _apply(document, objects, path)
     for o in objects:
         check_material(o.material, materials, path, f"objects.{o.name}.material")
+    sets = [c.variants for c in contents]
+    dressings = {
+        name: _apply(document, assigned(document.assign, worn.objects, materials, path)[0], path)[0]
+        for name, worn in ((name, assembled(contents, name, path)) for name in dict.fromkeys(chain(*sets)))
+    }
     if isinstance(environment, ImageEnvironment):
         files.use(environment.file)
     cameras = tuple(c.camera(c.name) for c in document.cameras) or tuple(v for c in contents for v in c.cameras)
     lights = (*(light for c in contents for light in c.lights), *_lights(document, path, files))
-    notes = (*whole.warnings, *unfit, *missing)
+    notes = (*whole.warnings, *unfit, *missing, *lights_that_stay(objects, dressings))
     if environment is None and not lights and not any(any(o.emission) for o in objects):
         environment, notes = DAYLIGHT, (*notes, "nothing in it emits light: it gets daylight")
     _check_names([c.name for c in cameras], path, "cameras")
     _check_names([p.name for p in document.paths], path, "paths")
-    return Scene(
+    scene = Scene(
         name=document.name,
         objects=objects,
         materials=materials,
@@ -103,6 +111,13 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
         crease_deg=document.crease_angle,
         light_groups=_light_groups(document, objects, lights, path),
     )
+
+    def read_material(name: str, field: str) -> Material:
+        return _material_of_file(name, field, path, files)
+
+    worn = {name: [o.material for o in worn] for name, worn in dressings.items()}
+    told = variants_told(document.variants, worn, scene, read_material, path)
+    return replace(with_variants(scene, told), sources=tuple(files.sources))
 
 
 def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list[str | GeometrySection], list[str]]:
@@ -166,9 +181,7 @@ def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[s
             field = f"materials.{name}.file"
             if not isinstance(table["file"], str):
                 raise UserError("is not a file name", file=path, field=field, got=table["file"])
-            source = files.path(table["file"], path, field)
-            materials[name] = _material_of_file(source, field, path).model_copy(update={"name": name})
-            files.use(source)
+            materials[name] = _material_of_file(table["file"], field, path, files).model_copy(update={"name": name})
         else:
             materials[name] = material_from({"name": name, **table}, where)
     return materials
@@ -183,15 +196,16 @@ def _measured(
     return {name: files.path(file, path, f"measured.{name}") for name, file in document.measured.items()}
 
 
-def _material_of_file(source: Path, field: str, path: Path) -> Material:
+def _material_of_file(name: str, field: str, path: Path, files: SceneFiles) -> Material:
     """The material of a document; a `UserError` if the file is a measurement, which has to be fitted first."""
     from lambent.materials.measured.registry import is_known
 
+    source = files.path(name, path, field)
     if source.is_file() and not _begins_as_json(source) and is_known(source):
         fitted = source.with_suffix(".json").name
         hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
         raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
-    return load_material(source)
+    return load_material(files.use(source))
 
 
 def _begins_as_json(path: Path) -> bool:

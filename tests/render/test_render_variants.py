@@ -1,0 +1,85 @@
+"""Variants of a scene in stills: their materials, textures and light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.core.camera import Camera
+from lambent.core.errors import UserError
+from lambent.core.images import read_image
+from lambent.core.light_mix import GroupMix, LightMix, parse_light
+from lambent.render import Settings, still
+from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
+from lambent.store.contract import scene_record, write_scene_record
+from lambent.store.store import Store
+from tests.bake.small_scenes import TINY, room_with_step
+from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
+
+WITHIN = Camera("in", (1.4, 1.2, -1.4), (-0.8, 0.5, 0.0), fov_y_deg=70)
+SMALL = Settings(48, 32, integrator="rings")
+RED = Look(MATERIALS["plaster"].model_copy(update={"kd": (0.6, 0.0, 0.0)}))
+DIM = LightMix({name: GroupMix(intensity=0.5) for name in ("lamp", "sky", "sun")})
+VARIANTS = (Variant("red", {"plaster": RED}), Variant("dim", light=DIM))
+
+
+def add_variants(folder: Path, variants: tuple[Variant, ...]) -> Path:
+    store = Store.open(folder)
+    write_scene_record(store, scene_record(store).model_copy(update={"variants": variants}))
+    store.close()
+    return folder
+
+
+def image(store: Path, settings: Settings, tmp_path: Path, notes: list[str] | None = None) -> np.ndarray:
+    camera = None if scene_record(Store.open(store)).cameras else WITHIN
+    still(store, tmp_path / "a.exr", camera, settings, note=(notes if notes is not None else []).append)
+    found = read_image(tmp_path / "a.exr")
+    (tmp_path / "a.exr").unlink()
+    return found
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    return add_variants(with_light_groups(write_small_store(tmp_path / "s")), VARIANTS)
+
+
+def test_a_store_without_an_answer_shows_the_material_and_says_the_rest(adapter: None, tmp_path: Path) -> None:
+    bare, notes = add_variants(write_small_store(tmp_path / "s"), VARIANTS), list[str]()
+    red = image(bare, replace(SMALL, variant="red"), tmp_path, notes)
+    assert red[-1, 0, 0] > 0 and red[-1, 0, 1] == 0 and any("stay as baked" in note for note in notes)
+    dim = image(bare, replace(SMALL, variant="dim"), tmp_path, notes)
+    assert np.array_equal(dim, image(bare, SMALL, tmp_path))
+    assert any("the mix of the variant is left out: the store has no light group lamp" in note for note in notes)
+    with pytest.raises(UserError, match=r"--variant: unknown variant; found rd; expected red, dim; did you mean 'red'"):
+        image(bare, replace(SMALL, variant="rd"), tmp_path)
+
+
+def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: Path, tmp_path: Path) -> None:
+    baked = image(store, SMALL, tmp_path)
+    dim = image(store, replace(SMALL, variant="dim"), tmp_path)
+    assert dim == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
+    given = image(store, replace(SMALL, variant="dim", light=parse_light(["sun=on"])), tmp_path)
+    assert given == pytest.approx(baked, rel=6e-3, abs=2e-3)
+
+
+def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, mi: object, tmp_path: Path) -> None:
+    scene = room_with_step()
+    colour = (0.5, 0.05, 0.05)
+    red = Look(scene.materials["grey"].model_copy(update={"kd": colour}))
+    marble = MaterialTextures(diffuse=Texture(np.full((2, 2, 3), 0.5, np.float16)))
+    whole = replace(scene, variants=(Variant("red", {"grey": red}),), textures={"unworn": marble},
+                    materials={**scene.materials, "unworn": scene.materials["grey"]})  # fmt: skip
+    baked = bake(whole, tmp_path / "s", quality=TINY)
+    baked.close()
+    by_variant = image(tmp_path / "s", replace(SMALL, variant="red"), tmp_path)
+    recoloured = image(tmp_path / "s", replace(SMALL, recolour={"grey": colour}), tmp_path)
+    assert np.array_equal(by_variant, recoloured)
+    plain = image(tmp_path / "s", SMALL, tmp_path)
+    assert by_variant.mean(axis=(0, 1))[1] < 0.7 * plain.mean(axis=(0, 1))[1]
+    add_variants(tmp_path / "s", (Variant("marble", {"grey": Look(scene.materials["grey"], "unworn")}),))
+    textured = image(tmp_path / "s", replace(SMALL, variant="marble", show="diffuse"), tmp_path)
+    assert 0.3 < textured.mean() / image(tmp_path / "s", replace(SMALL, show="diffuse"), tmp_path).mean() < 0.9
