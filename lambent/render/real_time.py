@@ -118,11 +118,6 @@ def _dressed(baked: BakedScene, store: Store, settings: Settings, note: Callable
     if not edited:
         return baked
     dressed = dressed_scene(baked, edited, looks)
-    if settings.recolour and settings.light is not None and settings.light.groups:
-        raise UserError("other colours answer light as baked", field="--recolour", hint="leave out the mix of light")
-    if baked.groups is not None:
-        note("light and probes stay as baked: the store has light groups to mix instead")
-        return dressed
     if not settings.recolour and not has_answer(store):
         note(f"light and probes stay as baked: {NO_ANSWER}")
         return dressed
@@ -130,4 +125,4 @@ def _dressed(baked: BakedScene, store: Store, settings: Settings, note: Callable
     note("light and probes of other materials are estimated from the bake, not baked again")
     if baked.light_fields:
         note("light fields show the materials that they were baked with")
-    return replace(dressed, irradiance=lit.irradiance, irradiance_back=lit.irradiance_back, probes=lit.probes)
+    return replace(lit, textures=dressed.textures)

@@ -83,3 +83,12 @@ def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, mi
     add_variants(tmp_path / "s", (Variant("marble", {"grey": Look(scene.materials["grey"], "unworn")}),))
     textured = image(tmp_path / "s", replace(SMALL, variant="marble", show="diffuse"), tmp_path)
     assert 0.3 < textured.mean() / image(tmp_path / "s", replace(SMALL, show="diffuse"), tmp_path).mean() < 0.9
+
+
+def test_a_mix_and_other_colours_go_together(adapter: None, mi: object, tmp_path: Path) -> None:
+    bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene").close()
+    red = {"grey": (0.5, 0.05, 0.05)}
+    whole = image(tmp_path / "s", replace(SMALL, recolour=red), tmp_path)
+    half = image(tmp_path / "s", replace(SMALL, recolour=red, light=parse_light(["lamp=0.5"])), tmp_path)
+    assert half == pytest.approx(whole / 2, rel=6e-3, abs=2e-3)
+    assert whole.mean(axis=(0, 1))[1] < 0.7 * image(tmp_path / "s", SMALL, tmp_path).mean(axis=(0, 1))[1]
