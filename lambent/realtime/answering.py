@@ -22,8 +22,6 @@ from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
-from lambent.scenes.scene import Look
-from lambent.scenes.variants import textures_worn
 from lambent.store.answer import SeenSpots, StoredAnswer
 
 FAINT = 0.01  # of the mean indirect light: darker texels say nothing of how exact the rest is
@@ -192,20 +190,16 @@ def _shown(materials: list[Material]) -> tuple[Floats, Floats]:
     return albedos.reflected.astype(np.float32), albedos.transmitted.astype(np.float32)
 
 
-def dressed_scene(baked: BakedScene, edited: Mapping[str, Material], looks: Mapping[str, Look]) -> BakedScene:
-    """A baked scene with some of its materials replaced, and textures as `looks` have them; its light stays."""
-    record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
-    return replace(baked, record=record, textures=textures_worn(baked.textures, looks))
-
-
 def answered_scene(baked: BakedScene, stored: StoredAnswer, edited: Mapping[str, Material]) -> BakedScene:
     """A baked scene with some of its materials replaced, and its light and probes as they answer that."""
     answer = AnsweredLight(baked, stored)
     light = answer.lit(edited)
     front, back = answer.maps(light)
     probes = {**baked.probes, **{name: answer.probe(name, light) for name in answer.probes}}
+    record = baked.record.model_copy(update={"materials": {**baked.record.materials, **edited}})
     return replace(
-        dressed_scene(baked, edited, {}),
+        baked,
+        record=record,
         irradiance=front,
         irradiance_back=back,
         probes=probes,

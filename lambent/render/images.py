@@ -24,6 +24,7 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.scenes.scene import Variant
 
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
@@ -144,6 +145,16 @@ class Images(ABC):
     def light_fields(self) -> dict[str, Any]:
         """Of light fields that have a budget: `realtime.streaming.Streaming.statistics`."""
         return {}
+
+    def wear(self, variant: Variant) -> None:
+        """Show a variant from the next image on; the mix of the settings, where they have one, stands before its own.
+
+        Raises
+        ------
+        UserError
+            Where the renderer has one state of materials alone.
+        """
+        raise UserError("an edited view has no variants", field="--variants")
 
     @abstractmethod
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:

@@ -92,8 +92,8 @@ def still(
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, WRITABLE)
-    opened, record = _opened(store)
-    view = camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
+    opened, record = opened_with_views(store)
+    view = view_of(record, camera)
     settings = _with_mix_of_variant(settings, opened, note)
     if camera is not None and settings.light is None and (mix := read_views(opened.folder).lights.get(view.name)):
         settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
@@ -133,8 +133,8 @@ def drawn_view(
     progress: Progress = silent,
 ) -> tuple[Floats, Camera]:
     """Radiance (height, width, 3) of a store's view, in memory, and its camera; parameters are those of `still`."""
-    opened, record = _opened(store)
-    view = _named("camera", record.cameras, camera)
+    opened, record = opened_with_views(store)
+    view = view_of(record, camera)
     return images(opened, settings, note=note).radiance(view, progress), view
 
 
@@ -164,7 +164,7 @@ def film(
     """
     began, file = time.perf_counter(), Path(file)
     check_writable(file, (FILM, *SEQUENCES))
-    opened, record = _opened(store)
+    opened, record = opened_with_views(store)
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
     settings = _with_mix_of_variant(settings, opened, note)
     if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
@@ -246,10 +246,15 @@ def exposed(settings: Settings, store: Store) -> Settings:
     return settings
 
 
-def _opened(store: Store | Path | str) -> tuple[Store, SceneRecord]:
+def opened_with_views(store: Store | Path | str) -> tuple[Store, SceneRecord]:
     """The store, and its scene record with the saved views."""
     opened = store if isinstance(store, Store) else Store.open(Path(store))
     return opened, with_views(scene_record(opened), read_views(opened.folder))
+
+
+def view_of(record: SceneRecord, camera: Camera | str | None) -> Camera:
+    """A camera itself, or that of a name; by default the first of the scene."""
+    return camera if isinstance(camera, Camera) else _named("camera", record.cameras, camera)
 
 
 def _named(kind: str, choices: Iterable[Named], name: str | None) -> Named:

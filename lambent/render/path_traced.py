@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
+from lambent.scenes.scene import Variant
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.scenes.variants import dressed, variant_named
 from lambent.store.contract import scene_record
@@ -36,16 +37,18 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
-        baked = scene_of(store, scene)
-        if settings.variant:
-            variant = variant_named(scene_record(store).variants, settings.variant)
-            baked = dressed(baked, variant)
-            if variant.light.groups:
-                note("the path tracer traces the light of the scene, not the mix of the variant")
-        self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
+        self._baked, self._note = scene_of(store, scene), note
+        variants = scene_record(store).variants
+        self.wear(variant_named(variants, settings.variant) if settings.variant else Variant("as baked"))
         for name in changed_inputs(store, self._scene):
             note(f"{name} has changed since the store was baked")
         engine()
+
+    def wear(self, variant: Variant) -> None:
+        worn = dressed(self._baked, variant)
+        self._scene = replace(worn, materials={**worn.materials, **recoloured(worn.materials, self.settings.recolour)})
+        if variant.light.groups:
+            self._note(f"the path tracer traces the light of the scene, not the mix of {variant.name}")
 
     def radiance(self, camera: Camera, progress: Progress = silent) -> Floats:
         from lambent.bake.reference.path_traced import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,8 +17,7 @@ from lambent.core.errors import UserError
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
-from lambent.realtime.answering import answered_scene, dressed_scene
-from lambent.realtime.baked import BakedScene, read_baked
+from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.group_arrays import BAKE_GROUPS, FIELDS_STAY, NO_GROUPS
@@ -29,8 +28,10 @@ from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
+from lambent.render.wearing import Wearing
+from lambent.scenes.scene import Look, Variant
 from lambent.scenes.variants import variant_named
-from lambent.store.answer import NO_ANSWER, has_answer, read_answer
+from lambent.store.answer import read_answer
 from lambent.store.contract import SIDES, noise_name
 from lambent.store.store import Store
 
@@ -62,18 +63,22 @@ class RealTime(Images):
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
-        baked = _dressed(baked, store, settings, note)
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)
         for text in self._renderer.missing:
             note(text)
-        self._check_light(settings.light, note)
+        self._wearing, self._light = Wearing(store, self._renderer, note), settings.light or MixTrack()
+        if settings.recolour and not self._wearing.answers:
+            read_answer(store)  # which says what is missing
+        self._check_light(self._light, note)
+        variants = baked.record.variants
+        self._wear(variant_named(variants, settings.variant).looks if settings.variant else {})
 
-    def _check_light(self, light: MixTrack | None, note: Callable[[str], None]) -> None:
+    def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
         """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
         scene = self._renderer.scene
-        if light is None or not light.groups:
+        if not light.groups:
             return
         if scene.groups is None:
             raise UserError(NO_GROUPS, field="--light", hint=BAKE_GROUPS)
@@ -81,9 +86,19 @@ class RealTime(Images):
         if scene.light_fields:
             note(FIELDS_STAY)
 
+    def wear(self, variant: Variant) -> None:
+        self._light = self.settings.light or MixTrack.of(variant.light)
+        self._wear(variant.looks)
+
+    def _wear(self, looks: Mapping[str, Look]) -> None:
+        """Show materials with other looks, and then with the other colours of the settings."""
+        worn = {name: look.material for name, look in looks.items()}
+        known_materials = {**self._renderer.scene.record.materials, **worn}
+        self._wearing.wear({**worn, **recoloured(known_materials, self.settings.recolour)}, looks)
+
     def _state(self, camera: Camera) -> FrameState:
-        light = self.settings.light
-        return self._frame(camera, light={} if light is None else light.factors_at(self.time_s))
+        light = self._light.factors_at(self.time_s)
+        return self._frame(camera, light=light, materials=self._wearing.materials, maps=self._renderer.light_version)
 
     @property
     def light_fields(self) -> dict[str, Any]:
@@ -107,22 +122,3 @@ class RealTime(Images):
             width, height = (max(1, round(share * size)) for size in frame.size)
             exposure_ev = self.exposed(self._renderer.image(replace(frame, width=width, height=height)))
         return draw(replace(frame, exposure_ev=exposure_ev))
-
-
-def _dressed(baked: BakedScene, store: Store, settings: Settings, note: Callable[[str], None]) -> BakedScene:
-    """The scene with the materials of the settings' variant, and other colours, and its light as it answers them."""
-    record = baked.record
-    looks = variant_named(record.variants, settings.variant).looks if settings.variant else {}
-    edited = {name: look.material for name, look in looks.items()}
-    edited |= recoloured({**record.materials, **edited}, settings.recolour)
-    if not edited:
-        return baked
-    dressed = dressed_scene(baked, edited, looks)
-    if not settings.recolour and not has_answer(store):
-        note(f"light and probes stay as baked: {NO_ANSWER}")
-        return dressed
-    lit = answered_scene(baked, read_answer(store), edited)
-    note("light and probes of other materials are estimated from the bake, not baked again")
-    if baked.light_fields:
-        note("light fields show the materials that they were baked with")
-    return replace(lit, textures=dressed.textures)

@@ -11,9 +11,10 @@ import pytest
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
-from lambent.core.images import read_image
+from lambent.core.images import read_encoded, read_image
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
-from lambent.render import Settings, still
+from lambent.render import Settings, sheet, still
+from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
 from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store
@@ -92,3 +93,42 @@ def test_a_mix_and_other_colours_go_together(adapter: None, mi: object, tmp_path
     half = image(tmp_path / "s", replace(SMALL, recolour=red, light=parse_light(["lamp=0.5"])), tmp_path)
     assert half == pytest.approx(whole / 2, rel=6e-3, abs=2e-3)
     assert whole.mean(axis=(0, 1))[1] < 0.7 * image(tmp_path / "s", SMALL, tmp_path).mean(axis=(0, 1))[1]
+
+
+def test_a_sheet_has_every_variant_and_its_name(adapter: None, store: Path, tmp_path: Path) -> None:
+    notes = list[str]()
+    done = sheet(store, tmp_path / "sheet.png", "front", replace(SMALL, exposure_ev=0.0), note=notes.append)
+    page = read_encoded(tmp_path / "sheet.png")
+    assert done.frames == 3 and page.shape[:2] == (done.height, done.width)
+    columns, _ = shape_of(3, 1.5)
+    places = [divmod(number, columns) for number in range(3)]
+    cells = [page[7 + y * 60 : 39 + y * 60, 7 + x * 55 : 55 + x * 55] for y, x in places]
+    for cell, settings in zip(
+        cells, (SMALL, replace(SMALL, variant="red"), replace(SMALL, variant="dim")), strict=True
+    ):
+        still(store, tmp_path / "a.png", "front", replace(settings, exposure_ev=0.0))
+        assert np.abs(cell - read_encoded(tmp_path / "a.png")).max() < 0.02
+    for y, x in places:
+        caption = page[39 + y * 60 : 67 + y * 60, 7 + x * 55 : 55 + x * 55]
+        assert caption.min() < 0.5 < caption.mean(), "letters on paper"
+    assert any("stay as baked" in note for note in notes), "the store has no answer"
+
+
+def test_names_and_shapes_of_sheets() -> None:
+    assert shape_of(1, 1.78) == (1, 1) and shape_of(4, 1.78) == (2, 2) and shape_of(9, 1.78) == (3, 3)
+    assert shape_of(12, 1.0) == (4, 3)
+    pictures = [np.full((40, 60, 3), 128, np.uint8)] * 3
+    page = laid_out(pictures, ["short", "a name that is much too long for its picture", "\x1b[31m"], 2)
+    assert page.shape == (2 * (40 + 28) + 7, 2 * (60 + 7) + 7, 3)
+    assert (page[:, :6] == 255).all() and (page[7 + 68 :, 74:] == 255).all(), "an empty place"
+    assert [one.name for one in with_the_baked_state(VARIANTS)] == ["as baked", "red", "dim"]
+    assert [one.name for one in with_the_baked_state((Variant("plain"), *VARIANTS))] == ["plain", "red", "dim"]
+
+
+def test_a_sheet_that_cannot_be_is_said(adapter: None, store: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"--variants: the sheet is too large; found 3 of 10000x10000"):
+        sheet(store, tmp_path / "a.png", None, Settings(10000, 10000))
+    with pytest.raises(UserError, match=r"--variants: the store has no variants"):
+        sheet(write_small_store(tmp_path / "bare"), tmp_path / "a.png")
+    with pytest.raises(UserError, match=r"png"):
+        sheet(store, tmp_path / "a.exr")

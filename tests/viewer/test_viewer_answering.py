@@ -12,6 +12,7 @@ import pytest
 
 from lambent.bake.bake import bake
 from lambent.core.camera import Camera
+from lambent.realtime.answer_shown import answered
 from lambent.realtime.answering import answered_scene
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
@@ -23,7 +24,7 @@ from lambent.scenes.scene import SceneObject
 from lambent.store.answer import read_answer
 from lambent.store.store import Store
 from lambent.viewer.modes.walk import answering
-from lambent.viewer.modes.walk.answering import WITHOUT, Answering, AnsweringLight, answered
+from lambent.viewer.modes.walk.answering import WITHOUT, Answering, AnsweringLight
 from tests.bake.small_scenes import GREY, TINY, room_with_step
 from tests.viewer.small_store import write_small_store
 

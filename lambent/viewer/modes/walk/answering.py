@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from lambent.core.errors import UserError
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
+from lambent.realtime.answer_shown import answered
 from lambent.realtime.answering import AnsweredLight, Lit
-from lambent.realtime.cube_mips import finite
 from lambent.realtime.group_arrays import GroupArrays
 from lambent.realtime.probe_light import ProbeLight
 from lambent.realtime.renderer import Renderer
@@ -148,10 +148,3 @@ class AnsweringLight:
 
     def _failed(self, error: UserError) -> None:
         self._shown.possible, self._shown.said = False, f"the light of other surfaces stays as baked: {error}"
-
-
-def answered(baked: ProbeLight, answer: AnsweredLight, name: str, light: Lit) -> ProbeLight:
-    """A probe's light in other light of the surfaces that it sees."""
-    change = answer.probe_change(name, light)
-    radiance = np.maximum(finite(baked.probe.radiance)[0] + change, 0)
-    return baked.relit(radiance, answer.probe_irradiance(name, change))

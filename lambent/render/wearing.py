@@ -1,0 +1,69 @@
+"""Other materials and their light in images of one renderer: variants, colours, and what these change with time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+from lambent.materials.document import Material
+from lambent.realtime.answer_shown import AnswerShown
+from lambent.realtime.answering import AnsweredLight
+from lambent.realtime.renderer import Renderer
+from lambent.scenes.scene import Look
+from lambent.store.answer import NO_ANSWER, has_answer, read_answer
+from lambent.store.contract import needs_probe
+from lambent.store.store import Store
+
+ESTIMATED = "light and probes of other materials are estimated from the bake, not baked again"
+
+
+class Wearing:
+    """What a renderer's scene wears: `materials` in the place of the store's, by name, for the states of frames.
+
+    Attributes
+    ----------
+    answers : bool
+        Whether light follows other materials; where it does not, a note says so once.
+    """
+
+    def __init__(self, store: Store, renderer: Renderer, note: Callable[[str], None]) -> None:
+        self._store, self._renderer, self._note = store, renderer, note
+        self._noted: set[str] = set()
+        self.answers = has_answer(store)
+        self.materials: dict[str, Material] = {}
+
+    def wear(self, materials: Mapping[str, Material], looks: Mapping[str, Look]) -> None:
+        """Show these materials, with the textures of `looks`, and the light that answers them, from now on.
+
+        All that are left out are as baked.
+        """
+        self.materials = dict(materials)
+        self._renderer.resources.dress(looks)
+        if materials:
+            self._tell(materials)
+        if self.answers and (materials or "_shown" in self.__dict__):
+            answer, shown = self._shown
+            shown.show(answer.lit(materials))
+
+    @cached_property
+    def _shown(self) -> tuple[AnsweredLight, AnswerShown]:
+        answer = AnsweredLight(self._renderer.scene, read_answer(self._store))
+        return answer, AnswerShown(self._renderer, answer)
+
+    def _tell(self, materials: Mapping[str, Material]) -> None:
+        """Note what is estimated, and what is not known of these materials."""
+        scene = self._renderer.scene
+        self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
+        if scene.light_fields:
+            self._once("light fields show the materials that they were baked with")
+        for name, material in materials.items():
+            given = scene.record.materials[name]
+            if needs_probe(material) and not needs_probe(given):
+                self._once(f"{name} was matte in the bake: what it mirrors now is from the nearest probe")
+            if material.transmits and not given.transmits and scene.irradiance_back is None:
+                self._once(f"{name} let no light through in the bake: its far side stays dark")
+
+    def _once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
+            self._note(text)
