@@ -139,6 +139,9 @@ def command(
         bool,
         typer.Option("--variants", help="All variants in one picture, each of --size, with their names. [640x360]"),
     ] = False,
+    keyframes: Annotated[
+        Path | None, typer.Option(help="File of states of materials and light over the time of a film (.toml).")
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -154,6 +157,8 @@ def command(
     Example: lambent render house.store --variant walnut -o walnut.png
 
     Example: lambent render house.store --variants --camera entrance -o sheet.png
+
+    Example: lambent render house.store --path tour --keyframes evening.toml -o evening.mp4
 
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
@@ -196,6 +201,8 @@ def command(
     suffix = output.suffix.lower()
     moves = not variants and (suffix == FILM or (path is not None and suffix in SEQUENCES))
     check_output(output, (".png",) if variants else (*WRITABLE, FILM), force=force or moves)
+    if keyframes is not None and not moves:
+        raise UserError("keyframes are of films", field="--keyframes", hint="write to .mp4, or name a --path")
     if moves and camera is not None:
         raise UserError("a film needs a path", field="--camera", hint="name a path with --path")
     if path is not None and not moves:
@@ -208,7 +215,9 @@ def command(
 
     with progress_bar() as progress:
         if moves:
-            done = render.film(store, output, path, settings, fps=fps, scene=scene, note=note, progress=progress)
+            done = render.film(
+                store, output, path, settings, fps=fps, keyframes=keyframes, scene=scene, note=note, progress=progress
+            )
         elif variants:
             done = render.sheet(store, output, camera, settings, scene=scene, note=note, progress=progress)
         else:

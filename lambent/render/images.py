@@ -24,6 +24,7 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.scenes.look_track import LookTrack
 from lambent.scenes.scene import Variant
 
 PATH_TRACER = "path"
@@ -82,6 +83,8 @@ class Settings:
     variant : str
         Name of one of the scene's variants: its materials, under those of `recolour`, and its mix of the light, where
         `light` has none. The light answers it.
+    looks : LookTrack, optional
+        Looks of materials over the time of a film, over those of the variant; the light answers them.
     """
 
     width: int = 1280
@@ -104,6 +107,7 @@ class Settings:
     light_field_cache: str = LEAST_RECENT
     recolour: Mapping[str, Triple] = field(default_factory=dict)
     variant: str = ""
+    looks: LookTrack | None = None
 
     @property
     def is_false_coloured(self) -> bool:

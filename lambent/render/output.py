@@ -23,7 +23,8 @@ from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
 from lambent.render.projected import Projected, faces_settings
 from lambent.scenes.camera_paths import camera_at
-from lambent.scenes.variants import variant_named
+from lambent.scenes.loaders.keyframes import Known, read_keyframes
+from lambent.scenes.variants import looks_as_loaded, variant_named
 from lambent.store.contract import SceneRecord, scene_record
 from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
@@ -145,6 +146,7 @@ def film(
     settings: Settings = DEFAULT,
     *,
     fps: int = 30,
+    keyframes: Path | None = None,
     scene: str | None = None,
     note: Note = ignore,
     progress: Progress = silent,
@@ -159,6 +161,8 @@ def film(
         A path, or the name of one of the scene or of a recorded walk; by default the scene's first.
     fps : int
         Frames per second.
+    keyframes : path, optional
+        A file of states of materials and light over time (`scenes.loaders.keyframes`).
 
     The other parameters and the errors are those of `still`.
     """
@@ -166,6 +170,8 @@ def film(
     check_writable(file, (FILM, *SEQUENCES))
     opened, record = opened_with_views(store)
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
+    if keyframes is not None:
+        settings = _with_keyframes(settings, opened, record, keyframes)
     settings = _with_mix_of_variant(settings, opened, note)
     if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
         settings = _lit(settings, opened, track, "saved with the walk", note)
@@ -215,6 +221,17 @@ def images(
     from lambent.render.real_time import RealTime
 
     return RealTime(store, settings, moving, note)
+
+
+def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file: Path) -> Settings:
+    """Settings with what a file says of materials and light over time."""
+    looks = looks_as_loaded(record.materials, record.textures)
+    found = read_keyframes(file, Known(looks, record.variants, read_views(store.folder).lights))
+    if not found.light.groups:
+        return replace(settings, looks=found.looks)
+    if settings.light is not None:
+        raise UserError("the keyframes say the light", field="--light", hint="leave it out, or out of the file")
+    return replace(settings, looks=found.looks, light=found.light)
 
 
 def _with_mix_of_variant(settings: Settings, store: Store, note: Note) -> Settings:

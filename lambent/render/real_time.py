@@ -16,7 +16,6 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import WHITE, MixTrack
 from lambent.core.progress import Progress, silent
-from lambent.materials.recolour import recoloured
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.frame_state import FrameState, quantity_of
@@ -72,8 +71,9 @@ class RealTime(Images):
         if settings.recolour and not self._wearing.answers:
             read_answer(store)  # which says what is missing
         self._check_light(self._light, note)
-        variants = baked.record.variants
-        self._wear(variant_named(variants, settings.variant).looks if settings.variant else {})
+        self._looks: Mapping[str, Look] = {}
+        if settings.variant:
+            self._looks = variant_named(baked.record.variants, settings.variant).looks
 
     def _check_light(self, light: MixTrack, note: Callable[[str], None]) -> None:
         """`UserError` where the store lacks the groups of a mix; a note of what does not follow it."""
@@ -87,16 +87,13 @@ class RealTime(Images):
             note(FIELDS_STAY)
 
     def wear(self, variant: Variant) -> None:
-        self._light = self.settings.light or MixTrack.of(variant.light)
-        self._wear(variant.looks)
-
-    def _wear(self, looks: Mapping[str, Look]) -> None:
-        """Show materials with other looks, and then with the other colours of the settings."""
-        worn = {name: look.material for name, look in looks.items()}
-        known_materials = {**self._renderer.scene.record.materials, **worn}
-        self._wearing.wear({**worn, **recoloured(known_materials, self.settings.recolour)}, looks)
+        self._light, self._looks = self.settings.light or MixTrack.of(variant.light), variant.looks
 
     def _state(self, camera: Camera) -> FrameState:
+        """The next frame's, its materials and their light on the GPU."""
+        track = self.settings.looks
+        looks = {**self._looks, **(track.looks_at(self.time_s) if track else {})}
+        self._wearing.wear(looks, self.settings.recolour)
         light = self._light.factors_at(self.time_s)
         return self._frame(camera, light=light, materials=self._wearing.materials, maps=self._renderer.light_version)
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
+from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown
 from lambent.realtime.answering import AnsweredLight
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Look
+from lambent.scenes.variants import looks_as_loaded
 from lambent.store.answer import NO_ANSWER, has_answer, read_answer
 from lambent.store.contract import needs_probe
 from lambent.store.store import Store
@@ -31,17 +34,26 @@ class Wearing:
         self._noted: set[str] = set()
         self.answers = has_answer(store)
         self.materials: dict[str, Material] = {}
+        self._looks: dict[str, Look] = {}
 
-    def wear(self, materials: Mapping[str, Material], looks: Mapping[str, Look]) -> None:
-        """Show these materials, with the textures of `looks`, and the light that answers them, from now on.
+    def wear(self, looks: Mapping[str, Look], colours: Mapping[str, Triple]) -> None:
+        """Show materials with these looks, then with these diffuse colours, and the light that answers them.
 
         All that are left out are as baked.
         """
-        self.materials = dict(materials)
-        self._renderer.resources.dress(looks)
+        scene = self._renderer.scene
+        loaded = looks_as_loaded(scene.record.materials, scene.textures)
+        worn = {name: look for name, look in looks.items() if look != loaded[name]}
+        documents = {name: look.material for name, look in worn.items()}
+        materials = {**documents, **recoloured({**scene.record.materials, **documents}, colours)}
+        if (worn, materials) == (self._looks, self.materials):
+            return
+        if worn != self._looks:
+            self._renderer.resources.dress(worn)
+        self._looks, self.materials = worn, materials
         if materials:
             self._tell(materials)
-        if self.answers and (materials or "_shown" in self.__dict__):
+        if self.answers:
             answer, shown = self._shown
             shown.show(answer.lit(materials))
 

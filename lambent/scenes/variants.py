@@ -14,6 +14,7 @@ from typing import TypeVar
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
 from lambent.core.light_mix import LightMix
+from lambent.materials.document import Material
 from lambent.scenes.scene import Look, MaterialTextures, Scene, Variant
 
 FIELD = "--variant"
@@ -68,18 +69,18 @@ def _copied(of_materials: Mapping[str, Kept], copies: Mapping[str, str]) -> dict
 
 def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
     """The looks of a variant by material, where they are others than the scene's."""
-    found = {}
+    found, loaded = {}, looks_as_loaded(scene.materials, scene.textures)
     for o, look in zip(scene.objects, one.looks, strict=True):
-        now = look_of(scene, o.material)
+        now = loaded[o.material]
         same_document = now.material.model_copy(update={"name": look.material.name}) == look.material
         if not (same_document and scene.textures.get(now.textures) is scene.textures.get(look.textures)):
             found[o.material] = look
     return found
 
 
-def look_of(scene: Scene, material: str) -> Look:
-    """How a material of a scene looks as it is loaded."""
-    return Look(scene.materials[material], material if material in scene.textures else "")
+def looks_as_loaded(materials: Mapping[str, Material], textured: Collection[str]) -> dict[str, Look]:
+    """How materials look as they are loaded; `textured` are the names of those with textures."""
+    return {name: Look(material, name if name in textured else "") for name, material in materials.items()}
 
 
 def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) -> Variant:

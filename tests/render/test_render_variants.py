@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from lambent.bake.bake import bake
-from lambent.core.camera import Camera
+from lambent.core.camera import Camera, CameraPath
 from lambent.core.errors import UserError
 from lambent.core.images import read_encoded, read_image
 from lambent.core.light_mix import GroupMix, LightMix, parse_light
-from lambent.render import Settings, sheet, still
+from lambent.render import Settings, film, sheet, still
 from lambent.render.sheet import laid_out, shape_of, with_the_baked_state
+from lambent.scenes.look_track import LookTrack
 from lambent.scenes.scene import Look, MaterialTextures, Texture, Variant
 from lambent.store.contract import scene_record, write_scene_record
 from lambent.store.store import Store
@@ -132,3 +133,44 @@ def test_a_sheet_that_cannot_be_is_said(adapter: None, store: Path, tmp_path: Pa
         sheet(write_small_store(tmp_path / "bare"), tmp_path / "a.png")
     with pytest.raises(UserError, match=r"png"):
         sheet(store, tmp_path / "a.exr")
+
+
+def frames(store: Path, folder: Path, text: str, settings: Settings, path: CameraPath | str) -> list[np.ndarray]:
+    """Two frames a second along a path, with keyframes."""
+    folder.mkdir()
+    (folder / "k.toml").write_text(f'format = "lambent-keyframes"\nversion = 1\n{text}')
+    film(store, folder / "f-#.exr", path, settings, fps=2, keyframes=folder / "k.toml")
+    return [read_image(file) for file in sorted(folder.glob("*.exr"))]
+
+
+def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Path, tmp_path: Path) -> None:
+    keys = '[[keys]]\nat = 0\nas_baked = true\n[[keys]]\nat = 2\nvariant = "dim"\n'
+    plain = frames(store, tmp_path / "plain", "[[keys]]\nat = 0\nas_baked = true", SMALL, "tour")
+    shown = frames(store, tmp_path / "shown", keys, SMALL, "tour")
+    shares = [a.mean() / b.mean() for a, b in zip(shown, plain, strict=True)]
+    assert shares == pytest.approx([1, 0.875, 0.75, 0.625, 0.5, 0.5], abs=0.01)
+    with pytest.raises(UserError, match=r"--light: the keyframes say the light"):
+        frames(store, tmp_path / "twice", keys, replace(SMALL, light=parse_light(["sun=off"])), "tour")
+
+
+def test_every_frame_of_changing_paint_is_a_still_of_that_paint(adapter: None, mi: object, tmp_path: Path) -> None:
+    bake(room_with_step(), tmp_path / "s", quality=TINY).close()
+    keys = (
+        "[[keys]]\nat = 0\nmaterials.grey.kd = [0.5, 0.5, 0.5]\n[[keys]]\nat = 1\nmaterials.grey.kd = [0.5, 0.1, 0.1]\n"
+    )
+    still_there = CameraPath("rest", (WITHIN, WITHIN), 1.5)
+    shown = frames(tmp_path / "s", tmp_path / "f", keys, replace(SMALL, samples=4), still_there)
+    for picture, green in zip(shown, (0.5, 0.3, 0.1), strict=True):
+        track = LookTrack({"grey": ((0.0, Look(room_with_step().materials["grey"].model_copy(
+            update={"kd": (0.5, green, green)}))),)})  # fmt: skip
+        expected, *_ = frames_of_track(tmp_path / "s", tmp_path / f"{green}", track, still_there)
+        assert picture == pytest.approx(expected, rel=2e-3, abs=1e-4)
+    assert shown[2].mean(axis=(0, 1))[1] < 0.5 * shown[0].mean(axis=(0, 1))[1]
+
+
+def frames_of_track(store: Path, folder: Path, track: LookTrack, path: CameraPath) -> list[np.ndarray]:
+    """Frames with looks that stay."""
+    folder.mkdir()
+    short = CameraPath(path.name, path.keys, 0.5)
+    film(store, folder / "f-#.exr", short, replace(SMALL, samples=4, looks=track), fps=2)
+    return [read_image(file) for file in sorted(folder.glob("*.exr"))]

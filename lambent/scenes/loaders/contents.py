@@ -11,7 +11,7 @@ from lambent.core.camera import Camera, overview
 from lambent.core.plain import Triple
 from lambent.materials.document import Material
 from lambent.scenes.scene import Environment, Light, MaterialTextures, Scene, SceneObject, SunSky, bounds_of
-from lambent.scenes.variants import Dressed, look_of, with_variants
+from lambent.scenes.variants import Dressed, looks_as_loaded, with_variants
 
 DAYLIGHT = SunSky(sun_direction=(0.4558, 0.7597, 0.4637))
 
@@ -53,7 +53,7 @@ class Contents:
             warnings=(*self.warnings, *notes, *lights_that_stay(self.objects, sets)),
             textures=self.textures,
         )
-        looks = {name: look_of(scene, name) for name in scene.materials}
+        looks = looks_as_loaded(scene.materials, scene.textures)
         return with_variants(scene, [
             Dressed(variant, [looks[o.material] for o in objects]) for variant, objects in sets.items()
         ])  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,12 +13,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from lambent.core.camera import overview
-from lambent.core.ceilings import SCENE_TOML_BYTES, TOML_LEVELS
 from lambent.core.errors import UserError, invalid
 from lambent.core.geometry import triangle_areas
-from lambent.core.inputs import read_bytes, read_head
 from lambent.core.plain import Triple
-from lambent.materials.document import Material, load_material, material_from
+from lambent.materials.document import Material, material_from
 from lambent.scenes.geometry import transformed
 from lambent.scenes.ies import read_ies
 from lambent.scenes.light_groups import SKY, SUN, names_of_lights
@@ -29,6 +25,7 @@ from lambent.scenes.loaders.meshes.repair import ABSURD
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.assembly import assembled, assigned, check_material, fitting
 from lambent.scenes.loaders.scene_toml.lamps import IesSection, coloured
+from lambent.scenes.loaders.scene_toml.material_files import material_of_file
 from lambent.scenes.loaders.scene_toml.schema import (
     GeometrySection,
     ImageSection,
@@ -36,6 +33,7 @@ from lambent.scenes.loaders.scene_toml.schema import (
     SceneDocument,
     known_keys,
 )
+from lambent.scenes.loaders.scene_toml.text import toml_of
 from lambent.scenes.loaders.scene_toml.variants import variants_told
 from lambent.scenes.scene import (
     Environment,
@@ -52,7 +50,6 @@ from lambent.scenes.scene import (
 )
 from lambent.scenes.variants import with_variants
 
-_DEEP_KEY = re.compile(rb"""(?<![\w"'.-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){9,}""")
 ReadGeometry = Callable[[str, Path, SceneFiles], Contents]  # name as written, the scene.toml, files below its folder
 
 
@@ -113,7 +110,7 @@ def load_toml(path: Path, read_geometry: ReadGeometry) -> Scene:
     )
 
     def read_material(name: str, field: str) -> Material:
-        return _material_of_file(name, field, path, files)
+        return material_of_file(name, field, path, files)
 
     worn = {name: [o.material for o in worn] for name, worn in dressings.items()}
     told = variants_told(document.variants, worn, scene, read_material, path)
@@ -134,15 +131,8 @@ def _there(document: SceneDocument, path: Path, files: SceneFiles) -> tuple[list
 
 
 def _parse(path: Path) -> SceneDocument:
-    content = read_bytes(path, SCENE_TOML_BYTES)
-    deepest = max((key[0].count(b".") for key in _DEEP_KEY.finditer(content)), default=0)
-    TOML_LEVELS.check(deepest, file=path)  # the parser's time grows with their square
     try:
-        data = tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"not a TOML document ({error})", file=path) from error
-    try:
-        return SceneDocument.model_validate(data)
+        return SceneDocument.model_validate(toml_of(path))
     except ValidationError as error:
         raise invalid(error, path, known_keys()) from error
 
@@ -181,7 +171,7 @@ def _materials(document: SceneDocument, path: Path, files: SceneFiles) -> dict[s
             field = f"materials.{name}.file"
             if not isinstance(table["file"], str):
                 raise UserError("is not a file name", file=path, field=field, got=table["file"])
-            materials[name] = _material_of_file(table["file"], field, path, files).model_copy(update={"name": name})
+            materials[name] = material_of_file(table["file"], field, path, files).model_copy(update={"name": name})
         else:
             materials[name] = material_from({"name": name, **table}, where)
     return materials
@@ -194,22 +184,6 @@ def _measured(
     for name in document.measured:
         check_material(name, materials, path, f"measured.{name}")
     return {name: files.path(file, path, f"measured.{name}") for name, file in document.measured.items()}
-
-
-def _material_of_file(name: str, field: str, path: Path, files: SceneFiles) -> Material:
-    """The material of a document; a `UserError` if the file is a measurement, which has to be fitted first."""
-    from lambent.materials.measured.registry import is_known
-
-    source = files.path(name, path, field)
-    if source.is_file() and not _begins_as_json(source) and is_known(source):
-        fitted = source.with_suffix(".json").name
-        hint = f"fit it first: lambent fit {source.name} -o {fitted}, then file = {fitted!r}"
-        raise UserError("is a measurement, not a material", file=path, field=field, got=source.name, hint=hint)
-    return load_material(files.use(source))
-
-
-def _begins_as_json(path: Path) -> bool:
-    return read_head(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def _apply(
