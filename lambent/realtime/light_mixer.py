@@ -86,6 +86,12 @@ class LightMixer:
         """(n, 3) of the mix that is wanted; None while all light is as it was baked."""
         return self._wanted
 
+    @property
+    def changes(self) -> bool:
+        """Whether the light that is wanted is another one than was baked."""
+        answers = self._answer is not None and self._answer.groups is not self._scene.groups
+        return answers or (self._wanted is not None and bool((self._wanted != 1).any()))
+
     @cached_property
     def _thread(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(1, "light")

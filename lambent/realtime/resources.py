@@ -91,6 +91,7 @@ class SceneResources:
         self._light_texture = upload(device, [layers], "rgba16float")
         self.light_view = self._light_texture.create_view(dimension="2d-array")
         self.light_version = 0  # grows with every answer of light to edited materials, and with other textures
+        self.answers = False  # whether light maps and probes answer edited materials
         sky = scene.far_light or DARK
         self.sky_group = self.sky_group_of(with_alpha(finite(sky.radiance)[0]))
         cleaned = without_sun(sky, scene.sun)

@@ -10,6 +10,7 @@ from lambent.materials.document import Material
 from lambent.materials.recolour import recoloured
 from lambent.realtime.answer_shown import AnswerShown
 from lambent.realtime.answering import AnsweredLight
+from lambent.realtime.group_arrays import FIELDS_STAY
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.scene import Look
 from lambent.scenes.variants import looks_as_loaded
@@ -67,7 +68,7 @@ class Wearing:
         scene = self._renderer.scene
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
         if scene.light_fields:
-            self._once("light fields show the materials that they were baked with")
+            self._once(FIELDS_STAY)
         for name, material in materials.items():
             given = scene.record.materials[name]
             if needs_probe(material) and not needs_probe(given):
