@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bench.views import given_or_baked
-from lambent.core.answer import Answer, answered, gathered, solved, upsampled
+from lambent.core.answer import Answer, answered, solved, upsampled
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
@@ -273,9 +273,10 @@ def timed(
 def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[str, float]:
     """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
     marks = [time.perf_counter()]
-    solution = solved(answer.patches, edited_albedos(given, now))
+    albedos = edited_albedos(given, now)
+    solution = solved(answer.patches, albedos)
     marks.append(time.perf_counter())
-    light = gathered(answer.rays, solution.exitance)
+    light = answer.indirect(albedos, solution)
     marks.append(time.perf_counter())
     upsampled(light, answer.near)
     marks.append(time.perf_counter())

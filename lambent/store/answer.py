@@ -9,6 +9,8 @@ answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels wit
                            light map; light that only lobes have sent on counts as direct
 answer/transfer            (P, P) float16, share of a patch's light by the patches that send it
 answer/rays                (K, R, 3) uint8, `core.answer.packed_rays` of the points that gather
+answer/points              (K,) uint32, the texel and side of each, as below
+answer/point_sun           (K, 3) float32, direct irradiance of the sun there, W/m^2
 answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
 answer/near                (T, 8) uint32, points near each, and
 answer/shares              (T, 8) uint8, what these count
@@ -28,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches
+from lambent.core.answer import Answer, Neighbours, Patches, Points, points_of_rays
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
@@ -56,7 +58,7 @@ def probe_spots_name(object_name: str, part: str) -> str:
 
 def has_answer(store: Store) -> bool:
     """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
-    needed = ("transfer", "rays", "near", "texels", "patch_direct", *DIRECT[:1])
+    needed = ("transfer", "rays", "points", "point_sun", "near", "texels", "patch_direct", *DIRECT[:1])
     if LAST not in store or not all(answer_name(part) in store for part in needed):
         return False
     return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
@@ -108,10 +110,11 @@ def read_answer(store: Store) -> StoredAnswer:
         hint = "bake the scene again with `lambent bake --only answer`"
         raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
-    material, paired, direct, transfer, rays, texels, near, shares, patch = (
+    material, paired, direct, transfer, rays, points, point_sun, texels, near, shares, patch = (
         store.read(answer_name(part))
         for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "texels", "near", "shares", "patch",
+            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "points", "point_sun",
+            "texels", "near", "shares", "patch",
         )
     )  # fmt: skip
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
@@ -128,7 +131,10 @@ def read_answer(store: Store) -> StoredAnswer:
         and (not near.size or int(near.max()) < len(rays))
         and (not shares.size or bool((shares.sum(axis=1) > 0).all()))
         and (not len(texels) or int(texels.max()) < 2 * height * width)
-        and (not rays.size or _most_patch(rays) < count)
+        and points.shape == rays.shape[:1]
+        and point_sun.shape == (len(points), 3)
+        and bool(np.isin(points, texels).all())
+        and (not rays.size or int(points_of_rays(rays).max()) < len(points))
     )
     if not fits:
         raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
@@ -146,24 +152,32 @@ def read_answer(store: Store) -> StoredAnswer:
                         hint=hint)  # fmt: skip
     patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
     albedos = albedos_of([record.materials[name] for name in names])
-    answer = Answer(patches, rays, Neighbours(near, shares), np.minimum(directs, baked), baked, albedos)
     number = _numbers(texels, height * width)
     flat = patch.reshape(2, -1)
-    of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2]
+    of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2].astype(np.int64)
     other = number[(texels ^ 1).astype(np.int64)]
     sun = sun_beside(store)
     of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
+    directs, at = np.minimum(directs, baked), number[points]
+    with_sun = np.zeros((groups, len(points), 3), np.float32)
+    with_sun[of_sun] = point_sun
+    near_points = Neighbours(near, shares)
+    senders = Points(
+        of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], near_points),
+        directs[:, at] + with_sun, baked[:, at] + with_sun,
+    )  # fmt: skip
+    answer = Answer(patches, senders, rays, near_points, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
         np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
     )  # fmt: skip
 
 
-def _most_patch(rays: NDArray[np.uint8]) -> int:
-    """The largest number of a patch that rays end on."""
-    high = rays[..., 1]
-    top = int(high.max())
-    return top * 256 + int(rays[..., 0][high == top].max())
+def _on_other_sides(row: NDArray[np.int64], near: Neighbours) -> NDArray[np.int64]:
+    """(K,) the point that counts most for the other side of each one's texel, the row (K,); its own where that is -1."""
+    most = near.shares.argmax(axis=1)[:, None]
+    found = np.take_along_axis(near.points, most, axis=1)[:, 0].astype(np.int64)
+    return np.asarray(np.where(row >= 0, found[row], np.arange(len(row))))
 
 
 def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.light.noise import chart_means
+from lambent.bake.light.denoise import denoise_charts
 from lambent.core.arrays import Flags, Floats, Indices
 
-ROUNDS = 3  # of means over 5 x 5 texels: one leaves noise that strong edits show as blotches
 
+def cleaned_direct(direct: Floats, known: Flags, light: Floats, labels: Indices) -> NDArray[np.float16]:
+    """Direct light (H, W, 3) of a light map (H, W, 3): denoised, at most all of it.
 
-def shared_by_charts(direct: Floats, known: Flags, light: Floats, labels: Indices) -> NDArray[np.float16]:
-    """Direct light (H, W, 3) as a share of a light map (H, W, 3), at most all of it.
-
-    Shares are those of the means over nearby texels of a chart: the samples' noise is averaged, and the edges are those
-    of the light map, which is denoised already. Far from samples (`known`) there is none.
+    Samples above the light map itself are cut first: lobes focus light on few of them, which no filter takes for noise.
 
     Parameters
     ----------
@@ -25,11 +22,5 @@ def shared_by_charts(direct: Floats, known: Flags, light: Floats, labels: Indice
         Chart of each texel.
     """
     given = np.asarray(light, np.float32)
-    both = np.concatenate([np.asarray(direct, np.float32), given], axis=-1) * known[..., None]
-    means = both
-    for _ in range(ROUNDS):
-        means = chart_means(means, known, labels)
-    part, whole = means[..., :3], means[..., 3:]
-    share = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
-    found = (given * np.clip(share, 0, 1)).astype(np.float16)
-    return np.asarray(np.minimum(found, np.asarray(light, np.float16)), np.float16)
+    clean = denoise_charts(np.minimum(direct, given) * known[..., None], known, labels)
+    return np.asarray(np.minimum(clean.astype(np.float16), given.astype(np.float16)), np.float16)

@@ -38,6 +38,8 @@ class Spots:
         All light, W/m^2, the sun's included.
     direct : (G, 2, K, 3) float32
         Direct light by group, the sun's included.
+    sun : (2, K, 3) float32
+        Direct irradiance of the sun, W/m^2.
     area : (K,) m^2, about.
     object, material, chart : (K,) integers.
     position, normal : (K, 3)
@@ -48,6 +50,7 @@ class Spots:
     there: Flags
     irradiance: NDArray[np.float32]
     direct: NDArray[np.float32]
+    sun: NDArray[np.float32]
     area: Floats
     object: Indices
     material: Indices
@@ -94,7 +97,8 @@ def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_
     light *= there[..., None]
     direct *= there[..., None]
     return Spots(
-        lit & there, there, light, direct, texels.spacing.astype(float) ** 2, object_of, material,
+        lit & there, there, light, direct, sun * there[..., None],
+        texels.spacing.astype(float) ** 2, object_of, material,
         traced.labels.reshape(-1)[texels.index], texels.positions.mean(axis=1).astype(float),
         normalize(texels.normals.mean(axis=1).astype(float)), texels.index,
     )  # fmt: skip

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 1
+REVISION = 2
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = ("transfer", "rays", "texels", "near", "shares")
+BETWEEN = ("transfer", "rays", "points", "point_sun", "texels", "near", "shares")
 SEEN = ("spots", "tint", "sun")
 TILES = 16  # of transfer and of rays
 
@@ -101,7 +101,7 @@ def _direct(context: BakeContext, side: int) -> Floats:
 
     What lobes alone have sent on counts as direct.
     """
-    from lambent.bake.answering.direct import shared_by_charts
+    from lambent.bake.answering.direct import cleaned_direct
     from lambent.bake.light.sampling import sampled_halves
 
     if MAPS[side] not in context.stale(KIND):
@@ -114,7 +114,7 @@ def _direct(context: BakeContext, side: int) -> Floats:
         samples, lit = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0), finished_groups(context)[side]
     assert lit is not None, "two-sided scenes have both maps"
     by_group = zip(samples, lit.reshape(len(samples), *known.shape, 3), strict=True)
-    direct = np.stack([shared_by_charts(sampled, known, light, labels) for sampled, light in by_group])
+    direct = np.stack([cleaned_direct(sampled, known, light, labels) for sampled, light in by_group])
     context.put(KIND, MAPS[side], direct, context.provenance())
     return direct
 
@@ -183,21 +183,24 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
-    """Transfer between patches, and rays from them to the points that gather."""
-    from lambent.bake.answering.points import gather_points, neighbours
+    """Transfer between patches, and rays between points."""
+    from lambent.bake.answering.points import bounded_points, neighbours
+    from lambent.bake.answering.senders import points_near
     from lambent.bake.answering.transfer import Between
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
-    between = Between(ends, spots, sides, clusters, spots.exitance(context.scene))
-    points = gather_points(spots, width, how.block)
+    points, block = bounded_points(spots, width, how.block)
+    codes, near = neighbours(spots, points, block)
+    closest = points_near(spots, codes, near)
+    between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
 
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
         return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
 
     def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-        return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
+        return between.gathered_rays(region[0], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
     arrays = (("transfer", (count, count), "float16", rows, "light between patches"),
@@ -207,11 +210,11 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
         run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
-    context.progress(0, 1, "texels that answer")
-    codes, near = neighbours(spots, points, how.block)
-    context.put(KIND, answer_name("texels"), codes, context.provenance())
-    context.put(KIND, answer_name("near"), near.points, context.provenance())
-    context.put(KIND, answer_name("shares"), near.shares, context.provenance())
+    numbers = (spots.index[points.texel] * 2 + points.side).astype(np.uint32)
+    own_sun = spots.sun[points.side, points.texel]
+    values = (numbers, own_sun, codes, near.points, near.shares)
+    for part, array in zip(BETWEEN[2:], values, strict=True):
+        context.put(KIND, answer_name(part), array, context.provenance())
 
 
 def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:
