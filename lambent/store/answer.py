@@ -16,7 +16,7 @@ answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe se
 answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
 answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
 answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
-                           traced_by_group, traced_back_by_group (1, H, W, 3 G), where light is sorted
+                           traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
 
 G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
 """

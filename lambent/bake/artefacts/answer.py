@@ -16,9 +16,10 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
-from lambent.store.contract import probe_name, shared_probes
+from lambent.store.contract import SIDES, probe_name, shared_probes
+from lambent.store.light_groups import group_name
 from lambent.store.store import Writer
 
 if TYPE_CHECKING:
@@ -108,15 +109,28 @@ def _direct(context: BakeContext, side: int) -> Floats:
         return np.asarray(context.store.read(MAPS[side]))
     labels = _sampled_direct(context, side)
     halves, known = sampled_halves(context.store.read(TRACED[side]))
-    samples, lit = halves.mean(axis=0)[None], finished_maps(context)[side]
-    if sorts_light(context.methods):
-        parts = context.store.read(_by_group(TRACED[side]))[0]
-        samples, lit = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0), finished_groups(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
-    by_group = zip(samples, lit.reshape(len(samples), *known.shape, 3), strict=True)
-    direct = np.stack([shared_by_charts(sampled, known, light, labels) for sampled, light in by_group])
+    if not sorts_light(context.methods):
+        lit = finished_maps(context)[side]
+        assert lit is not None, "two-sided scenes have both maps"
+        direct = shared_by_charts(halves.mean(axis=0), known, lit, labels)[None]
+    else:
+        direct = _direct_by_group(context, side, known, labels)
     context.put(KIND, MAPS[side], direct, context.provenance())
     return direct
+
+
+def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indices) -> NDArray[np.float16]:
+    """The same where light is sorted: the light map's own direct light, denoised, and what lobes alone have sent on."""
+    from lambent.bake.answering.direct import shared_by_charts
+
+    lit = finished_groups(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
+    whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
+    by_lobes = np.maximum(whole - straight, 0)
+    sent = np.stack([shared_by_charts(one, known, light, labels) for one, light in zip(by_lobes, lit, strict=True)])
+    straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
+    return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
 
 
 def _sampled_direct(context: BakeContext, side: int) -> Indices:
@@ -132,10 +146,10 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
     half, depth = max(1, how.direct_samples // 2), context.settings("light_map").max_depth
     sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
     if sorts_light(context.methods):
-        parts = len(traced.sorted_lights.groups)
+        parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
         beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, beside)
-        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=False), parts=parts)
+        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=True), parts=parts)
     scene = traced.whole(diffuse=False)
     sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
