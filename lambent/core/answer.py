@@ -6,7 +6,8 @@
 
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, E = D + B, a and t their diffuse albedos of
 reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is
-linear, so D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light,
+linear, so D, E and I have a leading axis of light groups, and so has F: light lies in other places within a patch for
+each. A ratio, and not a difference, is applied to the baked light,
 so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
 
 Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light within a patch: a ray that
@@ -45,8 +46,8 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (P, P) float32
-        F, rows by the patch that receives.
+    transfer : (G, P, P) float32
+        F by group, rows by the patch that receives; (P, P) is that of all groups.
     """
 
     material: NDArray[np.integer]
@@ -83,7 +84,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
     It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
     change would leave dark corners unsolved.
     """
-    groups, count, _ = patches.direct.shape
+    count = patches.direct.shape[1]
     reflected = albedos.reflected[patches.material].astype(np.float32)
     crossing = (patches.paired != np.arange(count))[:, None]
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
@@ -95,9 +96,9 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
         return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
-        sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)
-        arrived = (patches.transfer @ np.ascontiguousarray(sent)).reshape(count, groups, 3).transpose(1, 0, 2)
-        new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
+        new = np.maximum(
+            patches.direct + np.matmul(patches.transfer, exitance()), 0
+        )  # an equivalent albedo may be negative
         change = np.abs(new - light)
         light = new
         if (change <= tolerance * new + np.float32(1e-30)).all():
@@ -117,28 +118,32 @@ def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def packed_rays(patch: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (..., 3) bytes: the patch that each ends on, low byte first, and its weight (0 where it met none)."""
-    number = np.where(weight > 0, patch, 0).astype(np.uint16)
-    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), packed_weights(weight)], axis=-1)
+    """Rays (..., 2 + G) bytes: the patch that each ends on, low byte first, and its weights (G, ...) by group.
+
+    Weights are 0 where it met none.
+    """
+    number = np.where((weight > 0).any(axis=0), patch, 0).astype(np.uint16)
+    weights = (packed_weights(of_group) for of_group in weight)
+    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
 
 
 def gathered(rays: NDArray[np.uint8], exitance: Floats) -> NDArray[np.float32]:
-    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 3), from exitance (G, P, 3).
+    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 2 + G), from exitance (G, P, 3).
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
     table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8)) / rays.shape[1]
-    lights = np.ascontiguousarray(exitance, np.float32)
-    return np.stack([_gathered(np.ascontiguousarray(rays), table, of_group) for of_group in lights])
+    rays, lights = np.ascontiguousarray(rays), np.ascontiguousarray(exitance, np.float32)
+    return np.stack([_gathered(rays, table, of_group, 2 + group) for group, of_group in enumerate(lights)])
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def _gathered(rays, table, exitance):  # type: ignore[no-untyped-def]
+def _gathered(rays, table, exitance, byte):  # type: ignore[no-untyped-def]
     found = np.zeros((rays.shape[0], 3), np.float32)
     for k in numba.prange(rays.shape[0]):
         red = green = blue = np.float32(0)
         for r in range(rays.shape[1]):
-            weight = table[rays[k, r, 2]]
+            weight = table[rays[k, r, byte]]
             patch = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
             red += weight * exitance[patch, 0]
             green += weight * exitance[patch, 1]

@@ -7,8 +7,8 @@ answer/patch_paired        (P,) uint16, the patch on the other side; its own whe
 answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
                            light map; light that only lobes have sent on counts as direct
-answer/transfer            (P, P) float16, share of a patch's light by the patches that send it
-answer/rays                (K, R, 3) uint8, `core.answer.packed_rays` of the points that gather
+answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
+answer/rays                (K, R, 2 + G) uint8, `core.answer.packed_rays` of the points that gather
 answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
 answer/near                (T, 8) uint32, points near each, and
 answer/shares              (T, 8) uint8, what these count
@@ -122,7 +122,8 @@ def read_answer(store: Store) -> StoredAnswer:
         and paired.shape == material.shape
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
-        and transfer.shape == (count, count)
+        and transfer.shape == (count, len(direct) * count)
+        and rays.shape[2] == 2 + len(direct)
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
         and (not near.size or int(near.max()) < len(rays))
@@ -144,7 +145,8 @@ def read_answer(store: Store) -> StoredAnswer:
         )
         raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
                         hint=hint)  # fmt: skip
-    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
+    by_group = np.ascontiguousarray(transfer.reshape(count, groups, count).transpose(1, 0, 2), np.float32)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, by_group)
     albedos = albedos_of([record.materials[name] for name in names])
     answer = Answer(patches, rays, Neighbours(near, shares), np.minimum(directs, baked), baked, albedos)
     number = _numbers(texels, height * width)

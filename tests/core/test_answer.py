@@ -25,8 +25,8 @@ from lambent.core.answer import (
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
     rng = np.random.default_rng(3)
-    transfer = rng.random((count, count)) ** 4
-    transfer /= transfer.sum(axis=1, keepdims=True)  # a closed room
+    transfer = rng.random((groups, count, count)) ** 4
+    transfer /= transfer.sum(axis=2, keepdims=True)  # a closed room
     other = np.arange(count)
     if paired:
         other[:10] = np.roll(np.arange(10), 5)
@@ -49,7 +49,7 @@ def test_the_solution_is_that_of_the_linear_system(paired: bool) -> None:
             across = np.eye(30)[room.paired] * (room.paired != np.arange(30))[:, None]
             sends = np.diag(colours.reflected[room.material, channel])
             sends = sends + np.diag(colours.transmitted[room.material, channel]) @ across
-            light = np.linalg.solve(np.eye(30) - room.transfer @ sends, room.direct[group, :, channel])
+            light = np.linalg.solve(np.eye(30) - room.transfer[group] @ sends, room.direct[group, :, channel])
             assert np.allclose(found.exitance[group, :, channel], sends @ light, rtol=2e-4)
 
 
@@ -78,10 +78,10 @@ def test_weights_keep_their_relative_size_in_a_byte() -> None:
 
 def test_gathering_sums_what_rays_end_on() -> None:
     rng = np.random.default_rng(0)
-    patch, weight = rng.integers(0, 700, (5, 64)), rng.random((5, 64)) * 2
-    weight[:, ::7] = 0
+    patch, weight = rng.integers(0, 700, (5, 64)), rng.random((2, 5, 64)) * 2
+    weight[:, :, ::7] = 0
     light = rng.random((2, 700, 3)).astype(np.float32)
-    expected = (weight[None, ..., None] * light[:, patch]).mean(axis=2)
+    expected = (weight[..., None] * light[:, patch]).mean(axis=2)
     assert np.allclose(gathered(packed_rays(patch, weight), light), expected, rtol=0.01)
 
 
@@ -105,7 +105,7 @@ def test_direct_light_stays_and_so_does_what_was_not_gathered() -> None:
 
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
-    rays = packed_rays(rng.integers(0, 30, (9, 32)), np.ones((9, 32)))
+    rays = packed_rays(rng.integers(0, 30, (9, 32)), np.ones((1, 9, 32)))
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))
     baked = (1 + rng.random((1, 50, 3))).astype(np.float32)
     return Answer(room, rays, near, 0.3 * baked, baked, albedos())

@@ -27,40 +27,44 @@ class Between:
         self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
         width, height = sides[0].texels.width, sides[0].texels.height
         self._patch = np.full(width * height * 2, -1)
-        self._shape = np.zeros(width * height * 2, np.float32)
-        patch_light = patch_means(spots, clusters, exitance[..., None])[:, 0]
+        self._shape = np.zeros((len(exitance), width * height * 2), np.float32)
         for side in range(2):
-            of = clusters.of[side]
-            there = of >= 0
-            mean = patch_light[of]
-            bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
-            relative = np.divide(exitance[side], mean, out=there.astype(float), where=bright)
-            relative = np.minimum(relative, np.where(spots.lit[side], MOST_RELATIVE, MOST_UNLIT))
-            self._patch[spots.index * 2 + side], self._shape[spots.index * 2 + side] = of, relative
+            self._patch[spots.index * 2 + side] = clusters.of[side]
+        for shape, of_group in zip(self._shape, exitance, strict=True):
+            patch_light = patch_means(spots, clusters, of_group[..., None])[:, 0]
+            for side in range(2):
+                of = clusters.of[side]
+                there = of >= 0
+                mean = patch_light[of]
+                bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
+                relative = np.divide(of_group[side], mean, out=there.astype(float), where=bright)
+                relative = np.minimum(relative, np.where(spots.lit[side], MOST_RELATIVE, MOST_UNLIT))
+                shape[spots.index * 2 + side] = relative
 
     def patches_met(self, side: int, mine: Indices, count: int, seed: int) -> tuple[Indices, Floats]:
-        """Patches (n, count) that rays from texels `mine` (n,) of a side end on, -1 for none, and their weights.
+        """Patches (n, count) that rays from texels `mine` (n,) of a side end on, -1 for none; weights (G, n, count).
 
-        A weight is that of the patch's mean exitance: the light within a patch is in it.
+        A weight is that of the patch's mean exitance by a group: the light within a patch is in it.
         """
         spot, weight = self._ends.from_texels(self._sides[side], mine, count, seed)
         at = np.where(spot == NOWHERE, 0, spot).astype(np.int64)
         patch = np.where(spot == NOWHERE, -1, self._patch[at])
-        return patch, np.where(patch >= 0, weight * self._shape[at], 0.0)
+        return patch, np.where(patch >= 0, weight * self._shape[:, at], 0.0)
 
     def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
-        """Rows [first, last) of F (., P): means over `rays` from each patch, spread over its texels by area."""
-        rows = np.zeros((last - first, self._clusters.count), np.float32)
+        """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
+        rows = np.zeros((last - first, len(self._shape), self._clusters.count), np.float32)
         for side in range(2):
             texel, patch = self._drawn(side, first, last, rays, seed)
             if not len(texel):
                 continue
             met, weight = self.patches_met(side, texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
             known = met >= 0
-            place = ((patch - first)[:, None] * rows.shape[1] + met)[known]
-            sums = np.bincount(place, weight[known], rows.size).reshape(rows.shape)
-            drawn = np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
-            rows += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
+            count, drawn = rows.shape[2], np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
+            place = ((patch - first)[:, None] * count + met)[known]
+            for group, of_group in enumerate(weight):
+                sums = np.bincount(place, of_group[known], len(rows) * count).reshape(-1, count)
+                rows[:, group] += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
         return rows
 
     def _drawn(self, side: int, first: int, last: int, rays: int, seed: int) -> tuple[Indices, Indices]:
@@ -79,8 +83,8 @@ class Between:
         return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
 
     def gathered_rays(self, side: NDArray[np.integer], texel: Indices, count: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, count, 3) from points: their sides and texels (n,)."""
-        found = np.zeros((len(texel), count, 3), np.uint8)
+        """`packed_rays` (n, count, 2 + G) from points: their sides and texels (n,)."""
+        found = np.zeros((len(texel), count, 2 + len(self._shape)), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 1
+REVISION = 2
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -127,7 +127,7 @@ def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indi
     assert lit is not None, "two-sided scenes have both maps"
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
     whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
-    by_lobes = np.maximum(whole - straight, 0)
+    by_lobes = np.clip(whole - straight, 0, lit.astype(np.float32))
     sent = np.stack([shared_by_charts(one, known, light, labels) for one, light in zip(by_lobes, lit, strict=True)])
     straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
     return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
@@ -164,8 +164,10 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
 def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
     from lambent.bake.answering.spots import spots_of
 
-    maps = [light for light in finished_maps(context) if light is not None]
-    of_sun = context.traced.sorted_lights.sun if sorts_light(context.methods) else 0
+    by_group = sorts_light(context.methods)
+    maps = [one for one in (finished_groups if by_group else finished_maps)(context) if one is not None]
+    maps = maps if by_group else [one[None] for one in maps]
+    of_sun = context.traced.sorted_lights.sun if by_group else 0
     return spots_of(context.traced, maps, directs, of_sun)
 
 
@@ -208,14 +210,16 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     points = gather_points(spots, width, how.block)
 
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
-        return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
+        found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
+        return found.astype(np.float16).reshape(len(found), -1)
 
     def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
         return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
-    arrays = (("transfer", (count, count), "float16", rows, "light between patches"),
-              ("rays", (len(points.texel), how.gather_rays, 3), "uint8", rays, "gathering"))  # fmt: skip
+    groups = len(spots.irradiance)
+    arrays = (("transfer", (count, groups * count), "float16", rows, "light between patches"),
+              ("rays", (len(points.texel), how.gather_rays, 2 + groups), "uint8", rays, "gathering"))  # fmt: skip
     for part, shape, dtype, tile, what in arrays:
         chunk = (max(1, -(-shape[0] // TILES)), *shape[1:])
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
