@@ -8,8 +8,9 @@
 B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
 transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
 last PASSES are gathered among some thirty times as many points, each with its own direct light. Light is linear, so D,
-E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light, so that it
-keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+E and I have a leading axis of light groups, and so has F: each group's light lies elsewhere within a patch. A ratio,
+and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
+as baked the ratio is 1 and nothing changes.
 
 Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light around a point: a ray that
 ends where it is twice as bright as at the point counts twice.
@@ -27,8 +28,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 
 BYTE = 255
-STEPS = 127  # of a ray's weight: 7 bits beside the 17 of its point's number
-MOST_POINTS = 1 << 17
+MOST_POINTS = 1 << 16
 PASSES = 2
 MOST_WEIGHT = 16.0  # of a ray
 TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
@@ -51,8 +51,8 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (P, P) float32
-        F, rows by the patch that receives.
+    transfer : (G, P, P) float32
+        F by group, rows by the patch that receives; (P, P) is that of all groups.
     """
 
     material: NDArray[np.integer]
@@ -89,7 +89,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
     It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
     change would leave dark corners unsolved.
     """
-    groups, count, _ = patches.direct.shape
+    count = patches.direct.shape[1]
     reflected = albedos.reflected[patches.material].astype(np.float32)
     crossing = (patches.paired != np.arange(count))[:, None]
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
@@ -101,8 +101,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
         return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
-        sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)
-        arrived = (patches.transfer @ np.ascontiguousarray(sent)).reshape(count, groups, 3).transpose(1, 0, 2)
+        arrived = np.matmul(patches.transfer, exitance())
         new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
         change = np.abs(new - light)
         light = new
@@ -143,50 +142,49 @@ class Points:
 
 
 def packed_weights(weights: Floats) -> NDArray[np.uint8]:
-    """Weights of rays in STEPS, by their roots: steps are fine where weights are small."""
+    """Weights of rays as bytes, by their roots: steps are fine where weights are small."""
     root = np.sqrt(np.clip(weights, 0, MOST_WEIGHT) / MOST_WEIGHT)
-    return np.asarray(root * STEPS + 0.5, np.uint8)
+    return np.asarray(root * BYTE + 0.5, np.uint8)
 
 
 def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """The weights that packed ones stand for."""
-    return np.asarray((packed.astype(np.float32) / STEPS) ** 2 * MOST_WEIGHT, np.float32)
+    """The weights that bytes stand for."""
+    return np.asarray((packed.astype(np.float32) / BYTE) ** 2 * MOST_WEIGHT, np.float32)
 
 
 def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (..., 3) bytes: number of the point near which each ends, low bits first, then its weight in 7 bits.
+    """Rays (..., 2 + G) bytes: the point near which each ends, low byte first, and its weights (G, ...) by group.
 
-    The weight is 0 where a ray met none. Points are below MOST_POINTS.
+    Weights are 0 where it met none. Points are below MOST_POINTS.
     """
-    number = np.where(weight > 0, point, 0).astype(np.uint32) | packed_weights(weight).astype(np.uint32) << 17
-    return np.stack([(number >> bits & BYTE).astype(np.uint8) for bits in (0, 8, 16)], axis=-1)
+    number = np.where((weight > 0).any(axis=0), point, 0).astype(np.uint16)
+    weights = (packed_weights(of_group) for of_group in weight)
+    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
 
 
-def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint32]:
+def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """Numbers (...) of the points near which `packed_rays` end."""
-    low, middle, high = (rays[..., byte].astype(np.uint32) for byte in range(3))
-    return np.asarray(low | middle << 8 | (high & 1) << 16)
+    return np.asarray(rays[..., 0] | rays[..., 1].astype(np.uint16) << 8, np.uint16)
 
 
 def gathered(rays: NDArray[np.uint8], exitance: Floats) -> NDArray[np.float32]:
-    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 3), from exitance (G, K, 3).
+    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 2 + G), from exitance (G, K, 3).
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
-    table = unpacked_weights(np.arange(STEPS + 1, dtype=np.uint8)) / rays.shape[1]
-    lights = np.ascontiguousarray(exitance, np.float32)
-    return np.stack([_gathered(np.ascontiguousarray(rays), table, of_group) for of_group in lights])
+    table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8)) / rays.shape[1]
+    rays, lights = np.ascontiguousarray(rays), np.ascontiguousarray(exitance, np.float32)
+    return np.stack([_gathered(rays, table, of_group, 2 + group) for group, of_group in enumerate(lights)])
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def _gathered(rays, table, exitance):  # type: ignore[no-untyped-def]
+def _gathered(rays, table, exitance, byte):  # type: ignore[no-untyped-def]
     found = np.zeros((rays.shape[0], 3), np.float32)
     for k in numba.prange(rays.shape[0]):
         red = green = blue = np.float32(0)
         for r in range(rays.shape[1]):
-            high = rays[k, r, 2]
-            weight = table[high >> 1]
-            point = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8) | ((np.int64(high) & 1) << 16)
+            weight = table[rays[k, r, byte]]
+            point = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
             red += weight * exitance[point, 0]
             green += weight * exitance[point, 1]
             blue += weight * exitance[point, 2]
@@ -244,7 +242,7 @@ class Answer:
     ----------
     points : Points
         That send and gather light.
-    rays : (K, R, 3) uint8
+    rays : (K, R, 2 + G) uint8
         Their `packed_rays`.
     near : Neighbours
         Of the T texels.

@@ -7,8 +7,8 @@ answer/patch_paired        (P,) uint16, the patch on the other side; its own whe
 answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
                            light map; light that only lobes have sent on counts as direct
-answer/transfer            (P, P) float16, share of a patch's light by the patches that send it
-answer/rays                (K, R, 3) uint8, `core.answer.packed_rays` of the points that gather
+answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
+answer/rays                (K, R, 2 + G) uint8, `core.answer.packed_rays` of the points that send and gather light
 answer/points              (K,) uint32, the texel and side of each, as below
 answer/point_sun           (K, 3) float32, direct irradiance of the sun there, W/m^2
 answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
@@ -18,7 +18,7 @@ answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe se
 answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
 answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
 answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
-                           traced_by_group, traced_back_by_group (1, H, W, 3 G), where light is sorted
+                           traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
 
 G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
 """
@@ -125,7 +125,8 @@ def read_answer(store: Store) -> StoredAnswer:
         and paired.shape == material.shape
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
-        and transfer.shape == (count, count)
+        and transfer.shape == (count, len(direct) * count)
+        and rays.shape[2] == 2 + len(direct)
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
         and (not near.size or int(near.max()) < len(rays))
@@ -150,7 +151,8 @@ def read_answer(store: Store) -> StoredAnswer:
         )
         raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
                         hint=hint)  # fmt: skip
-    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
+    by_group = np.ascontiguousarray(transfer.reshape(count, groups, count).transpose(1, 0, 2), np.float32)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, by_group)
     albedos = albedos_of([record.materials[name] for name in names])
     number = _numbers(texels, height * width)
     flat = patch.reshape(2, -1)
@@ -161,12 +163,12 @@ def read_answer(store: Store) -> StoredAnswer:
     directs, at = np.minimum(directs, baked), number[points]
     with_sun = np.zeros((groups, len(points), 3), np.float32)
     with_sun[of_sun] = point_sun
-    near_points = Neighbours(near, shares)
+    nearest = Neighbours(near, shares)
     senders = Points(
-        of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], near_points),
+        of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], nearest),
         directs[:, at] + with_sun, baked[:, at] + with_sun,
     )  # fmt: skip
-    answer = Answer(patches, senders, rays, near_points, directs, baked, albedos)
+    answer = Answer(patches, senders, rays, nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
         np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
@@ -174,7 +176,7 @@ def read_answer(store: Store) -> StoredAnswer:
 
 
 def _on_other_sides(row: NDArray[np.int64], near: Neighbours) -> NDArray[np.int64]:
-    """(K,) the point that counts most for the other side of each one's texel, the row (K,); its own where that is -1."""
+    """(K,) the point that counts most for the other side of a point's texel, `row` (K,); its own where that is -1."""
     most = near.shares.argmax(axis=1)[:, None]
     found = np.take_along_axis(near.points, most, axis=1)[:, 0].astype(np.int64)
     return np.asarray(np.where(row >= 0, found[row], np.arange(len(row))))

@@ -28,8 +28,8 @@ from lambent.core.answer import (
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
     rng = np.random.default_rng(3)
-    transfer = rng.random((count, count)) ** 4
-    transfer /= transfer.sum(axis=1, keepdims=True)  # a closed room
+    transfer = rng.random((groups, count, count)) ** 4
+    transfer /= transfer.sum(axis=2, keepdims=True)  # a closed room
     other = np.arange(count)
     if paired:
         other[:10] = np.roll(np.arange(10), 5)
@@ -52,7 +52,7 @@ def test_the_solution_is_that_of_the_linear_system(paired: bool) -> None:
             across = np.eye(30)[room.paired] * (room.paired != np.arange(30))[:, None]
             sends = np.diag(colours.reflected[room.material, channel])
             sends = sends + np.diag(colours.transmitted[room.material, channel]) @ across
-            light = np.linalg.solve(np.eye(30) - room.transfer @ sends, room.direct[group, :, channel])
+            light = np.linalg.solve(np.eye(30) - room.transfer[group] @ sends, room.direct[group, :, channel])
             assert np.allclose(found.irradiance[group, :, channel], light, rtol=2e-4)
 
 
@@ -73,21 +73,21 @@ def test_a_solution_that_does_not_come_to_an_end_says_so() -> None:
     assert not solved(room, Albedos(np.full((1, 3), 1.0), np.zeros((1, 3)))).converged
 
 
-def test_weights_keep_their_relative_size_in_seven_bits() -> None:
+def test_weights_keep_their_relative_size_in_a_byte() -> None:
     weights = np.geomspace(0.1, MOST_WEIGHT, 200)
-    assert np.allclose(unpacked_weights(packed_weights(weights)), weights, rtol=0.12)
+    assert np.allclose(unpacked_weights(packed_weights(weights)), weights, rtol=0.06)
     assert unpacked_weights(packed_weights(np.array([0.0, 99.0]))).tolist() == [0.0, MOST_WEIGHT]
 
 
 def test_gathering_sums_what_rays_end_on() -> None:
     rng = np.random.default_rng(0)
-    point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((5, 64)) * 2
-    weight[:, ::7] = 0
+    point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((2, 5, 64)) * 2
+    weight[:, :, ::7] = 0
     rays = packed_rays(point, weight)
-    assert np.array_equal(points_of_rays(rays), np.where(weight > 0, point, 0))
+    assert np.array_equal(points_of_rays(rays), np.where(weight[0] > 0, point, 0))
     light = rng.random((2, MOST_POINTS, 3)).astype(np.float32)
-    expected = (weight[None, ..., None] * light[:, point]).mean(axis=2)
-    assert np.allclose(gathered(rays, light), expected, rtol=0.02)
+    expected = (weight[..., None] * light[:, point]).mean(axis=2)
+    assert np.allclose(gathered(rays, light), expected, rtol=0.01)
 
 
 def test_points_send_the_light_of_both_their_sides() -> None:
@@ -102,7 +102,7 @@ def test_points_send_the_light_of_both_their_sides() -> None:
 
 def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
     """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
-    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((2, 16)))
+    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((1, 2, 16)))
     room = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
     points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
     near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
@@ -133,7 +133,7 @@ def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> Non
 
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
-    rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((9, 32)))
+    rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((1, 9, 32)))
     light = (1 + rng.random((1, 9, 3))).astype(np.float32)
     points = Points(rng.integers(0, 30, 9), rng.integers(0, 4, 9), np.arange(9), 0.3 * light, light)
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))

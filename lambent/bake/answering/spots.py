@@ -34,10 +34,8 @@ class Spots:
         Whether light was sampled there, on the normal's side and on the other.
     there : (2, K) bool
         Whether there is a light map.
-    irradiance : (2, K, 3) float32
-        All light, W/m^2, the sun's included.
-    direct : (G, 2, K, 3) float32
-        Direct light by group, the sun's included.
+    irradiance, direct : (G, 2, K, 3) float32
+        All light and direct light by group, W/m^2, the sun's included in both.
     sun : (2, K, 3) float32
         Direct irradiance of the sun, W/m^2.
     area : (K,) m^2, about.
@@ -59,13 +57,21 @@ class Spots:
     normal: Floats
     index: Indices
 
+    @property
+    def light(self) -> NDArray[np.float32]:
+        """(2, K, 3) irradiance by all groups."""
+        return np.asarray(self.irradiance.sum(axis=0))
+
     def exitance(self, scene: Scene) -> Floats:
-        """(2, K) luminance of what each side sends out, but for its texture, by which texels of a patch are weighed."""
+        """(G, 2, K) luminance of what each side sends out by each group, but for its texture.
+
+        Texels of a patch are weighed by it.
+        """
         materials = list(scene.materials.values())
         reflected = np.array([float(luminance(np.array(m.kd))) for m in materials])[self.material] + LEAST
         transmitted = np.array([float(luminance(np.array(m.kt_d))) for m in materials])[self.material]
         light = luminance(self.irradiance)
-        return np.asarray(reflected * light + transmitted * light[::-1])
+        return np.asarray(reflected * light + transmitted * light[:, ::-1])
 
 
 def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_sun: int | None) -> Spots:
@@ -74,7 +80,7 @@ def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_
     Parameters
     ----------
     maps, directs
-        By side, one or both: all light (H, W, 3), and direct light (G, H, W, 3) by group.
+        By side, one or both: all light and direct light (G, H, W, 3) by group.
     of_sun : int, optional
         The sun's group; None where there is no sun.
     """
@@ -85,15 +91,16 @@ def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_
     material = np.array([names.index(o.material) for o in scene.objects])[object_of]
     count = len(texels.index)
     lit, there = np.zeros((2, count), bool), np.zeros((2, count), bool)
-    light, direct = np.zeros((2, count, 3), np.float32), np.zeros((len(directs[0]), 2, count, 3), np.float32)
+    light, direct = np.zeros((2, len(directs[0]), 2, count, 3), np.float32)
     sun = sun_at(traced)
     for side, (of_map, of_direct) in enumerate(zip(maps, directs, strict=True)):
         lit[side] = traced.in_view((1.0, -1.0)[side])[0].valid.any(axis=1)
         there[side] = np.ones(count, bool) if side == 0 else traced.crossed[texels.face[:, 0]]
-        light[side] = of_map.reshape(-1, 3)[texels.index].astype(np.float32) + sun[side]
+        light[:, side] = of_map.reshape(len(of_map), -1, 3)[:, texels.index]
         direct[:, side] = of_direct.reshape(len(of_direct), -1, 3)[:, texels.index]
     if of_sun is not None:
-        direct[of_sun, :, :] += sun
+        light[of_sun] += sun
+        direct[of_sun] += sun
     light *= there[..., None]
     direct *= there[..., None]
     return Spots(

@@ -16,9 +16,10 @@ from lambent.bake.keys import key_of
 from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
-from lambent.store.contract import probe_name, shared_probes
+from lambent.store.contract import SIDES, probe_name, shared_probes
+from lambent.store.light_groups import group_name
 from lambent.store.store import Writer
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 2
+REVISION = 3
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
@@ -108,15 +109,28 @@ def _direct(context: BakeContext, side: int) -> Floats:
         return np.asarray(context.store.read(MAPS[side]))
     labels = _sampled_direct(context, side)
     halves, known = sampled_halves(context.store.read(TRACED[side]))
-    samples, lit = halves.mean(axis=0)[None], finished_maps(context)[side]
-    if sorts_light(context.methods):
-        parts = context.store.read(_by_group(TRACED[side]))[0]
-        samples, lit = np.moveaxis(parts.reshape(*known.shape, -1, 3), 2, 0), finished_groups(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
-    by_group = zip(samples, lit.reshape(len(samples), *known.shape, 3), strict=True)
-    direct = np.stack([cleaned_direct(sampled, known, light, labels) for sampled, light in by_group])
+    if not sorts_light(context.methods):
+        lit = finished_maps(context)[side]
+        assert lit is not None, "two-sided scenes have both maps"
+        direct = cleaned_direct(halves.mean(axis=0), known, lit, labels)[None]
+    else:
+        direct = _direct_by_group(context, side, known, labels)
     context.put(KIND, MAPS[side], direct, context.provenance())
     return direct
+
+
+def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indices) -> NDArray[np.float16]:
+    """The same where light is sorted: the light map's own direct light, denoised, and what lobes alone have sent on."""
+    from lambent.bake.answering.direct import cleaned_direct
+
+    lit = finished_groups(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
+    whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
+    by_lobes = np.clip(whole - straight, 0, lit.astype(np.float32))
+    sent = np.stack([cleaned_direct(one, known, light, labels) for one, light in zip(by_lobes, lit, strict=True)])
+    straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
+    return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
 
 
 def _sampled_direct(context: BakeContext, side: int) -> Indices:
@@ -132,10 +146,10 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
     half, depth = max(1, how.direct_samples // 2), context.settings("light_map").max_depth
     sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
     if sorts_light(context.methods):
-        parts = len(traced.sorted_lights.groups)
+        parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
         beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, beside)
-        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=False), parts=parts)
+        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=True), parts=parts)
     scene = traced.whole(diffuse=False)
     sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
@@ -150,8 +164,10 @@ def _sampled_direct(context: BakeContext, side: int) -> Indices:
 def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
     from lambent.bake.answering.spots import spots_of
 
-    maps = [light for light in finished_maps(context) if light is not None]
-    of_sun = context.traced.sorted_lights.sun if sorts_light(context.methods) else 0
+    by_group = sorts_light(context.methods)
+    maps = [one for one in (finished_groups if by_group else finished_maps)(context) if one is not None]
+    maps = maps if by_group else [one[None] for one in maps]
+    of_sun = context.traced.sorted_lights.sun if by_group else 0
     return spots_of(context.traced, maps, directs, of_sun)
 
 
@@ -197,14 +213,16 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
 
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
-        return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
+        found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
+        return found.astype(np.float16).reshape(len(found), -1)
 
     def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
         return between.gathered_rays(region[0], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
-    arrays = (("transfer", (count, count), "float16", rows, "light between patches"),
-              ("rays", (len(points.texel), how.gather_rays, 3), "uint8", rays, "gathering"))  # fmt: skip
+    groups = len(spots.irradiance)
+    arrays = (("transfer", (count, groups * count), "float16", rows, "light between patches"),
+              ("rays", (len(points.texel), how.gather_rays, 2 + groups), "uint8", rays, "gathering"))  # fmt: skip
     for part, shape, dtype, tile, what in arrays:
         chunk = (max(1, -(-shape[0] // TILES)), *shape[1:])
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
