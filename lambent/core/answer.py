@@ -24,6 +24,7 @@ from functools import cached_property
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from lambent.core.arrays import Floats
 
@@ -59,6 +60,14 @@ class Patches:
     paired: NDArray[np.integer]
     direct: NDArray[np.float32]
     transfer: NDArray[np.float32]
+
+    @cached_property
+    def rows(self) -> list[csr_matrix]:
+        """F of each group, sparse: four of five entries are 0, and BLAS is slow on products with three columns."""
+        return [
+            csr_matrix(of_group)
+            for of_group in np.broadcast_to(self.transfer, (len(self.direct), *self.transfer.shape[-2:]))
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +110,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
         return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
-        arrived = np.matmul(patches.transfer, exitance())
+        arrived = np.stack([rows @ sent for rows, sent in zip(patches.rows, exitance(), strict=True)])
         new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
         change = np.abs(new - light)
         light = new
@@ -134,7 +143,7 @@ class Points:
         """Exitance (G, K, 3), W/m^2, where indirect light is `ratio` (G, K, 3) times as baked."""
         now = self.direct + (self.light - self.direct) * ratio
         found = now * albedos.reflected[self.material].astype(np.float32)
-        passes = albedos.transmitted.any(axis=1)[self.material]
+        passes = np.asarray(albedos.transmitted.any(axis=1))[self.material]
         crossed = np.flatnonzero((self.other != np.arange(len(self.other))) & passes)
         passed = albedos.transmitted[self.material[crossed]].astype(np.float32)
         found[:, crossed] += now[:, self.other[crossed]] * passed

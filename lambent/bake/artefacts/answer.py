@@ -112,7 +112,7 @@ def _direct(context: BakeContext, side: int) -> Floats:
     if not sorts_light(context.methods):
         lit = finished_maps(context)[side]
         assert lit is not None, "two-sided scenes have both maps"
-        direct = cleaned_direct(halves.mean(axis=0), known, lit, labels)[None]
+        direct = cleaned_direct(halves, known, lit, labels)[None]
     else:
         direct = _direct_by_group(context, side, known, labels)
     context.put(KIND, MAPS[side], direct, context.provenance())
@@ -128,7 +128,9 @@ def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indi
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
     whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
     by_lobes = np.clip(whole - straight, 0, lit.astype(np.float32))
-    sent = np.stack([cleaned_direct(one, known, light, labels) for one, light in zip(by_lobes, lit, strict=True)])
+    sent = np.stack(
+        [cleaned_direct(np.stack([one, one]), known, light, labels) for one, light in zip(by_lobes, lit, strict=True)]
+    )
     straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
     return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
 
