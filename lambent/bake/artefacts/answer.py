@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 3
+REVISION = 4
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
