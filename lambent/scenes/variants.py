@@ -83,6 +83,12 @@ def looks_as_loaded(materials: Mapping[str, Material], textured: Collection[str]
     return {name: Look(material, name if name in textured else "") for name, material in materials.items()}
 
 
+def documents_of(scene: Scene, material: str) -> list[Material]:
+    """A material of the scene as it is loaded, and as each variant shows it."""
+    shown = (variant.looks.get(material) for variant in scene.variants)
+    return [scene.materials[material], *(look.material for look in shown if look is not None)]
+
+
 def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) -> Variant:
     """The variant of this name; a `UserError` that lists all of them where there is none."""
     found = {variant.name: variant for variant in variants}
