@@ -46,6 +46,8 @@ def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
     whole = replace(
         scene, objects=tuple(objects), materials={**scene.materials, **renamed},
         textures=_copied(scene.textures, copies), measured=_copied(scene.measured, copies),
+        warnings=(*scene.warnings, *(f"material {of}: variants part its objects, others are of {own}" for own, of in
+                                     copies.items())),
     )  # fmt: skip
     return replace(whole, variants=tuple(Variant(one.name, _changed(whole, one), one.light) for one in told))
 
