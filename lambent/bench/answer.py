@@ -4,9 +4,10 @@ Rows are scene x edit. Errors are those at texels that viewers see, drawn at ran
 `rms` and `mean_error` over the mean of the truth, `relative_rms` and `p95_contacts` texel by texel (over at least
 LEAST of that mean). The truth has the direct sun, which texels show beside the light map and no edit changes. The light
 that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone:
-`shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. `rms` and `relative_rms`
-are roots of mean products of the errors in two independent halves of the paths, which noise (`noise`, of one whole)
-does not enter. `naive` is the light as it was baked.
+`shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
+group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
+errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
+as it was baked.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
 Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
@@ -116,6 +117,7 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
         "bytes": sum(int(np.prod(a.shape)) * np.dtype(a.dtype).itemsize for a in arrays),
         "patches": len(stored.answer.patches.material),
         "texels": len(truth.at),
+        "groups": len(stored.answer.baked),
     }
     rows = []
     for number, (name, edit) in enumerate(edits.items()):
@@ -184,9 +186,9 @@ class Truth:
         computed = upsampled(answer.indirect(albedos), answer.near)
         after, before = self._traced(edited), self._before
         direct = np.minimum(self._direct, before.mean(axis=0))
-        gathered_light = [light[:, self.at].sum(axis=0)[None] for light in (computed, self._reference)]
-        map_before = answer.baked[:, self.at].sum(axis=0)
-        map_after = answered(self._direct[None], map_before[None], *gathered_light)[0]
+        by_group = [light[:, self.at] for light in (answer.direct, answer.baked, computed, self._reference)]
+        map_before, map_after = by_group[1].sum(axis=0), answered(*by_group).sum(axis=0)
+        gathered_light = [light.sum(axis=0)[None] for light in by_group[2:]]
         ours = (
             answered(direct[None], half[None], *gathered_light)[0] - true
             for half, true in zip(before, after, strict=True)

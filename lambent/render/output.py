@@ -17,7 +17,7 @@ from lambent.core.errors import UserError, did_you_mean
 from lambent.core.exposure import ev100_of
 from lambent.core.film import FILM, SEQUENCES, even_size, pictures_writer, radiance_wanted
 from lambent.core.images import WRITABLE, check_writable, write_image, write_shown
-from lambent.core.light_mix import MixTrack
+from lambent.core.light_mix import LightMix, MixTrack
 from lambent.core.progress import Progress, silent, tracked
 from lambent.core.projections import Projection
 from lambent.render.images import PATH_TRACER, Images, Settings
@@ -95,8 +95,8 @@ def still(
     check_writable(file, WRITABLE)
     opened, record = opened_with_views(store)
     view = view_of(record, camera)
-    settings = _with_mix_of_variant(settings, opened, note)
-    if camera is not None and settings.light is None and (mix := read_views(opened.folder).lights.get(view.name)):
+    says_mix = settings.light is not None or _mix_of_variant(settings, record).groups
+    if camera is not None and not says_mix and (mix := read_views(opened.folder).lights.get(view.name)):
         settings = _lit(settings, opened, MixTrack.of(mix), "saved with the view", note)
     drawn = images(opened, settings, scene=scene, note=note)
     write_still(drawn, file, view, progress)
@@ -172,8 +172,8 @@ def film(
     chosen = path if isinstance(path, CameraPath) else _named("path", record.paths, path)
     if keyframes is not None:
         settings = _with_keyframes(settings, opened, record, keyframes)
-    settings = _with_mix_of_variant(settings, opened, note)
-    if settings.light is None and (track := read_views(opened.folder).tracks.get(chosen.name)):
+    says_mix = settings.light is not None or _mix_of_variant(settings, record).groups
+    if not says_mix and (track := read_views(opened.folder).tracks.get(chosen.name)):
         settings = _lit(settings, opened, track, "saved with the walk", note)
     if file.suffix.lower() == FILM:
         width, height = even_size(settings.width, settings.height)
@@ -211,7 +211,10 @@ def images(
     store: Store, settings: Settings = DEFAULT, *, moving: bool = False, scene: str | None = None, note: Note = ignore
 ) -> Images:
     """Renderer of a store's images as arrays; `moving` for those of a film, the other parameters as of `still`."""
-    settings = _with_mix_of_variant(exposed(settings, store), store, note)
+    settings = exposed(settings, store)
+    mix = _mix_of_variant(settings, scene_record(store))
+    if settings.light is None and mix.groups and settings.integrator != PATH_TRACER:
+        settings = _lit(settings, store, MixTrack.of(mix), "of the variant", note)
     if settings.projection is not Projection.perspective:
         return Projected(images(store, faces_settings(settings), moving=moving, scene=scene, note=note), settings)
     if settings.integrator == PATH_TRACER:
@@ -234,12 +237,9 @@ def _with_keyframes(settings: Settings, store: Store, record: SceneRecord, file:
     return replace(settings, looks=found.looks, light=found.light)
 
 
-def _with_mix_of_variant(settings: Settings, store: Store, note: Note) -> Settings:
-    """Settings with the mix of their variant, if it has one and they have none."""
-    if not settings.variant or settings.light is not None or settings.integrator == PATH_TRACER:
-        return settings
-    mix = variant_named(scene_record(store).variants, settings.variant).light
-    return _lit(settings, store, MixTrack.of(mix), "of the variant", note) if mix.groups else settings
+def _mix_of_variant(settings: Settings, record: SceneRecord) -> LightMix:
+    """The mix of the light that the settings' variant has."""
+    return variant_named(record.variants, settings.variant).light if settings.variant else LightMix()
 
 
 def _lit(settings: Settings, store: Store, light: MixTrack, whose: str, note: Note) -> Settings:

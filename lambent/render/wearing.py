@@ -69,9 +69,11 @@ class Wearing:
         self._once(ESTIMATED if self.answers else f"light and probes stay as baked: {NO_ANSWER}")
         if scene.light_fields:
             self._once(FIELDS_STAY)
+        shared, has_probe = scene.shared_probes, {o.material for o in scene.record.objects if o.name in scene.probes}
+        has_probe |= {o.material for o in scene.record.objects if shared.get(o.name) in scene.probes}
         for name, material in materials.items():
             given = scene.record.materials[name]
-            if needs_probe(material) and not needs_probe(given):
+            if needs_probe(material) and not needs_probe(given) and name not in has_probe:
                 self._once(f"{name} was matte in the bake: what it mirrors now is from the nearest probe")
             if material.transmits and not given.transmits and scene.irradiance_back is None:
                 self._once(f"{name} let no light through in the bake: its far side stays dark")

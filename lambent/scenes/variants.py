@@ -46,6 +46,8 @@ def with_variants(scene: Scene, told: Sequence[Dressed]) -> Scene:
     whole = replace(
         scene, objects=tuple(objects), materials={**scene.materials, **renamed},
         textures=_copied(scene.textures, copies), measured=_copied(scene.measured, copies),
+        warnings=(*scene.warnings, *(f"material {of}: variants part its objects, others are of {own}" for own, of in
+                                     copies.items())),
     )  # fmt: skip
     return replace(whole, variants=tuple(Variant(one.name, _changed(whole, one), one.light) for one in told))
 
@@ -81,6 +83,12 @@ def _changed(scene: Scene, one: Dressed) -> dict[str, Look]:
 def looks_as_loaded(materials: Mapping[str, Material], textured: Collection[str]) -> dict[str, Look]:
     """How materials look as they are loaded; `textured` are the names of those with textures."""
     return {name: Look(material, name if name in textured else "") for name, material in materials.items()}
+
+
+def documents_of(scene: Scene, material: str) -> list[Material]:
+    """A material of the scene as it is loaded, and as each variant shows it."""
+    shown = (variant.looks.get(material) for variant in scene.variants)
+    return [scene.materials[material], *(look.material for look in shown if look is not None)]
 
 
 def variant_named(variants: Iterable[Variant], name: str, field: str = FIELD) -> Variant:

@@ -71,6 +71,7 @@ def test_objects_of_one_material_that_part_ways_get_materials_of_their_own(tmp_p
     assert sphere not in others and {sphere, *others} == {"white", "white_2"}
     assert scene.materials["white_2"].model_copy(update={"name": "white"}) == scene.materials["white"]
     assert [*scene.variants[0].looks] == [sphere]
+    assert "material white: variants part its objects, others are of white_2" in scene.warnings
 
 
 def test_a_material_keeps_its_textures_with_other_numbers_and_takes_those_of_another(tmp_path: Path) -> None:

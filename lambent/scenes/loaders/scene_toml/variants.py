@@ -47,8 +47,9 @@ def variants_told(
         worn = list(of_geometry.get(name, as_loaded))
         section = described.get(name) or VariantSection(name=name)
         worn = _exchanged(section, worn, scene, path)
-        looks = looks_told(section.materials, loaded, read, path, f"variants.{section.name}.materials")
-        told.append(Dressed(name, [{**loaded, **looks}[material] for material in worn], _mix(section, path)))
+        told_looks = looks_told(section.materials, loaded, read, path, f"variants.{section.name}.materials")
+        looks = {**loaded, **told_looks}
+        told.append(Dressed(name, [looks[material] for material in worn], _mix(section, path)))
     return told
 
 
