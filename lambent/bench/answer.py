@@ -2,10 +2,12 @@
 
 Rows are scene x edit. Errors are those at texels that viewers see, drawn at random, all channels alike, in percent:
 `rms` and `mean_error` over the mean of the truth, `relative_rms` and `p95_contacts` texel by texel (over at least
-LEAST of that mean). The light that is answered from is path traced, too, with the same random numbers, so that errors
-are those of the answer alone: `shown_rms` has those of the light map besides, of which `baked_rms` is there before
-any edit. `rms` and `relative_rms` are roots of mean products of the errors in two independent halves of the paths,
-which noise (`noise`, of one whole) does not enter. `naive` is the light as it was baked.
+LEAST of that mean). The truth has the direct sun, which texels show beside the light map and no edit changes. The light
+that is answered from is path traced, too, with the same random numbers, so that errors are those of the answer alone:
+`shown_rms` has those of the light map besides, of which `baked_rms` is there before any edit. Where light is sorted by
+group, `shown_rms` is of the sum of the groups' own answers. `rms` and `relative_rms` are roots of mean products of the
+errors in two independent halves of the paths, which noise (`noise`, of one whole) does not enter. `naive` is the light
+as it was baked.
 
 Contacts are texels from which a quarter of cosine distributed rays meet something within CONTACT_M.
 Times are medians of turns through all edits; `edit_to_picture_ms` is that of solving, gathering, upsampling and upload,
@@ -24,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lambent.bench.views import given_or_baked
-from lambent.core.answer import Answer, answered, gathered, solved, upsampled
+from lambent.core.answer import Answer, answered, solved, upsampled
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry import triangle_areas
 from lambent.core.plain import Triple
@@ -115,6 +117,7 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
         "bytes": sum(int(np.prod(a.shape)) * np.dtype(a.dtype).itemsize for a in arrays),
         "patches": len(stored.answer.patches.material),
         "texels": len(truth.at),
+        "groups": len(stored.answer.baked),
     }
     rows = []
     for number, (name, edit) in enumerate(edits.items()):
@@ -142,6 +145,7 @@ class Truth:
         )
         self.at = np.searchsorted(stored.texels, sides.texels.index[self._chosen] * 2)
         self._contact = self._contacts()
+        self._sun = self._direct_sun()
         self._before = self._traced({})
         answer = stored.answer
         self._reference = answer.reference()
@@ -154,6 +158,12 @@ class Truth:
         how = self._effort
         found = retraced(self._context.traced, self._sides, self._chosen, edited, how.paths, SEED, self._progress)
         return found.halves.astype(float)
+
+    def _direct_sun(self) -> Floats:
+        """(n, 3) W/m^2."""
+        from lambent.bake.answering.spots import sun_at
+
+        return np.asarray(sun_at(self._context.traced)[0][self._chosen])
 
     def _contacts(self) -> Flags:
         """(n,) texels that touch something."""
@@ -176,16 +186,17 @@ class Truth:
         computed = upsampled(answer.indirect(albedos), answer.near)
         after, before = self._traced(edited), self._before
         direct = np.minimum(self._direct, before.mean(axis=0))
-        gathered_light = [light[:, self.at].sum(axis=0)[None] for light in (computed, self._reference)]
-        map_before = answer.baked[:, self.at].sum(axis=0)
-        map_after = answered(self._direct[None], map_before[None], *gathered_light)[0]
+        by_group = [light[:, self.at] for light in (answer.direct, answer.baked, computed, self._reference)]
+        map_before, map_after = by_group[1].sum(axis=0), answered(*by_group).sum(axis=0)
+        gathered_light = [light.sum(axis=0)[None] for light in by_group[2:]]
         ours = (
             answered(direct[None], half[None], *gathered_light)[0] - true
             for half, true in zip(before, after, strict=True)
         )
         naive = [half - true for half, true in zip(before, after, strict=True)]
         shown, as_baked = [map_after - half for half in after], [map_before - half for half in before]
-        mean, local = after.mean(), np.maximum(after.mean(axis=0), LEAST * after.mean())
+        all_light = after.mean(axis=0) + self._sun
+        mean, local = all_light.mean(), np.maximum(all_light, LEAST * all_light.mean())
         one, other = ours
         whole = (one + other) / 2
         own, left = figures(one, other, mean, local), figures(naive[0], naive[1], mean, local)
@@ -198,7 +209,7 @@ class Truth:
             "naive_rms": left["rms"],
             "naive_relative_rms": left["relative_rms"],
             "shown_rms": figures(shown[0], shown[1], mean, local)["rms"],
-            "baked_rms": figures(as_baked[0], as_baked[1], before.mean(), local)["rms"],
+            "baked_rms": figures(as_baked[0], as_baked[1], (before.mean(axis=0) + self._sun).mean(), local)["rms"],
             "noise": percent(np.sqrt(((one - other) ** 2).mean()) / 2 / mean),
         }
 
@@ -273,9 +284,10 @@ def timed(
 def _steps(answer: Answer, now: list[Material], given: list[Material]) -> dict[str, float]:
     """Milliseconds of solving, gathering and upsampling, and the sweeps of the solution."""
     marks = [time.perf_counter()]
-    solution = solved(answer.patches, edited_albedos(given, now))
+    albedos = edited_albedos(given, now)
+    solution = solved(answer.patches, albedos)
     marks.append(time.perf_counter())
-    light = gathered(answer.rays, solution.exitance)
+    light = answer.indirect(albedos, solution)
     marks.append(time.perf_counter())
     upsampled(light, answer.near)
     marks.append(time.perf_counter())

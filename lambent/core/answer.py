@@ -1,35 +1,42 @@
 """Light that answers when surfaces get other colours: radiosity between patches, gathered at points of the light map.
 
-    B = F (a (D + B) + t (D + B) on the other side)                                                  (solve)
-    I = mean over rays of weight (a E + t E on the other side) where they end                        (gather)
-    E(edited) = D + (E - D) I(edited) / I(as baked)                                                  (ratios)
+    B = F (a (D + B) + t (D + B) on the other side)                                          (solve, patches)
+    E(edited) = D + (E - D) ratio                                                            (points, texels)
+    I = mean over rays of weight (a E + t E on the other side) at the point near their end   (gather, points)
+    ratio = B(edited) / B(as baked) of the patch, then I(edited) / I(as baked)
 
-B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, E = D + B, a and t their diffuse albedos of
-reflection and transmission, F (P, P) the share of what a patch receives that comes from each other one. Light is
-linear, so D, E and I have a leading axis of light groups. A ratio, and not a difference, is applied to the baked light,
-so that it keeps its detail and the error is relative; with albedos as baked the ratio is 1 and nothing changes.
+B (P, 3) is the indirect and D (P, 3) the direct irradiance of patches, a and t their diffuse albedos of reflection and
+transmission, F (P, P) the share of what a patch receives that comes from each other one. Patches have most bounces; the
+last PASSES are gathered among some thirty times as many points, each with its own direct light. Light is linear, so D,
+E and I have a leading axis of light groups, and so has F: each group's light lies elsewhere within a patch. A ratio,
+and not a difference, is applied to the baked light, so that it keeps its detail and the error is relative; with albedos
+as baked the ratio is 1 and nothing changes.
 
-Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light within a patch: a ray that
-ends where a patch is twice as bright as its mean counts twice.
+Rays that lobes have sent on, and textures, are in the weights. Weights also follow the light around a point: a ray that
+ends where it is twice as bright as at the point counts twice.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from lambent.core.arrays import Floats
 
 BYTE = 255
+MOST_POINTS = 1 << 16
+PASSES = 2
 MOST_WEIGHT = 16.0  # of a ray
 TOLERANCE = 1e-3  # relative change of every patch in a sweep, below which a solution stands
 SWEEPS = 400  # at most: with albedos up to MOST_ALBEDO even a closed box is done before
 MOST_ALBEDO = 0.97  # of an edited surface
 MOST_RATIO = 64.0  # of the light after an edit, and one over it before
-MOST_EXCESS = 1.5
+MOST_EXCESS = 1.25  # of the baked indirect light over what is gathered, as far as an edit makes it brighter
 DARK = 1e-6  # of the mean indirect light: below it a ratio is 1
 
 
@@ -45,14 +52,22 @@ class Patches:
         The patch on the other side; its own number on surfaces that no light crosses.
     direct : (G, P, 3) float32
         Direct irradiance by group of lights, W/m^2, the sun's included.
-    transfer : (P, P) float32
-        F, rows by the patch that receives.
+    transfer : (G, P, P) float32
+        F by group, rows by the patch that receives; (P, P) is that of all groups.
     """
 
     material: NDArray[np.integer]
     paired: NDArray[np.integer]
     direct: NDArray[np.float32]
     transfer: NDArray[np.float32]
+
+    @cached_property
+    def rows(self) -> list[csr_matrix]:
+        """F of each group, sparse: four of five entries are 0, and BLAS is slow on products with three columns."""
+        return [
+            csr_matrix(of_group)
+            for of_group in np.broadcast_to(self.transfer, (len(self.direct), *self.transfer.shape[-2:]))
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +85,9 @@ class Albedos:
 
 @dataclass(frozen=True)
 class Solution:
-    """Exitance (G, P, 3) of patches, W/m^2, the sweeps it took, and whether it stands."""
+    """Irradiance (G, P, 3) of patches, W/m^2, the sweeps it took, and whether it stands."""
 
-    exitance: NDArray[np.float32]
+    irradiance: NDArray[np.float32]
     sweeps: int
     converged: bool
 
@@ -83,7 +98,7 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
     It ends when no patch of any group changes by more than `tolerance` of its own light: a bound on the brightest
     change would leave dark corners unsolved.
     """
-    groups, count, _ = patches.direct.shape
+    count = patches.direct.shape[1]
     reflected = albedos.reflected[patches.material].astype(np.float32)
     crossing = (patches.paired != np.arange(count))[:, None]
     transmitted = (albedos.transmitted[patches.material] * crossing).astype(np.float32)
@@ -95,14 +110,44 @@ def solved(patches: Patches, albedos: Albedos, tolerance: float = TOLERANCE) -> 
         return np.asarray(out + light[:, patches.paired] * transmitted if crosses else out)
 
     for sweep in range(1, SWEEPS + 1):
-        sent = exitance().transpose(1, 0, 2).reshape(count, groups * 3)
-        arrived = (patches.transfer @ np.ascontiguousarray(sent)).reshape(count, groups, 3).transpose(1, 0, 2)
+        arrived = np.stack([rows @ sent for rows, sent in zip(patches.rows, exitance(), strict=True)])
         new = np.maximum(patches.direct + arrived, 0)  # an equivalent albedo may be negative
         change = np.abs(new - light)
         light = new
         if (change <= tolerance * new + np.float32(1e-30)).all():
-            return Solution(exitance().astype(np.float32), sweep, True)
-    return Solution(exitance().astype(np.float32), SWEEPS, False)
+            return Solution(light.astype(np.float32), sweep, True)
+    return Solution(light.astype(np.float32), SWEEPS, False)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of texels, which send light to rays that end near them, and gather it.
+
+    Attributes
+    ----------
+    patch, material : (K,) integers
+        That each lies in, and that it has.
+    other : (K,) integers
+        The point on the other side of the surface; its own number where no light crosses it.
+    direct, light : (G, K, 3) float32
+        Direct and all baked irradiance by group of lights, W/m^2, the sun's included.
+    """
+
+    patch: NDArray[np.integer]
+    material: NDArray[np.integer]
+    other: NDArray[np.integer]
+    direct: NDArray[np.float32]
+    light: NDArray[np.float32]
+
+    def exitance(self, albedos: Albedos, ratio: Floats) -> NDArray[np.float32]:
+        """Exitance (G, K, 3), W/m^2, where indirect light is `ratio` (G, K, 3) times as baked."""
+        now = self.direct + (self.light - self.direct) * ratio
+        found = now * albedos.reflected[self.material].astype(np.float32)
+        passes = np.asarray(albedos.transmitted.any(axis=1))[self.material]
+        crossed = np.flatnonzero((self.other != np.arange(len(self.other))) & passes)
+        passed = albedos.transmitted[self.material[crossed]].astype(np.float32)
+        found[:, crossed] += now[:, self.other[crossed]] * passed
+        return np.asarray(found, np.float32)
 
 
 def packed_weights(weights: Floats) -> NDArray[np.uint8]:
@@ -116,33 +161,42 @@ def unpacked_weights(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray((packed.astype(np.float32) / BYTE) ** 2 * MOST_WEIGHT, np.float32)
 
 
-def packed_rays(patch: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
-    """Rays (..., 3) bytes: the patch that each ends on, low byte first, and its weight (0 where it met none)."""
-    number = np.where(weight > 0, patch, 0).astype(np.uint16)
-    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), packed_weights(weight)], axis=-1)
+def packed_rays(point: NDArray[np.integer], weight: Floats) -> NDArray[np.uint8]:
+    """Rays (..., 2 + G) bytes: the point near which each ends, low byte first, and its weights (G, ...) by group.
+
+    Weights are 0 where it met none. Points are below MOST_POINTS.
+    """
+    number = np.where((weight > 0).any(axis=0), point, 0).astype(np.uint16)
+    weights = (packed_weights(of_group) for of_group in weight)
+    return np.stack([(number & BYTE).astype(np.uint8), (number >> 8).astype(np.uint8), *weights], axis=-1)
+
+
+def points_of_rays(rays: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Numbers (...) of the points near which `packed_rays` end."""
+    return np.asarray(rays[..., 0] | rays[..., 1].astype(np.uint16) << 8, np.uint16)
 
 
 def gathered(rays: NDArray[np.uint8], exitance: Floats) -> NDArray[np.float32]:
-    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 3), from exitance (G, P, 3).
+    """Indirect irradiance (G, K, 3) at points with `packed_rays` (K, R, 2 + G), from exitance (G, K, 3).
 
     Rays are cosine distributed: it is pi times the mean of the radiance exitance/pi.
     """
     table = unpacked_weights(np.arange(BYTE + 1, dtype=np.uint8)) / rays.shape[1]
-    lights = np.ascontiguousarray(exitance, np.float32)
-    return np.stack([_gathered(np.ascontiguousarray(rays), table, of_group) for of_group in lights])
+    rays, lights = np.ascontiguousarray(rays), np.ascontiguousarray(exitance, np.float32)
+    return np.stack([_gathered(rays, table, of_group, 2 + group) for group, of_group in enumerate(lights)])
 
 
 @numba.njit(parallel=True, cache=True, nogil=True)
-def _gathered(rays, table, exitance):  # type: ignore[no-untyped-def]
+def _gathered(rays, table, exitance, byte):  # type: ignore[no-untyped-def]
     found = np.zeros((rays.shape[0], 3), np.float32)
     for k in numba.prange(rays.shape[0]):
         red = green = blue = np.float32(0)
         for r in range(rays.shape[1]):
-            weight = table[rays[k, r, 2]]
-            patch = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
-            red += weight * exitance[patch, 0]
-            green += weight * exitance[patch, 1]
-            blue += weight * exitance[patch, 2]
+            weight = table[rays[k, r, byte]]
+            point = np.int64(rays[k, r, 0]) | (np.int64(rays[k, r, 1]) << 8)
+            red += weight * exitance[point, 0]
+            green += weight * exitance[point, 1]
+            blue += weight * exitance[point, 2]
         found[k, 0], found[k, 1], found[k, 2] = red, green, blue
     return found
 
@@ -195,8 +249,10 @@ class Answer:
 
     Attributes
     ----------
-    rays : (K, R, 3) uint8
-        `packed_rays` of the points that gather.
+    points : Points
+        That send and gather light.
+    rays : (K, R, 2 + G) uint8
+        Their `packed_rays`.
     near : Neighbours
         Of the T texels.
     direct, baked : (G, T, 3) float32
@@ -206,19 +262,39 @@ class Answer:
     """
 
     patches: Patches
+    points: Points
     rays: NDArray[np.uint8]
     near: Neighbours
     direct: NDArray[np.float32]
     baked: NDArray[np.float32]
     albedos: Albedos
 
-    def indirect(self, albedos: Albedos) -> NDArray[np.float32]:
-        """Indirect irradiance (G, K, 3) at the points that gather."""
-        return gathered(self.rays, solved(self.patches, albedos).exitance)
+    def indirect(self, albedos: Albedos, solution: Solution | None = None) -> NDArray[np.float32]:
+        """Indirect irradiance (G, K, 3) at the points, as far as their rays see it.
+
+        `solution` is that of the patches, if there is one already.
+        """
+        found = self._gathered_as_baked
+        if albedos.same_as(self.albedos):
+            return found
+        now = (solution or solved(self.patches, albedos)).irradiance - self.patches.direct
+        ratio = ratios(now, self._patches_as_baked)[:, self.points.patch]
+        for _ in range(PASSES):
+            found = gathered(self.rays, self.points.exitance(albedos, ratio))
+            ratio = ratios(found, self._gathered_as_baked)
+        return found
+
+    @cached_property
+    def _patches_as_baked(self) -> Floats:
+        return np.asarray(solved(self.patches, self.albedos).irradiance - self.patches.direct)
+
+    @cached_property
+    def _gathered_as_baked(self) -> NDArray[np.float32]:
+        return gathered(self.rays, self.points.exitance(self.albedos, np.ones(1, np.float32)))
 
     def reference(self) -> NDArray[np.float32]:
         """Indirect irradiance (G, T, 3) at the texels as this computes it for the baked materials."""
-        return upsampled(self.indirect(self.albedos), self.near)
+        return upsampled(self._gathered_as_baked, self.near)
 
     def irradiance(self, albedos: Albedos, reference: Floats) -> NDArray[np.float32]:
         """Irradiance (G, T, 3) of the texels with other albedos; `baked` itself where they are as baked."""
@@ -230,8 +306,9 @@ class Answer:
 def answered(direct: Floats, baked: Floats, edited: Floats, reference: Floats) -> NDArray[np.float32]:
     """D + (E - D) times the ratio of the gathered light `edited` over `reference`, all (G, ..., 3).
 
-    Of indirect light that is more than MOST_EXCESS times what was gathered, the rest stays as baked: lobes have
+    Of indirect light that is more than MOST_EXCESS times what was gathered, the rest grows with no edit: lobes have
     focused it, or it comes from something so near that the points that gather do not see it.
     """
-    stays = np.maximum(direct, baked - MOST_EXCESS * reference)
-    return np.asarray(stays + (baked - stays) * ratios(edited, reference), np.float32)
+    ratio, indirect = ratios(edited, reference), baked - direct
+    excess = np.maximum(indirect - MOST_EXCESS * reference, 0)
+    return np.asarray(direct + indirect * ratio - excess * np.maximum(ratio - 1, 0), np.float32)

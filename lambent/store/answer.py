@@ -7,15 +7,20 @@ answer/patch_paired        (P,) uint16, the patch on the other side; its own whe
 answer/patch_direct        (G, P, 3) float32, direct irradiance with the sun's, W/m^2, by group of lights
 answer/direct, direct_back (G, H, W, 3) float16, direct irradiance of texels without the sun's, at most that of the
                            light map; light that only lobes have sent on counts as direct
-answer/transfer            (P, P) float16, share of a patch's light by the patches that send it
-answer/rays                (K, R, 3) uint8, `core.answer.packed_rays` of the points that gather
+answer/transfer            (P, G P) float16, share of a patch's light by the patches that send it, group after group
+answer/rays                (K, R, 2 + G) uint8, `core.answer.packed_rays` of the points that send and gather light
+answer/points              (K,) uint32, the texel and side of each, as below
+answer/point_sun           (K, 3) float32, direct irradiance of the sun there, W/m^2
 answer/texels              (T,) uint32, texels that answer: twice (row * W + column), plus 1 on the other side
 answer/near                (T, 8) uint32, points near each, and
 answer/shares              (T, 8) uint8, what these count
 answer/probe/OBJECT/spots  (6, N, N) uint32, texel that each texel of a probe sees, as above; NO_SPOT for none
 answer/probe/OBJECT/tint   (6, N, N, 3) float16, texture there, relative to the material's colour
 answer/probe/OBJECT/sun    (6, N, N) float16, direct sun there over that on what faces it; negative on the far side
-answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues
+answer/traced, traced_back (2, H, W, 4) float32, samples of direct light, from which a bake continues; by group too,
+                           traced_by_group, traced_back_by_group (1, H, W, 6 G), where light is sorted
+
+G is the number of light groups, in the order of `store.light_groups`; 1 where light was baked as one.
 """
 
 from __future__ import annotations
@@ -25,16 +30,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.answer import Answer, Neighbours, Patches
+from lambent.core.answer import Answer, Neighbours, Patches, Points, points_of_rays
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.materials.diffuse_albedos import albedos_of
+from lambent.scenes.light_groups import SUN
 from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_beside
+from lambent.store.light_groups import group_name, light_groups
 from lambent.store.store import Store
 
 NO_PATCH = 0xFFFF
 NO_SPOT = 0xFFFFFFFF
 DIRECT = ("direct", "direct_back")  # by side
+NO_ANSWER = "the store has no light that answers them (`lambent bake --only answer`)"
 LAST = "answer/shares"  # written last but for probes
 
 
@@ -49,8 +57,11 @@ def probe_spots_name(object_name: str, part: str) -> str:
 
 
 def has_answer(store: Store) -> bool:
-    """Whether a store's light can answer other colours of its materials."""
-    return LAST in store and all(answer_name(part) in store for part in ("transfer", "rays", "near", "texels"))
+    """Whether a store's light can answer other colours of its materials, by group where it is sorted so."""
+    needed = ("transfer", "rays", "points", "point_sun", "near", "texels", "patch_direct", *DIRECT[:1])
+    if LAST not in store or not all(answer_name(part) in store for part in needed):
+        return False
+    return store.artefact(answer_name("patch_direct")).shape[0] == max(1, len(light_groups(store)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +85,7 @@ class StoredAnswer:
     materials : names, by number
     seen : what probes see, by object
     sun : (3,) W/m^2 on what faces it
+    of_sun : number of the sun's light group
     """
 
     answer: Answer
@@ -83,6 +95,7 @@ class StoredAnswer:
     materials: tuple[str, ...]
     seen: dict[str, SeenSpots]
     sun: Floats
+    of_sun: int = 0
 
 
 def read_answer(store: Store) -> StoredAnswer:
@@ -97,10 +110,11 @@ def read_answer(store: Store) -> StoredAnswer:
         hint = "bake the scene again with `lambent bake --only answer`"
         raise UserError("store has no light that answers other colours", file=store.folder, field="answer", hint=hint)
     record = scene_record(store)
-    material, paired, direct, transfer, rays, texels, near, shares, patch = (
+    material, paired, direct, transfer, rays, points, point_sun, texels, near, shares, patch = (
         store.read(answer_name(part))
         for part in (
-            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "texels", "near", "shares", "patch",
+            "patch_material", "patch_paired", "patch_direct", "transfer", "rays", "points", "point_sun",
+            "texels", "near", "shares", "patch",
         )
     )  # fmt: skip
     names = tuple(map(str, store.artefact(answer_name("patch")).meta.get("materials", ())))
@@ -111,40 +125,61 @@ def read_answer(store: Store) -> StoredAnswer:
         and paired.shape == material.shape
         and (not count or int(paired.max()) < count)
         and direct.shape[1:] == (count, 3)
-        and transfer.shape == (count, count)
+        and transfer.shape == (count, len(direct) * count)
+        and rays.shape[2] == 2 + len(direct)
         and near.shape == shares.shape
         and near.shape[0] == len(texels)
         and (not near.size or int(near.max()) < len(rays))
         and (not shares.size or bool((shares.sum(axis=1) > 0).all()))
         and (not len(texels) or int(texels.max()) < 2 * height * width)
-        and (not rays.size or _most_patch(rays) < count)
+        and points.shape == rays.shape[:1]
+        and point_sun.shape == (len(points), 3)
+        and bool(np.isin(points, texels).all())
+        and (not rays.size or int(points_of_rays(rays).max()) < len(points))
     )
     if not fits:
         raise UserError("broken store", file=store.folder, field="answer", got="arrays that do not fit together")
-    lights = [f"light_map/{side}" for side in SIDES], [answer_name(part) for part in DIRECT]
+    sorted_light = bool(light_groups(store))
+    maps = [group_name(side) if sorted_light else f"light_map/{side}" for side in SIDES]
+    lights = maps, [answer_name(part) for part in DIRECT]
     baked, directs = (_at_texels(store, of_sides, texels) for of_sides in lights)
-    groups = direct.shape[0]
-    if directs.shape[0] != groups:
-        raise UserError("broken store", file=store.folder, field="answer/direct", got=directs.shape[0], expected=groups)
-    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, transfer.astype(np.float32))
+    groups = baked.shape[0]
+    if not directs.shape[0] == direct.shape[0] == groups:
+        got, hint = (
+            f"{directs.shape[0]} and {direct.shape[0]} light groups",
+            "bake it with `lambent bake --only answer`",
+        )
+        raise UserError("does not fit the light map", file=store.folder, field="answer", got=got, expected=groups,
+                        hint=hint)  # fmt: skip
+    by_group = np.ascontiguousarray(transfer.reshape(count, groups, count).transpose(1, 0, 2), np.float32)
+    patches = Patches(material.astype(np.int64), paired.astype(np.int64), direct, by_group)
     albedos = albedos_of([record.materials[name] for name in names])
-    answer = Answer(patches, rays, Neighbours(near, shares), np.minimum(directs, baked), baked, albedos)
     number = _numbers(texels, height * width)
     flat = patch.reshape(2, -1)
-    of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2]
+    of_patch = np.where(flat == NO_PATCH, 0, flat)[texels % 2, texels // 2].astype(np.int64)
     other = number[(texels ^ 1).astype(np.int64)]
     sun = sun_beside(store)
+    of_sun = next((n for n, group in enumerate(light_groups(store)) if SUN in group.members), 0)
+    directs, at = np.minimum(directs, baked), number[points]
+    with_sun = np.zeros((groups, len(points), 3), np.float32)
+    with_sun[of_sun] = point_sun
+    nearest = Neighbours(near, shares)
+    senders = Points(
+        of_patch[at], material.astype(np.int64)[of_patch[at]], _on_other_sides(other[at], nearest),
+        directs[:, at] + with_sun, baked[:, at] + with_sun,
+    )  # fmt: skip
+    answer = Answer(patches, senders, rays, nearest, directs, baked, albedos)
     return StoredAnswer(
         answer, texels, other, material[of_patch].astype(np.int64), names, _seen(store, record, number),
-        np.zeros(3) if sun is None else np.array(sun.irradiance),
+        np.zeros(3) if sun is None else np.array(sun.irradiance), of_sun,
     )  # fmt: skip
 
 
-def _most_patch(rays: NDArray[np.uint8]) -> int:
-    """The largest number of a patch that rays end on."""
-    high = rays[..., 1]
-    top = int(high.max())
-    return top * 256 + int(rays[..., 0][high == top].max())
+def _on_other_sides(row: NDArray[np.int64], near: Neighbours) -> NDArray[np.int64]:
+    """(K,) the point that counts most for the other side of a point's texel, `row` (K,); its own where that is -1."""
+    most = near.shares.argmax(axis=1)[:, None]
+    found = np.take_along_axis(near.points, most, axis=1)[:, 0].astype(np.int64)
+    return np.asarray(np.where(row >= 0, found[row], np.arange(len(row))))
 
 
 def _at_texels(store: Store, names: list[str], texels: NDArray[np.uint32]) -> NDArray[np.float32]:

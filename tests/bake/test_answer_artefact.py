@@ -41,9 +41,8 @@ def test_a_furnace_of_another_albedo_has_the_light_of_its_series(box: Store, alb
 
 def test_a_closed_box_loses_no_light(box: Store) -> None:
     stored = read_answer(box)
-    assert stored.answer.patches.transfer.sum(axis=1) == pytest.approx(1, abs=0.03)
-    exitance = solved(stored.answer.patches, stored.answer.albedos).exitance
-    assert exitance == pytest.approx(np.pi / 2, rel=0.05)
+    assert stored.answer.patches.transfer.sum(axis=2) == pytest.approx(1, abs=0.03)
+    assert solved(stored.answer.patches, stored.answer.albedos).irradiance == pytest.approx(np.pi, rel=0.05)
     assert np.median(stored.answer.reference()) == pytest.approx(np.pi / 2, rel=0.03)
 
 

@@ -7,15 +7,18 @@ import pytest
 
 from lambent.core.answer import (
     MOST_EXCESS,
+    MOST_POINTS,
     MOST_WEIGHT,
     Albedos,
     Answer,
     Neighbours,
     Patches,
+    Points,
     answered,
     gathered,
     packed_rays,
     packed_weights,
+    points_of_rays,
     ratios,
     solved,
     unpacked_weights,
@@ -25,8 +28,8 @@ from lambent.core.answer import (
 
 def patches(groups: int = 2, count: int = 30, paired: bool = False) -> Patches:
     rng = np.random.default_rng(3)
-    transfer = rng.random((count, count)) ** 4
-    transfer /= transfer.sum(axis=1, keepdims=True)  # a closed room
+    transfer = rng.random((groups, count, count)) ** 4
+    transfer /= transfer.sum(axis=2, keepdims=True)  # a closed room
     other = np.arange(count)
     if paired:
         other[:10] = np.roll(np.arange(10), 5)
@@ -49,8 +52,8 @@ def test_the_solution_is_that_of_the_linear_system(paired: bool) -> None:
             across = np.eye(30)[room.paired] * (room.paired != np.arange(30))[:, None]
             sends = np.diag(colours.reflected[room.material, channel])
             sends = sends + np.diag(colours.transmitted[room.material, channel]) @ across
-            light = np.linalg.solve(np.eye(30) - room.transfer @ sends, room.direct[group, :, channel])
-            assert np.allclose(found.exitance[group, :, channel], sends @ light, rtol=2e-4)
+            light = np.linalg.solve(np.eye(30) - room.transfer[group] @ sends, room.direct[group, :, channel])
+            assert np.allclose(found.irradiance[group, :, channel], light, rtol=2e-4)
 
 
 def test_dark_corners_are_solved_as_well_as_bright_ones() -> None:
@@ -62,7 +65,7 @@ def test_dark_corners_are_solved_as_well_as_bright_ones() -> None:
     direct[0, 0] = 1
     room = Patches(np.zeros(count, int), np.arange(count), direct, chain)
     found = solved(room, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
-    assert np.allclose(found.exitance[0, :, 0], 0.5 * 0.005 ** np.arange(count), rtol=1e-3)
+    assert np.allclose(found.irradiance[0, :, 0], 0.005 ** np.arange(count), rtol=1e-3)
 
 
 def test_a_solution_that_does_not_come_to_an_end_says_so() -> None:
@@ -78,11 +81,35 @@ def test_weights_keep_their_relative_size_in_a_byte() -> None:
 
 def test_gathering_sums_what_rays_end_on() -> None:
     rng = np.random.default_rng(0)
-    patch, weight = rng.integers(0, 700, (5, 64)), rng.random((5, 64)) * 2
-    weight[:, ::7] = 0
-    light = rng.random((2, 700, 3)).astype(np.float32)
-    expected = (weight[None, ..., None] * light[:, patch]).mean(axis=2)
-    assert np.allclose(gathered(packed_rays(patch, weight), light), expected, rtol=0.01)
+    point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((2, 5, 64)) * 2
+    weight[:, :, ::7] = 0
+    rays = packed_rays(point, weight)
+    assert np.array_equal(points_of_rays(rays), np.where(weight[0] > 0, point, 0))
+    light = rng.random((2, MOST_POINTS, 3)).astype(np.float32)
+    expected = (weight[..., None] * light[:, point]).mean(axis=2)
+    assert np.allclose(gathered(rays, light), expected, rtol=0.01)
+
+
+def test_points_send_the_light_of_both_their_sides() -> None:
+    light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
+    points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
+    sheet = Albedos(np.full((1, 3), 0.2), np.full((1, 3), 0.5))
+    as_baked = points.exitance(sheet, np.ones(1, np.float32))
+    assert np.allclose(as_baked[0, :, 0], [0.2 * 10 + 0.5 * 4, 0.2 * 4 + 0.5 * 10])
+    doubled = points.exitance(sheet, np.full((1, 2, 3), 2, np.float32))
+    assert np.allclose(doubled[0, :, 0], 1.5 * as_baked[0, :, 0]), "direct light stays"
+
+
+def test_two_points_in_a_furnace_have_the_light_of_its_series() -> None:
+    """Direct light 1 everywhere, albedo a, every ray ends on a point: all light is 1 / (1 - a)."""
+    direct, rays = np.ones((1, 2, 3), np.float32), packed_rays(np.tile([0, 1], (2, 8)), np.ones((1, 2, 16)))
+    room = Patches(np.zeros(2, int), np.arange(2), direct, np.full((2, 2), 0.5, np.float32))
+    points = Points(np.arange(2), np.zeros(2, int), np.arange(2), direct, 2 * direct)
+    near = Neighbours(np.array([[0], [1]], np.uint32), np.full((2, 1), 255, np.uint8))
+    answer = Answer(room, points, rays, near, direct, 2 * direct, Albedos(np.full((1, 3), 0.5), np.zeros((1, 3))))
+    for albedo in (0.0, 0.25, 0.8):
+        found = answer.irradiance(Albedos(np.full((1, 3), albedo), np.zeros((1, 3))), answer.reference())
+        assert np.allclose(found, 1 / (1 - albedo), rtol=0.01)
 
 
 def test_texels_show_means_of_their_points() -> None:
@@ -96,19 +123,22 @@ def test_ratios_of_no_light_are_one_and_bounded() -> None:
     assert ratios(np.array([[[0.5, 4e9, 5.0]]]), reference).tolist() == [[[0.5, 64.0, 1.0]]]
 
 
-def test_direct_light_stays_and_so_does_what_was_not_gathered() -> None:
+def test_direct_light_stays_and_light_that_was_not_gathered_never_grows() -> None:
     one = np.ones((1, 1, 3), np.float32)
     assert np.allclose(answered(one, 3 * one, one, 2 * one), 2.0), "half of the indirect light"
-    found = answered(0 * one, 10 * one, 0 * one, 2 * one)
-    assert np.allclose(found, 10 - 2 * MOST_EXCESS), "the excess over what was gathered"
+    found = answered(0 * one, 10 * one, 4 * one, 2 * one)
+    assert np.allclose(found, 10 + 2 * MOST_EXCESS), "what was not gathered grows with no edit"
+    assert np.allclose(answered(0 * one, 10 * one, 0 * one, 2 * one), 0), "but dies with the light around it"
 
 
 def small_answer() -> Answer:
     rng, room = np.random.default_rng(1), patches(1)
-    rays = packed_rays(rng.integers(0, 30, (9, 32)), np.ones((9, 32)))
+    rays = packed_rays(rng.integers(0, 9, (9, 32)), np.ones((1, 9, 32)))
+    light = (1 + rng.random((1, 9, 3))).astype(np.float32)
+    points = Points(rng.integers(0, 30, 9), rng.integers(0, 4, 9), np.arange(9), 0.3 * light, light)
     near = Neighbours(rng.integers(0, 9, (50, 8)).astype(np.uint32), np.full((50, 8), 255, np.uint8))
     baked = (1 + rng.random((1, 50, 3))).astype(np.float32)
-    return Answer(room, rays, near, 0.3 * baked, baked, albedos())
+    return Answer(room, points, rays, near, 0.3 * baked, baked, albedos())
 
 
 def test_before_the_first_edit_nothing_changes() -> None:

@@ -342,6 +342,13 @@ light_field = { points = 64, texels = 48, offset_m = 0.01, error = 0.05 }
 [objects.scene]
 emission = [0.4, 0.3, 0.2]
 
+[[variants]]
+name = "dark"
+materials.oak = { kd = 0.05 }
+materials.copper = { use = "oak" }
+objects."a*" = "oak"
+light = { sky = "0.2,2700K" }
+
 [[reflectors]]
 objects = "a*"
 use = true

@@ -5,31 +5,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.light.denoise import denoise_charts
 from lambent.bake.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
 
-ROUNDS = 3  # of means over 5 x 5 texels: one leaves noise that strong edits show as blotches
+SAME = 0.2  # of their sum: the most that the halves' local means differ by in plain noise
 
 
-def shared_by_charts(direct: Floats, known: Flags, light: Floats, labels: Indices) -> NDArray[np.float16]:
-    """Direct light (H, W, 3) as a share of a light map (H, W, 3), at most all of it.
+def cleaned_direct(halves: Floats, known: Flags, light: Floats, labels: Indices) -> NDArray[np.float16]:
+    """Direct light (H, W, 3) of a light map (H, W, 3): denoised, at most all of it.
 
-    Shares are those of the means over nearby texels of a chart: the samples' noise is averaged, and the edges are those
-    of the light map, which is denoised already. Far from samples (`known`) there is none.
+    Samples above the light map are cut first, at twice its light where both halves agree: light that lobes focus on a
+    few samples is in one half alone, and no filter takes it for noise.
 
     Parameters
     ----------
-    direct : (H, W, 3)
-        Noisy direct irradiance, where `known`.
+    halves : (2, H, W, 3)
+        Noisy direct irradiance by independent samples, where `known`.
     labels : (H, W) int
         Chart of each texel.
     """
-    given = np.asarray(light, np.float32)
-    both = np.concatenate([np.asarray(direct, np.float32), given], axis=-1) * known[..., None]
-    means = both
-    for _ in range(ROUNDS):
-        means = chart_means(means, known, labels)
-    part, whole = means[..., :3], means[..., 3:]
-    share = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
-    found = (given * np.clip(share, 0, 1)).astype(np.float16)
-    return np.asarray(np.minimum(found, np.asarray(light, np.float16)), np.float16)
+    given = np.asarray(light, np.float32) * known[..., None]
+    one, other = (chart_means(np.minimum(half, 2 * given), known, labels) for half in halves)
+    same = np.abs(one - other) < SAME * (one + other)
+    clean = denoise_charts(np.minimum(halves.mean(axis=0), given * (1 + same)), known, labels)
+    return np.asarray(np.minimum(clean.astype(np.float16), np.asarray(light, np.float16)), np.float16)

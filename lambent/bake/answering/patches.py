@@ -53,7 +53,7 @@ def clustered(spots: Spots, hits: Floats, most: int) -> Clusters:
 
 def _features(spots: Spots) -> Floats:
     """(K, 8) of each texel."""
-    light = luminance(spots.irradiance)
+    light = luminance(spots.light)
     mean = float(light[spots.lit].mean()) if spots.lit.any() else 1.0
     logs = np.log10(np.maximum(light, max(DARKEST * mean, 1e-30))) * spots.there
     return np.concatenate([spots.position, NORMAL_M * spots.normal, logs.T], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.answering.spots import Spots
-from lambent.core.answer import BYTE, Neighbours
+from lambent.core.answer import BYTE, MOST_POINTS, Neighbours
 from lambent.core.arrays import Floats, Indices
 
 NEAR = 8
@@ -43,6 +43,13 @@ def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
         texels.append(order[first])
         sides.append(np.full(int(first.sum()), side))
     return GatherPoints(np.concatenate(sides), np.concatenate(texels))
+
+
+def bounded_points(spots: Spots, width: int, block: int) -> tuple[GatherPoints, int]:
+    """`gather_points` of the smallest blocks, from `block` on, that have no more than rays can name; and their size."""
+    while len((found := gather_points(spots, width, block)).texel) > MOST_POINTS:
+        block += max(1, block // 4)
+    return found, block
 
 
 def neighbours(spots: Spots, points: GatherPoints, block: int) -> tuple[NDArray[np.uint32], Neighbours]:

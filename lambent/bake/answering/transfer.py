@@ -6,61 +6,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.bake.answering.patches import Clusters
+from lambent.bake.answering.points import GatherPoints
 from lambent.bake.answering.rays import NOWHERE, RayEnds
+from lambent.bake.answering.senders import senders_of
 from lambent.bake.answering.spots import Spots
 from lambent.bake.surfaces.texels import Sides
 from lambent.bake.tiles import seed_of
 from lambent.core.answer import packed_rays
 from lambent.core.arrays import Floats, Indices
 
-MOST_RELATIVE = 16.0  # light of a texel over its patch's, such as of a spot of sun in shade
-MOST_UNLIT = 1.0  # the same where no light was sampled: the patch's light is that of its other texels
-LEAST_SENT = 1e-9  # of the brightest patch: darker ones send as if they were even
 RAYS_OF_TEXEL = 32
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
 
 
 class Between:
-    """Rays between the texels of a scene, as rays between its patches."""
+    """Rays between the texels of a scene, as rays between its patches, and between its points."""
 
-    def __init__(self, ends: RayEnds, spots: Spots, sides: list[Sides], clusters: Clusters, exitance: Floats) -> None:
-        self._ends, self._spots, self._sides, self._clusters = ends, spots, sides, clusters
-        width, height = sides[0].texels.width, sides[0].texels.height
-        self._patch = np.full(width * height * 2, -1)
-        self._shape = np.zeros(width * height * 2, np.float32)
-        patch_light = patch_means(spots, clusters, exitance[..., None])[:, 0]
-        for side in range(2):
-            of = clusters.of[side]
-            there = of >= 0
-            mean = patch_light[of]
-            bright = there & (mean > LEAST_SENT * patch_light.max(initial=0.0))
-            relative = np.divide(exitance[side], mean, out=there.astype(float), where=bright)
-            relative = np.minimum(relative, np.where(spots.lit[side], MOST_RELATIVE, MOST_UNLIT))
-            self._patch[spots.index * 2 + side], self._shape[spots.index * 2 + side] = of, relative
-
-    def patches_met(self, side: int, mine: Indices, count: int, seed: int) -> tuple[Indices, Floats]:
-        """Patches (n, count) that rays from texels `mine` (n,) of a side end on, -1 for none, and their weights.
-
-        A weight is that of the patch's mean exitance: the light within a patch is in it.
-        """
-        spot, weight = self._ends.from_texels(self._sides[side], mine, count, seed)
-        at = np.where(spot == NOWHERE, 0, spot).astype(np.int64)
-        patch = np.where(spot == NOWHERE, -1, self._patch[at])
-        return patch, np.where(patch >= 0, weight * self._shape[at], 0.0)
+    def __init__(
+        self, ends: RayEnds, spots: Spots, sides: list[Sides], clusters: Clusters, near: Indices,
+        points: GatherPoints, exitance: Floats,
+    ) -> None:  # fmt: skip
+        size = sides[0].texels.width * sides[0].texels.height
+        self._ends, self._spots, self._sides, self._clusters, self._points = ends, spots, sides, clusters, points
+        means = [patch_means(spots, clusters, of_group[..., None])[:, 0] for of_group in exitance]
+        self._patches = [senders_of(spots, clusters.of, *pair, size) for pair in zip(means, exitance, strict=True)]
+        own = exitance[:, points.side, points.texel]
+        self._near = [senders_of(spots, near, *pair, size) for pair in zip(own, exitance, strict=True)]
 
     def transfer_rows(self, first: int, last: int, rays: int, seed: int) -> NDArray[np.float32]:
-        """Rows [first, last) of F (., P): means over `rays` from each patch, spread over its texels by area."""
-        rows = np.zeros((last - first, self._clusters.count), np.float32)
+        """Rows [first, last) of F (., G, P): means over `rays` from each patch, spread over its texels by area."""
+        count = self._clusters.count
+        rows = np.zeros((last - first, len(self._patches), count), np.float32)
         for side in range(2):
             texel, patch = self._drawn(side, first, last, rays, seed)
             if not len(texel):
                 continue
-            met, weight = self.patches_met(side, texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
-            known = met >= 0
-            place = ((patch - first)[:, None] * rows.shape[1] + met)[known]
-            sums = np.bincount(place, weight[known], rows.size).reshape(rows.shape)
+            ends = self._ends.from_texels(self._sides[side], texel, RAYS_OF_TEXEL, seed_of(seed, "transfer", side))
             drawn = np.bincount(patch - first, minlength=len(rows)) * RAYS_OF_TEXEL
-            rows += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
+            for group, senders in enumerate(self._patches):
+                met, weight = senders.met(*ends)
+                known = met >= 0
+                place = ((patch - first)[:, None] * count + met)[known]
+                sums = np.bincount(place, weight[known], len(rows) * count).reshape(-1, count)
+                rows[:, group] += (sums / np.maximum(drawn, 1)[:, None]).astype(np.float32)
         return rows
 
     def _drawn(self, side: int, first: int, last: int, rays: int, seed: int) -> tuple[Indices, Indices]:
@@ -78,14 +66,16 @@ class Between:
         nothing: Indices = np.zeros(0, np.int64)
         return np.concatenate([nothing, *texels]), np.concatenate([nothing, *patches])
 
-    def gathered_rays(self, side: NDArray[np.integer], texel: Indices, count: int, seed: int) -> NDArray[np.uint8]:
-        """`packed_rays` (n, count, 3) from points: their sides and texels (n,)."""
-        found = np.zeros((len(texel), count, 3), np.uint8)
+    def gathered_rays(self, part: slice, count: int, seed: int) -> NDArray[np.uint8]:
+        """`packed_rays` (n, count, 2 + G) from some of the points."""
+        side, texel = self._points.side[part], self._points.texel[part]
+        found = np.zeros((len(texel), count, 2 + len(self._near)), np.uint8)
         for one in range(2):
             mine = np.flatnonzero(side == one)
             if len(mine):
-                patch, weight = self.patches_met(one, texel[mine], count, seed_of(seed, "gather", one))
-                found[mine] = packed_rays(patch, weight)
+                ends = self._ends.from_texels(self._sides[one], texel[mine], count, seed_of(seed, "gather", one))
+                met = [senders.met(*ends) for senders in self._near]
+                found[mine] = packed_rays(met[0][0], np.stack([weight for _, weight in met]))
         return found
 
 

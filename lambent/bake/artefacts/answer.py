@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_maps
+from lambent.bake.artefacts.light_map import IRRADIANCE, SIGNS, finished_groups, finished_maps
 from lambent.bake.artefacts.probe import sharing
 from lambent.bake.context import BakeContext
 from lambent.bake.engine import engine
 from lambent.bake.keys import key_of
+from lambent.bake.methods import sorts_light
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import run_tiles
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.answer import DIRECT, NO_PATCH, answer_name, probe_spots_name
-from lambent.store.contract import probe_name, shared_probes
+from lambent.store.contract import SIDES, probe_name, shared_probes
+from lambent.store.light_groups import group_name
+from lambent.store.store import Writer
 
 if TYPE_CHECKING:
     from lambent.bake.answering.patches import Clusters
@@ -26,11 +29,11 @@ if TYPE_CHECKING:
 
 KIND = "answer"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 1
+REVISION = 4
 TRACED = tuple(answer_name(part) for part in ("traced", "traced_back"))
 MAPS = tuple(answer_name(part) for part in DIRECT)
 PATCH = ("patch", "patch_material", "patch_paired", "patch_direct")
-BETWEEN = ("transfer", "rays", "texels", "near", "shares")
+BETWEEN = ("transfer", "rays", "points", "point_sun", "texels", "near", "shares")
 SEEN = ("spots", "tint", "sun")
 TILES = 16  # of transfer and of rays
 
@@ -64,12 +67,20 @@ def keys(context: BakeContext) -> dict[str, str]:
     count = 2 if any(context.two_sided) else 1
     effort = [how.patches, how.patch_rays, how.gather_rays, how.block, how.direct_samples, how.importance_rays]
     key = key_of(KIND, REVISION, light, effort, context.seed)
-    found = dict.fromkeys((*TRACED[:count], *MAPS[:count], *map(answer_name, (*PATCH, *BETWEEN))), key)
+    by_group = map(_by_group, TRACED[:count]) if sorts_light(context.methods) else ()
+    found = dict.fromkeys((*TRACED[:count], *by_group, *MAPS[:count]), key)
+    worn = [(o.name, o.material) for o in context.scene.objects]  # patches are of one material, by its name
+    found |= dict.fromkeys(map(answer_name, (*PATCH, *BETWEEN)), key_of(KIND, REVISION, key, worn))
     of_probes = context.keys("probe")
     for o in context.scene.objects:
         if radiance := of_probes.get(probe_name(o.name, "radiance")):
             found |= {probe_spots_name(o.name, part): key_of(KIND, REVISION, key, radiance) for part in SEEN}
     return found
+
+
+def _by_group(name: str) -> str:
+    """Name of the samples by light group that belong to samples."""
+    return f"{name}_by_group"
 
 
 def bake(context: BakeContext) -> None:
@@ -87,39 +98,79 @@ def bake(context: BakeContext) -> None:
 
 
 def _direct(context: BakeContext, side: int) -> Floats:
-    """Direct light (H, W, 3) of a side, at most that of the light map; what lobes alone have sent on counts as such."""
-    from lambent.bake.answering.direct import shared_by_charts
-    from lambent.bake.light.sampling import Sampling, sampled_halves, tile_samples
+    """Direct light (G, H, W, 3) of a side by group, at most that of the light map.
+
+    What lobes alone have sent on counts as direct.
+    """
+    from lambent.bake.answering.direct import cleaned_direct
+    from lambent.bake.light.sampling import sampled_halves
 
     if MAPS[side] not in context.stale(KIND):
-        return np.asarray(context.store.read(MAPS[side])[0])
+        return np.asarray(context.store.read(MAPS[side]))
+    labels = _sampled_direct(context, side)
+    halves, known = sampled_halves(context.store.read(TRACED[side]))
+    if not sorts_light(context.methods):
+        lit = finished_maps(context)[side]
+        assert lit is not None, "two-sided scenes have both maps"
+        direct = cleaned_direct(halves, known, lit, labels)[None]
+    else:
+        direct = _direct_by_group(context, side, known, labels)
+    context.put(KIND, MAPS[side], direct, context.provenance())
+    return direct
+
+
+def _direct_by_group(context: BakeContext, side: int, known: Flags, labels: Indices) -> NDArray[np.float16]:
+    """The same where light is sorted: the light map's own direct light, denoised, and what lobes alone have sent on."""
+    from lambent.bake.answering.direct import cleaned_direct
+
+    lit = finished_groups(context)[side]
+    assert lit is not None, "two-sided scenes have both maps"
+    parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
+    whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)
+    by_lobes = np.clip(whole - straight, 0, lit.astype(np.float32))
+    sent = np.stack(
+        [cleaned_direct(np.stack([one, one]), known, light, labels) for one, light in zip(by_lobes, lit, strict=True)]
+    )
+    straight_map = context.store.read(group_name(SIDES[side], direct=True)).astype(np.float32)
+    return np.asarray(np.minimum(straight_map + sent, lit), np.float16)
+
+
+def _sampled_direct(context: BakeContext, side: int) -> Indices:
+    """Take samples of direct light of a side, those by group beside; returns the charts that viewers see (H, W)."""
+    from lambent.bake.light.groups import BothWriters
+    from lambent.bake.light.sampling import Sampling, tile_samples
+
     how: Settings = context.settings(KIND)
-    texels, tile = context.traced.texels, context.settings("light_map").tile_texels
-    shape, chunk = (2, texels.height, texels.width, 4), (2, tile, tile, 4)
-    writer = context.samples(KIND, TRACED[side], shape, chunk)
-    scene = context.traced.whole(diffuse=False)
-    sides, labels = context.traced.in_view(SIGNS[side])
+    traced, tile = context.traced, context.settings("light_map").tile_texels
+    size = traced.texels.height, traced.texels.width
+    whole = context.samples(KIND, TRACED[side], (2, *size, 4), (2, tile, tile, 4))
+    writer: Writer | BothWriters = whole
+    half, depth = max(1, how.direct_samples // 2), context.settings("light_map").max_depth
+    sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
+    if sorts_light(context.methods):
+        parts = 2 * len(traced.sorted_lights.groups)  # all of it, and what comes straight from emitters
+        beside = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
+        writer = BothWriters(whole, beside)
+        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=True), parts=parts)
+    scene = traced.whole(diffuse=False)
+    sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
-        half = max(1, how.direct_samples // 2)
-        depth, unseen = context.settings("light_map").max_depth, context.traced.unseen(diffuse=False)
-        sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=unseen)
         run_tiles(
             writer, lambda region, seed: tile_samples(scene, sides, region, seed, sampling), seed=context.seed,
             progress=context.progress, what="direct light" + (", far sides" if side else ""),
         )  # fmt: skip
     writer.finish()
-    lit = finished_maps(context)[side]
-    assert lit is not None, "two-sided scenes have both maps"
-    halves, known = sampled_halves(context.store.read(TRACED[side]))
-    direct = shared_by_charts(halves.mean(axis=0), known, lit, labels)
-    context.put(KIND, MAPS[side], direct[None], context.provenance())
-    return direct
+    return labels
 
 
 def _spots(context: BakeContext, directs: list[Floats]) -> Spots:
     from lambent.bake.answering.spots import spots_of
 
-    return spots_of(context.traced, [light for light in finished_maps(context) if light is not None], directs)
+    by_group = sorts_light(context.methods)
+    maps = [one for one in (finished_groups if by_group else finished_maps)(context) if one is not None]
+    maps = maps if by_group else [one[None] for one in maps]
+    of_sun = context.traced.sorted_lights.sun if by_group else 0
+    return spots_of(context.traced, maps, directs, of_sun)
 
 
 def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
@@ -142,7 +193,7 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
     numbers = {"patch_material": found.material, "patch_paired": found.paired}
     for part, values in numbers.items():
         context.put(KIND, answer_name(part), values.astype(np.uint16), context.provenance())
-    direct = patch_means(spots, found, spots.direct)[None].astype(np.float32)
+    direct = np.stack([patch_means(spots, found, of_group) for of_group in spots.direct]).astype(np.float32)
     context.put(KIND, answer_name("patch_direct"), direct, context.provenance())
     note = context.provenance(materials=list(context.scene.materials))
     context.put(KIND, answer_name("patch"), patch.reshape(2, texels.height, texels.width), note)
@@ -150,35 +201,40 @@ def _clusters(context: BakeContext, ends: RayEnds, spots: Spots) -> Clusters:
 
 
 def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Clusters) -> None:
-    """Transfer between patches, and rays from them to the points that gather."""
-    from lambent.bake.answering.points import gather_points, neighbours
+    """Transfer between patches, and rays between points."""
+    from lambent.bake.answering.points import bounded_points, neighbours
+    from lambent.bake.answering.senders import points_near
     from lambent.bake.answering.transfer import Between
 
     how: Settings = context.settings(KIND)
     width, count = context.traced.texels.width, clusters.count
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: 2 if any(context.two_sided) else 1]]
-    between = Between(ends, spots, sides, clusters, spots.exitance(context.scene))
-    points = gather_points(spots, width, how.block)
+    points, block = bounded_points(spots, width, how.block)
+    codes, near = neighbours(spots, points, block)
+    closest = points_near(spots, codes, near)
+    between = Between(ends, spots, sides, clusters, closest, points, spots.exitance(context.scene))
 
     def rows(region: tuple[slice, ...], seed: int) -> Floats:
-        return between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed).astype(np.float16)
+        found = between.transfer_rows(region[0].start, region[0].stop, how.patch_rays, seed)
+        return found.astype(np.float16).reshape(len(found), -1)
 
     def rays(region: tuple[slice, ...], seed: int) -> NDArray[np.uint8]:
-        return between.gathered_rays(points.side[region[0]], points.texel[region[0]], how.gather_rays, seed)
+        return between.gathered_rays(region[0], how.gather_rays, seed)
 
     key = context.keys(KIND)[answer_name("transfer")]
-    arrays = (("transfer", (count, count), "float16", rows, "light between patches"),
-              ("rays", (len(points.texel), how.gather_rays, 3), "uint8", rays, "gathering"))  # fmt: skip
+    groups = len(spots.irradiance)
+    arrays = (("transfer", (count, groups * count), "float16", rows, "light between patches"),
+              ("rays", (len(points.texel), how.gather_rays, 2 + groups), "uint8", rays, "gathering"))  # fmt: skip
     for part, shape, dtype, tile, what in arrays:
         chunk = (max(1, -(-shape[0] // TILES)), *shape[1:])
         writer = context.store.begin(answer_name(part), KIND, shape, chunk, dtype, key=key, meta=context.provenance())
         run_tiles(writer, tile, seed=context.seed, progress=context.progress, what=what)
         writer.finish()
-    context.progress(0, 1, "texels that answer")
-    codes, near = neighbours(spots, points, how.block)
-    context.put(KIND, answer_name("texels"), codes, context.provenance())
-    context.put(KIND, answer_name("near"), near.points, context.provenance())
-    context.put(KIND, answer_name("shares"), near.shares, context.provenance())
+    numbers = (spots.index[points.texel] * 2 + points.side).astype(np.uint32)
+    own_sun = spots.sun[points.side, points.texel]
+    values = (numbers, own_sun, codes, near.points, near.shares)
+    for part, array in zip(BETWEEN[2:], values, strict=True):
+        context.put(KIND, answer_name(part), array, context.provenance())
 
 
 def _seen_by_probes(context: BakeContext, stale: set[str]) -> None:

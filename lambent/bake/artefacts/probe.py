@@ -17,6 +17,7 @@ from lambent.bake.methods import ProbeMethod, sorts_light
 from lambent.bake.probes.division import HIDDEN
 from lambent.bake.quality import QualityName
 from lambent.bake.tiles import seed_of
+from lambent.scenes.variants import documents_of
 from lambent.store.contract import SHARED_PROBES, needs_probe, probe_name, shared_probes
 
 KIND = "probe"
@@ -135,5 +136,6 @@ def _cached(context: BakeContext) -> bool:
 
 
 def _objects(context: BakeContext) -> list[str]:
-    """Names of the objects that want a probe."""
-    return [o.name for o in context.scene.objects if needs_probe(context.scene.materials[o.material])]
+    """Names of the objects that want a probe, as they are or in a variant."""
+    scene = context.scene
+    return [o.name for o in scene.objects if any(map(needs_probe, documents_of(scene, o.material)))]

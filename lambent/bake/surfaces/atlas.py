@@ -14,6 +14,7 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
 from lambent.scenes.scene import Mesh, Scene
+from lambent.scenes.variants import documents_of
 from lambent.store.contract import ObjectRecord, needs_probe
 
 Sizes = Callable[[Scene, list[Piece], int], Floats]  # of texels on pieces, in metres, for a number of texels
@@ -132,7 +133,8 @@ def object_records(scene: Scene) -> tuple[ObjectRecord, ...]:
         low, high = o.mesh.bounds
         records.append(ObjectRecord(
             name=o.name, material=o.material, first_face=first, face_count=len(o.mesh.faces), emission=o.emission,
-            bounds=(triple(low), triple(high)), probe=needs_probe(scene.materials[o.material]),
+            bounds=(triple(low), triple(high)),
+            probe=any(map(needs_probe, documents_of(scene, o.material))),
             part_of=scene.parts.get(o.name, ""), borders=scene.borders.get(o.name, ()),
         ))  # fmt: skip
         first += len(o.mesh.faces)

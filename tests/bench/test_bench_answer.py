@@ -1,0 +1,56 @@
+"""The bench of other colours: the light it answers with is nearer to path tracing than the light as it was."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from lambent.bake.bake import bake
+from lambent.bake.quality import quality_named
+from lambent.bench import answer
+from lambent.core.errors import UserError
+from lambent.scenes import builtin, load_scene
+from tests.viewer.small_store import write_small_store
+
+SMALL = quality_named("preview").changed(
+    "small",
+    geometry={"texels": 64},
+    light_map={"samples": (32, 32), "noise": 0.0, "gather_samples": 64},
+    environment={"texels": 16},
+    probe={"texels": 16, "samples": 8},
+    answer={"patches": 100, "patch_rays": 512, "gather_rays": 64},
+)
+EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1)
+
+
+@pytest.mark.usefixtures("adapter", "mi")
+@pytest.mark.parametrize("groups", ["none", "scene"])
+def test_rows_of_a_store(tmp_path: Path, groups: str) -> None:
+    lamp = '[[lights]]\nkind = "point"\nname = "bulb"\nposition = [0.3, 0.3, 0.3]\nintensity = [0.2, 0.1, 0.05]\n'
+    (tmp_path / "box.toml").write_text((files(builtin) / "box.toml").read_text() + lamp)
+    bake(load_scene(tmp_path / "box.toml"), tmp_path / "s", quality=SMALL, light_groups=groups).close()
+    rows = answer.run(EFFORT, [tmp_path / "s"])["rows"]
+    assert len(rows) == 2 and len({row["edit"] for row in rows}) == 2
+    for row in rows:
+        assert row["scene"] == "box" and row["texels"] == 60 and 10 < row["patches"] <= 110
+        assert row["groups"] == (1 if groups == "none" else 2)
+        assert row["rms"] < 0.5 * row["naive_rms"] and row["relative_rms"] < 0.5 * row["naive_relative_rms"]
+        assert 0 < row["noise"] < row["naive_rms"] and row["shown_rms"] < row["naive_rms"] + row["baked_rms"]
+        parts = [row[name] for name in ("solve_ms", "gather_ms", "upsample_ms", "upload_ms")]
+        assert min(parts) > 0 and row["edit_to_picture_ms"] > row["upload_ms"] and row["sweeps"] >= 1
+        assert row["bytes"] > 1000 and row["precompute_s"] > 0
+
+
+def test_edits_of_a_scene_are_of_its_largest_materials() -> None:
+    scene = load_scene("builtin:box")
+    edits = answer.edits_of(scene, 4)
+    assert len(edits) == 4 and "everything white" in edits and all(edit.keys() <= scene.materials.keys()
+                                                                   for edit in edits.values())  # fmt: skip
+    assert "walls dark blue" in answer.edits_of(load_scene("builtin:room"), 6)
+
+
+def test_a_store_without_an_answer_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="--only answer"):
+        answer.run(EFFORT, [write_small_store(tmp_path / "s")])
