@@ -24,6 +24,7 @@ from lambent.core.photometry import LUMINANCE, Quantity, photometric
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
+from lambent.scenes.replacement import Replacement
 
 PATH_TRACER = "path"
 FALSE_COLOUR, NOISE = "false-colour", "noise"
@@ -78,6 +79,8 @@ class Settings:
         Of the path tracer, 0 or more: other seeds have independent noise.
     recolour : mapping
         Linear RGB by material: its diffuse colour in the images, and the light answers (`realtime.answering`).
+    replacements : tuple of Replacement
+        Other meshes in the place of objects that have light fields of their volume (`realtime.replaced`).
     """
 
     width: int = 1280
@@ -99,6 +102,7 @@ class Settings:
     sky_turn_deg: float = 0.0
     light_field_cache: str = LEAST_RECENT
     recolour: Mapping[str, Triple] = field(default_factory=dict)
+    replacements: tuple[Replacement, ...] = ()
 
     @property
     def is_false_coloured(self) -> bool:

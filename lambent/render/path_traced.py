@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
+from lambent.scenes.replacement import with_replacements
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store
@@ -35,8 +36,9 @@ class PathTraced(Images):
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
         baked = scene_of(store, scene)
-        self._scene = replace(baked, materials={**baked.materials, **recoloured(baked.materials, settings.recolour)})
-        for name in changed_inputs(store, self._scene):
+        coloured = {**baked.materials, **recoloured(baked.materials, settings.recolour)}
+        self._scene = with_replacements(replace(baked, materials=coloured), settings.replacements)
+        for name in changed_inputs(store, baked):
             note(f"{name} has changed since the store was baked")
         engine()
 

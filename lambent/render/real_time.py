@@ -27,6 +27,7 @@ from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
+from lambent.realtime.replaced import with_replacements
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
 from lambent.store.answer import read_answer
@@ -71,6 +72,12 @@ class RealTime(Images):
             note("light and probes of other colours are estimated from the bake, not baked again")
             if baked.light_fields:
                 note("light fields show the colours that they were baked with")
+        baked = with_replacements(baked, settings.replacements)
+        if settings.replacements:
+            if settings.light is not None and settings.light.groups:
+                hint = "leave out the mix of light"
+                raise UserError("a replaced object is lit as baked", field="--replace", hint=hint)
+            note("other objects keep the shadows and reflections of what was replaced")
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)

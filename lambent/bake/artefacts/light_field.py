@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,12 +25,14 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
+from lambent.store.light_fields import EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
     from lambent.bake.light_fields.acquisition import Around
     from lambent.bake.light_fields.choosing import Chooser
-    from lambent.bake.light_fields.placing import Placing
+    from lambent.bake.light_fields.placing import Placed, Placing
+    from lambent.bake.light_fields.sample_map import Behind
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
@@ -75,13 +78,20 @@ SETTINGS = {
 class Traced:
     """The scene that points are placed in, what they see, and the unit of its light in half floats.
 
-    `bare` is what points of objects see whose light fields have one level.
+    Points of objects whose light fields have one level see `bare`; those whose maps are without the object, `without`.
     """
 
     placing: Placing
     around: Around
     unit: float
     bare: Around
+    without: Callable[[str], Around]
+
+    def seen(self, name: str, how: Settings, wish: LightFieldWish) -> Around:
+        """What points of an object see."""
+        if wish.without_object:
+            return self.without(name)
+        return self.bare if how.levels == 1 else self.around
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -92,7 +102,11 @@ def keys(context: BakeContext) -> dict[str, str]:
         inputs += [context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
-        found |= dict.fromkeys((light_field_name(name, part) for part in how.parts), key_of(KIND, REVISION, *inputs))
+        if wish.without_object:  # keys of other light fields stay as they were
+            inputs.append("volume" if wish.volume else "refracts")
+        found |= dict.fromkeys(
+            (light_field_name(name, part) for part in parts_of(how, wish)), key_of(KIND, REVISION, *inputs)
+        )
     return found
 
 
@@ -101,7 +115,7 @@ def bake(context: BakeContext) -> None:
     left = {
         name: how.points * how.texels**2
         for name, how in ((name, settings_of(context, wish)) for name, wish in wishes.items())
-        if stale & {light_field_name(name, part) for part in how.parts}
+        if stale & {light_field_name(name, part) for part in parts_of(how, wishes[name])}
     }
     done, total = 0, sum(left.values())
     for name, work in left.items():
@@ -125,6 +139,11 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
     if context.methods.get(request.FIELDS) != request.AUTO:
         return asked
     return {one["object"]: LightFieldWish(points=one["points"]) for one in _choice(context)} | asked
+
+
+def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
+    """The arrays of an object's light field, in the order in which they are written."""
+    return (*how.parts[:-1], EXITS, how.parts[-1]) if wish.refracts else how.parts
 
 
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
@@ -180,7 +199,12 @@ def _traced(context: BakeContext) -> Traced:
     kind = {"diffuse": not cached}
     placing = Placing(traced.builder(**kind), traced.whole(**kind))
     unit = unit_of(context.scene, maps[0], traced.sun)
-    return Traced(placing, seen, unit, seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare))
+
+    def without(name: str) -> Around:
+        return replace(seen, scene=traced.builder(**kind).build(leave_out={name}))
+
+    bare_seen = seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare)
+    return Traced(placing, seen, unit, bare_seen, without)
 
 
 def _chooser(context: BakeContext, traced: Traced) -> Chooser:
@@ -195,14 +219,15 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
     from lambent.core.light_field_blocks import blocks_of, blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
-    seen = traced.bare if how.levels == 1 else traced.around
+    seen = traced.seen(name, how, wish)
     progress(0, 1, "points")
     points = _points(context, name, wish, traced)
     normals = context.store.read(light_field_name(name, "normals"))
 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
-        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, normals[some])
+        surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
+        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, surface)
         maps = halves(light, traced.unit)
         return blocks_of(maps) if how.blocks else maps
 
@@ -222,7 +247,7 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
         run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
         writer.finish()
-    _sample_map(context, name, points, how.levels, start)
+    _sample_map(context, name, wish, points, how.levels, start)
 
 
 def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Floats:
@@ -230,14 +255,8 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     names = [light_field_name(name, part) for part in ("points", "normals")]
     if not context.stale(KIND) & set(names):
         return context.store.read(names[0])
-    mesh, seed, count = context.scene.object(name).mesh, seed_of(context.seed, KIND, name), None
-    most = settings_of(context, wish).points
     try:
-        if wish.error is not None:
-            chooser = _chooser(context, traced)
-            if (seen := chooser.watched(name)) is not None:
-                count = chooser.trial(name, seen, most).count_for(wish.error)
-        found = traced.placing.points(mesh, count or most, seed, wish.offset_m)
+        found = _placed(context, name, wish, traced)
     except UserError as error:
         raise UserError(error.message, field=f"light_field of {name}", hint=error.hint) from error
     for at, array in zip(names, (found.positions, found.normals), strict=True):
@@ -245,19 +264,63 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     return context.store.read(names[0])
 
 
-def _sample_map(context: BakeContext, name: str, points: Floats, levels: int, start: float) -> None:
+def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Placed:
+    """Where the points of an object stand."""
+    from lambent.bake.light_fields.volume import volume_points
+
+    mesh, seed = context.scene.object(name).mesh, seed_of(context.seed, KIND, name)
+    count = most = settings_of(context, wish).points
+    if wish.volume:
+        return volume_points(context.traced.builder(diffuse=not _cached(context)), mesh, name, most)
+    if wish.error is not None:
+        chooser = _chooser(context, traced)
+        if (seen := chooser.watched(name)) is not None:
+            count = chooser.trial(name, seen, most).count_for(wish.error)
+    return traced.placing.points(mesh, count, seed, wish.offset_m)
+
+
+def _sample_map(
+    context: BakeContext, name: str, wish: LightFieldWish, points: Floats, levels: int, start: float
+) -> None:
     """Written last: a light field that has it is whole."""
     from lambent.bake.light_fields.sample_map import sample_map
+    from lambent.bake.light_fields.volume import spacing_m
 
     objects = context.scene.objects
     first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
     number = next(i for i, o in enumerate(objects) if o.name == name)
-    area_m2 = float(triangle_areas(objects[number].mesh.corners).sum())
+    mesh = objects[number].mesh
+    spacing = np.sqrt(triangle_areas(mesh.corners).sum() / len(points))
+    if wish.volume:
+        spacing = spacing_m(mesh, len(points))
     size = context.atlas.width, context.atlas.height
     faces = np.arange(first[number], first[number + 1])
-    found = sample_map(context.geometry, faces, size, points, float(np.sqrt(area_m2 / len(points))))
+    behind = _exits(context, name) if wish.refracts else None
+    found = sample_map(context.geometry, faces, size, points, float(spacing), behind)
+    if found.exits is not None:
+        context.put(KIND, light_field_name(name, EXITS), found.exits, context.provenance(glass=_glass(context, name)))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
     note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": levels}
+    note |= {"volume": True} if wish.volume else {}
     seconds = round(time.perf_counter() - start, 2)
     name_of_map = light_field_name(name, "sample_map")
     context.put(KIND, name_of_map, found.entries, context.provenance(**note, seconds=seconds))
+
+
+def _exits(context: BakeContext, name: str) -> Behind:
+    """Finds the faces behind the surface of an object of glass."""
+    from lambent.bake.light_fields.glass import Exits
+
+    o = context.scene.object(name)
+    builder = context.traced.builder(diffuse=not _cached(context))
+    return Exits(builder, name, context.scene.materials[o.material]).behind
+
+
+def _glass(context: BakeContext, name: str) -> list[float]:
+    """Index of refraction, share of light RGB, and power of the cosine of the glass of an object."""
+    from lambent.bake.light_fields.glass import clearest, index_of_refraction
+    from lambent.core.thin_glass import normal_transmittance
+
+    material = context.scene.materials[context.scene.object(name).material]
+    lobe = clearest(material)
+    return [index_of_refraction(material), *normal_transmittance(lobe).tolist(), 1 - 2 * lobe.alpha]

@@ -8,13 +8,13 @@ import numpy as np
 
 from lambent.bake.light_fields.acquisition import Around, inverse_distances, radiance_maps
 from lambent.bake.light_fields.placing import Placing
-from lambent.bake.light_fields.sample_map import nearest_points
 from lambent.bake.light_fields.watched import Watched
 from lambent.core.arrays import Floats
 from lambent.core.cubemap import sample
 from lambent.core.directions import normalize
 from lambent.core.light_field import LightField
 from lambent.core.light_field_lookup import Place, marched
+from lambent.core.nearest_points import nearest_points
 from lambent.core.probe_lookups import distance_lookup, inverse_depth, planes_lookup
 from lambent.scenes.scene import Mesh
 
