@@ -7,17 +7,16 @@ import pytest
 
 from lambent.bake.light_fields.sample_map import (
     GUTTER,
-    HORIZON_DEG,
     LONGEST,
     MOST_TEXELS,
     finer_by,
-    nearest_points,
     sample_map,
     with_gutters,
 )
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
 from lambent.core.light_field import CANDIDATES, NO_POINT
+from lambent.core.nearest_points import HORIZON_DEG, nearest_points
 
 
 def by_brute_force(places: Floats, normals: Floats, points: Floats) -> np.ndarray:
@@ -96,6 +95,6 @@ def test_a_map_has_room_however_large_the_object_is(size: tuple[int, int], spaci
 def test_gutters_have_the_entries_of_the_nearest_texel() -> None:
     entries, covered = np.full((9, 9, CANDIDATES), NO_POINT, np.uint16), np.zeros((9, 9), bool)
     entries[4, 4], covered[4, 4] = (7, 5, NO_POINT, NO_POINT), True
-    filled = with_gutters(entries, covered)
+    filled = with_gutters(entries, covered, NO_POINT)
     assert (filled[2:7, 4] == entries[4, 4]).all() and (filled[4, 2:7] == entries[4, 4]).all()
     assert (filled[[0, 1, 7, 8]] == NO_POINT).all()

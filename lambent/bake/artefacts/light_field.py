@@ -266,9 +266,13 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
 
 def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Placed:
     """Where the points of an object stand."""
+    from lambent.bake.light_fields.glass import clearest
     from lambent.bake.light_fields.volume import volume_points
 
-    mesh, seed = context.scene.object(name).mesh, seed_of(context.seed, KIND, name)
+    o, seed = context.scene.object(name), seed_of(context.seed, KIND, name)
+    mesh = o.mesh
+    if wish.refracts:
+        clearest(context.scene.materials[o.material])  # an error before anything is traced
     count = most = settings_of(context, wish).points
     if wish.volume:
         return volume_points(context.traced.builder(diffuse=not _cached(context)), mesh, name, most)

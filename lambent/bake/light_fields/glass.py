@@ -31,7 +31,7 @@ def clearest(material: Material) -> Lobe:
     """
     lobes = [lobe for lobe in material.transmission_lobes if any(lobe.k)]
     if not lobes:
-        raise UserError("refracts: its material transmits nothing", hint="leave out `refracts`")
+        raise UserError("its material transmits nothing", hint="leave out `refracts`")
     return max(lobes, key=lambda lobe: float(np.mean(lobe.k)))
 
 
