@@ -98,3 +98,22 @@ def test_gutters_have_the_entries_of_the_nearest_texel() -> None:
     filled = with_gutters(entries, covered, NO_POINT)
     assert (filled[2:7, 4] == entries[4, 4]).all() and (filled[4, 2:7] == entries[4, 4]).all()
     assert (filled[[0, 1, 7, 8]] == NO_POINT).all()
+
+
+def test_points_behind_a_wall_are_left_out_where_others_are_seen() -> None:
+    """A wall at x = 0: places see points of their own side; one that sees none has the nearest of all."""
+    rng = np.random.default_rng(2)
+    points = np.concatenate([rng.random((200, 3)), rng.random((200, 3)) * [-1, 1, 1]])
+    places, up = np.array([[0.05, 0.5, 0.0], [-0.05, 0.5, 0.0], [0.5, 0.5, 0.0]]), np.tile([0.0, 0, 1], (3, 1))
+
+    def same_side(p: Floats, n: Floats, q: Floats) -> np.ndarray:
+        return (p[:, 0] > 0) == (q[:, 0] > 0)
+
+    found = nearest_points(places, up, points, same_side)
+    assert (points[found[0], 0] > 0).all() and (points[found[1], 0] < 0).all()
+    by_hand = by_brute_force(places[:1], up[:1], np.where(points[:, :1] > 0, points, 1e6))
+    np.testing.assert_array_equal(found[:1], by_hand)
+    blind = nearest_points(places, up, points, lambda p, n, q: np.zeros(len(p), bool))
+    np.testing.assert_array_equal(blind, by_brute_force(places, up, points))
+    few = nearest_points(places[:1], up[:1], points[:3], same_side)
+    np.testing.assert_array_equal(few, by_brute_force(places[:1], up[:1], points[:3]))

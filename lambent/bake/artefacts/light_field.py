@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 4
+REVISION = 5
 MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
@@ -169,7 +169,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
     how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
     named = sorted(context.scene.light_fields)
     inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed]
-    key = key_of(LIGHT_FIELD_CHOICE, 1, *inputs)
+    key = key_of(LIGHT_FIELD_CHOICE, 2, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
         from lambent.bake.light_fields.choice import chosen
@@ -211,7 +211,9 @@ def _chooser(context: BakeContext, traced: Traced) -> Chooser:
     from lambent.bake.light_fields.choosing import Chooser
 
     places = context.traced.places
-    return Chooser(context.scene, context.store, traced.placing, traced.around, places, context.seed)
+    return Chooser(
+        context.scene, context.store, traced.placing, traced.around, places, context.settings(KIND).texels, context.seed
+    )
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
@@ -247,7 +249,7 @@ def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: 
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
         run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
         writer.finish()
-    _sample_map(context, name, wish, points, how.levels, start)
+    _sample_map(context, name, wish, traced, start)
 
 
 def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Floats:
@@ -266,6 +268,7 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
 
 def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Placed:
     """Where the points of an object stand."""
+    from lambent.bake.light_fields.facing import turned_to_viewers
     from lambent.bake.light_fields.glass import clearest
     from lambent.bake.light_fields.volume import volume_points
 
@@ -279,18 +282,19 @@ def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     if wish.error is not None:
         chooser = _chooser(context, traced)
         if (seen := chooser.watched(name)) is not None:
-            count = chooser.trial(name, seen, most).count_for(wish.error)
+            count = chooser.trial(name, seen, most=most).count_for(wish.error)
+    mesh = turned_to_viewers(mesh, context.traced.places, traced.around.scene, seed)
     return traced.placing.points(mesh, count, seed, wish.offset_m)
 
 
-def _sample_map(
-    context: BakeContext, name: str, wish: LightFieldWish, points: Floats, levels: int, start: float
-) -> None:
+def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, start: float) -> None:
     """Written last: a light field that has it is whole."""
+    from lambent.bake.light_fields.facing import side_seen, views_in
     from lambent.bake.light_fields.sample_map import sample_map
     from lambent.bake.light_fields.volume import spacing_m
 
-    objects = context.scene.objects
+    objects, how = context.scene.objects, settings_of(context, wish)
+    points = context.store.read(light_field_name(name, "points"))
     first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
     number = next(i for i, o in enumerate(objects) if o.name == name)
     mesh = objects[number].mesh
@@ -300,11 +304,13 @@ def _sample_map(
     size = context.atlas.width, context.atlas.height
     faces = np.arange(first[number], first[number + 1])
     behind = _exits(context, name) if wish.refracts else None
-    found = sample_map(context.geometry, faces, size, points, float(spacing), behind)
+    sees = views_in(traced.seen(name, how, wish).scene)
+    side = side_seen(mesh, context.traced.places, traced.around.scene, seed_of(context.seed, KIND, name))
+    found = sample_map(context.geometry, faces, size, points, float(spacing), behind, sees, side)
     if found.exits is not None:
         context.put(KIND, light_field_name(name, EXITS), found.exits, context.provenance(glass=_glass(context, name)))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
-    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": levels}
+    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": how.levels}
     note |= {"volume": True} if wish.volume else {}
     seconds = round(time.perf_counter() - start, 2)
     name_of_map = light_field_name(name, "sample_map")

@@ -14,7 +14,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.directions import normalize
 from lambent.core.geometry import cross_2d, triangle_areas
 from lambent.core.light_field import CANDIDATES, NO_EXIT, NO_POINT
-from lambent.core.nearest_points import nearest_points
+from lambent.core.nearest_points import Sees, nearest_points
 
 FINER = 8  # texels to the spacing of the points, about
 MOST_TEXELS, LONGEST = 1 << 18, 8192  # of a sample map, and along its sides
@@ -36,7 +36,7 @@ Behind = Callable[[Floats, Floats], Floats]  # of places and normals (n, 3): the
 
 def sample_map(
     geometry: dict[str, Floats], faces: Indices, size: tuple[int, int], points: Floats, spacing_m: float,
-    behind: Behind | None = None,
+    behind: Behind | None = None, sees: Sees | None = None, side: float = 1.0,
 ) -> SampleMap:  # fmt: skip
     """The sample map of an object.
 
@@ -48,6 +48,8 @@ def sample_map(
     points : (P, 3), P at most 65535.
     spacing_m : of the points; texels are finer, as far as the map has room.
     behind : finds the exits, where the object is of glass.
+    sees : whether places see points (`core.nearest_points`).
+    side : -1 where viewers see the object from the other side of its normals.
     """
     corners = geometry["uv2"][geometry["faces"][faces]].astype(float) * size
     scale = finer_by(geometry["positions"][geometry["faces"][faces]].astype(float), corners, spacing_m)
@@ -57,9 +59,12 @@ def sample_map(
     width, height = (int(side) for side in high - low)
     cropped = (geometry["uv2"].astype(float) * grid - low) / (width, height)
     texels = texels_of({**geometry, "faces": geometry["faces"][faces], "uv2": cropped}, width, height)
-    middle, normal = texels.positions.mean(axis=1, dtype=float), normalize(texels.normals.sum(axis=1, dtype=float))
+    middle, normal = (
+        texels.positions.mean(axis=1, dtype=float),
+        side * normalize(texels.normals.sum(axis=1, dtype=float)),
+    )
     entries = np.full((height * width, CANDIDATES), NO_POINT, np.uint16)
-    entries[texels.index] = nearest_points(middle, normal, points)
+    entries[texels.index] = nearest_points(middle, normal, points, sees)
     covered = np.zeros(height * width, bool)
     covered[texels.index] = True
     shape = height, width, CANDIDATES
