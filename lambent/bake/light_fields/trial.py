@@ -77,8 +77,8 @@ class Trial:
 
 
 def tried(
-    placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Around, seed: int, texels: int, level: float,
-    most: int = COUNTS[-1],
+    placing: Placing, mesh: Mesh, seen: Watched, probe: ProbeLight, around: Around, seed: int, texels: int,
+    level: float, most: int = COUNTS[-1],
 ) -> Trial:  # fmt: skip
     """The errors of an object's probe, and of light fields of COUNTS points and of `most`, as far as it has room."""
     by_probe = probe.seen(seen)
