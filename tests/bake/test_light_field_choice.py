@@ -102,13 +102,13 @@ def beside() -> Scene:
 
 
 def test_a_bake_chooses_and_keeps_its_choice(beside: Scene, tmp_path: Path) -> None:
-    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 16, "strata": 1, "blocks": False})
+    quality = TINY.changed("tiny", light_field={"points": 12, "texels": 46, "strata": 1, "blocks": False})
     store = bake(beside, tmp_path / "s", quality=quality, light_fields="auto")
     fields = {one["object"]: one for one in light_fields_of(store)}
     assert "ball" in fields
     for name, one in fields.items():
         assert one["error"] < 0.85 * one["probe_error"] and one["seconds"] > 0
-        assert store.read(light_field_name(name, "radiance")).shape == (one["points"], 16, 16, 3)
+        assert store.read(light_field_name(name, "radiance")).shape == (one["points"], 46, 46, 3)
     keys, steps = {a.name: a.key for a in store.artefacts()}, list[str]()
     store = bake(beside, tmp_path / "s", quality=quality, progress=lambda done, total, what: steps.append(what))
     assert {a.name: a.key for a in store.artefacts()} == keys and not steps, "chosen once, as the store says"

@@ -14,6 +14,7 @@ from typing import Any
 from lambent.bake.light_fields.trial import Trial
 
 WORTH = 0.85
+CHECKED = 0.95  # the same at places that are held out, where noise does not favour what is chosen
 SHARE = 0.0002  # of what is wrong with all objects: those with less are not tried
 MOST_TRIED = 48
 
@@ -52,7 +53,7 @@ def chosen(trials: Mapping[str, Trial], texels: int, budget_mb: float, bytes_per
             error, check = trial.fields[before] if before else trial.probe, trial.held_out[before]
             for count, found in trial.fields.items():
                 cost = (count - before) * megabytes
-                falls = found < WORTH * error and trial.held_out[count] < check
+                falls = found < WORTH * error and trial.held_out[count] < CHECKED * check
                 if count > before and cost <= left and falls:
                     worth = (error - found) * trial.size_sr / cost
                     if worth > gain:
