@@ -28,7 +28,7 @@ STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular")
 MATTE = Material(name="matte", kd=(0.5, 0.5, 0.5))
 
 
-def volume_field(count: int = 6, side: int = 126) -> LightField:
+def volume_field(count: int = 5, side: int = 94) -> LightField:
     """Maps at count^3 points in the box of the ball and around it, without the ball."""
     at = (np.arange(count) + 0.5) / count * 2.5 * RADIUS - 1.25 * RADIUS
     points = np.stack(np.meshgrid(at, at, at), axis=-1).reshape(-1, 3)
@@ -164,8 +164,8 @@ def test_subdivision_keeps_the_surface() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"object": "bal"}, "no object of this name.*did you mean 'ball'"),
-        ({"material": "mirrow"}, "no material of this name.*did you mean 'mirror'"),
+        ({"object": "bal"}, "unknown object.*did you mean 'ball'"),
+        ({"material": "mirrow"}, "unknown material.*did you mean 'mirror'"),
         ({}, "no light field of a volume"),
     ],
 )
