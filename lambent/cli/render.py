@@ -142,6 +142,13 @@ def command(
     keyframes: Annotated[
         Path | None, typer.Option(help="File of states of materials and light over the time of a film (.toml).")
     ] = None,
+    replace: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="OBJECT=FILE or OBJECT=FILE,MATERIAL: the mesh of a file in the place of an object whose light field "
+            "is of a volume; path traces it. Repeatable."
+        ),
+    ] = None,
     fps: Annotated[int, typer.Option(min=1, max=240, help="Frames per second of a film.")] = 30,
     force: Force = False,
     json: Json = False,
@@ -160,6 +167,8 @@ def command(
 
     Example: lambent render house.store --path tour --keyframes evening.toml -o evening.mp4
 
+    Example: lambent render room.store --replace teapot=vase.obj -o vase.png
+
     Example: lambent render tray.store --edit tray.edits.json -o tray.png
     """
     from lambent import render
@@ -169,6 +178,7 @@ def command(
     from lambent.core.outputs import check_output
     from lambent.core.projections import Projection
     from lambent.materials.recolour import parse_recolours
+    from lambent.scenes.replacement import parse_replacements
 
     if ev100 is not None:
         exposure = _exposure_of(ev100, exposure)
@@ -183,7 +193,7 @@ def command(
         *parse_size(size), integrator, samples, exposure, view, scale, log=not linear, show=part, planar=planar,
         lookup=lookup, projection=Projection(projection), field_deg=field, light_field_mb=light_field_mb, seed=seed,
         light=parse_light(light) if light else None, sky_turn_deg=sky_turn, light_field_cache=light_field_cache,
-        recolour=parse_recolours(recolour or ()), variant=variant,
+        recolour=parse_recolours(recolour or ()), replacements=parse_replacements(replace or ()), variant=variant,
     )  # fmt: skip
     settings.check()
     if edit is not None:

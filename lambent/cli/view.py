@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from lambent.cli.walk import LEAST_RECENT, SIZE, Cache, Memory, Size, Store, Turn, show
+from lambent.cli.walk import LEAST_RECENT, SIZE, Cache, Memory, Replace, Size, Store, Turn, show
 
 
 def command(
     store: Store, size: Size = SIZE, light_field_mb: Memory = None, light_field_cache: Cache = LEAST_RECENT,
-    sky_turn: Turn = 0.0,
+    sky_turn: Turn = 0.0, replace: Replace = None,
 ) -> None:  # fmt: skip
     """Turn about an object of a baked scene: drag to orbit, wheel to come nearer; the same window as `walk`.
 
     Example: lambent view room.store
     """
-    show(store, "view", size, light_field_mb, light_field_cache, sky_turn)
+    show(store, "view", size, light_field_mb, light_field_cache, sky_turn, replace)

@@ -13,6 +13,9 @@ Store = Annotated[Path, typer.Argument(help="Folder of a baked store.")]
 Size = Annotated[str, typer.Option(help="WIDTHxHEIGHT of the window.")]
 Memory = Annotated[float | None, typer.Option(min=0, help="GPU memory for light fields, MB. [default: all of them]")]
 Cache = Annotated[str, typer.Option(help="Which maps go where not all have room: least-recent or adaptive.")]
+Replace = Annotated[
+    list[str] | None, typer.Option(help="OBJECT=FILE[,MATERIAL]: a mesh in the place of an object; as of `render`.")
+]
 Turn = Annotated[float, typer.Option(help="Degrees by which the sky and what light fields see of it turn.")]
 SIZE = "1680x1050"
 LEAST_RECENT = "least-recent"
@@ -20,18 +23,24 @@ LEAST_RECENT = "least-recent"
 
 def command(
     store: Store, size: Size = SIZE, light_field_mb: Memory = None, light_field_cache: Cache = LEAST_RECENT,
-    sky_turn: Turn = 0.0,
+    sky_turn: Turn = 0.0, replace: Replace = None,
 ) -> None:  # fmt: skip
     """Walk through a baked scene: WASD and the mouse; standing still converges to the exact answer for the baked light.
 
     Example: lambent walk room.store
     """
-    show(store, "walk", size, light_field_mb, light_field_cache, sky_turn)
+    show(store, "walk", size, light_field_mb, light_field_cache, sky_turn, replace)
 
 
-def show(store: Path, mode: str, size: str, light_field_mb: float | None, policy: str, sky_turn_deg: float) -> None:
+def show(
+    store: Path, mode: str, size: str, light_field_mb: float | None, policy: str, sky_turn_deg: float,
+    replace: list[str] | None,
+) -> None:  # fmt: skip
     """Open the window on a store."""
     pixels = parse_size(size)
     from lambent.viewer import app
 
-    app.run(store, mode, size=pixels, light_field_mb=light_field_mb, policy=policy, sky_turn_deg=sky_turn_deg)
+    app.run(
+        store, mode, size=pixels, light_field_mb=light_field_mb, policy=policy, sky_turn_deg=sky_turn_deg,
+        replaced=tuple(replace or ()),
+    )  # fmt: skip

@@ -11,9 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 NO_POINT = 0xFFFF  # in a sample map: no further point
+NO_EXIT = -1.0  # in place of a distance: no face is behind
 CANDIDATES = 4  # points that a texel of the sample map names at most
 MOST_POINTS = NO_POINT  # indices are 16 bits wide
 LEAST_TEXELS, MOST_TEXELS = 8, 1024  # along a side of a map
+
+
+@dataclass(frozen=True, eq=False)
+class Glass:
+    """The second interface that light passes, which enters a thin piece of glass: thesis R, "Thin Lens Refractions".
+
+    Parameters
+    ----------
+    exits : (h, w, 4) float16, by texel of the sample map: the normal of the face behind it, out of the glass, times the
+        share of light that further faces of the object let pass at normal incidence; and its distance along the
+        normal of the surface, in metres. The distance is -1 where no face is behind: the surface is a sheet.
+    eta : index of refraction, inside over outside.
+    tint : the share of light that an interface lets pass at normal incidence, RGB.
+    power : of the cosine, by which an interface lets less pass at others (`materials.clear`).
+    """
+
+    exits: NDArray[np.float16]
+    eta: float
+    tint: tuple[float, float, float]
+    power: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +54,11 @@ class LightField:
         in [0, 1]: texel (row, column) has its centre at uv2 = ((column + 1/2)/columns, (row + 1/2)/rows).
     offset_m : how far off the surface the points are.
     own_diffuse : whether the maps show the object itself without its lobes.
+    volume : whether points fill a box that the object stands in, and maps are without it, so that another may stand
+        there. `normals` point away from the middle of the box.
+    cover : (P, E, E) uint8, or None: bit 2 i + j is set where the quarter (row i, column j) of a texel shows a surface;
+        others show the sky, whatever the texel's distance is. A texel with a surface has its light and its distance.
+    glass : what refracts the light that the object transmits, or None; maps are then without the object.
     blocks : (P, B, B, 4) uint32, or None: where a store has the radiance so, as `core.light_field_blocks` makes it.
     """
 
@@ -46,3 +72,11 @@ class LightField:
     offset_m: float
     blocks: NDArray[np.uint32] | None = None
     own_diffuse: bool = False
+    volume: bool = False
+    glass: Glass | None = None
+    cover: NDArray[np.uint8] | None = None
+
+    @property
+    def without_object(self) -> bool:
+        """Whether the maps are without the object."""
+        return self.volume or self.glass is not None

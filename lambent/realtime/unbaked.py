@@ -20,6 +20,7 @@ from lambent.core.plain import Triple, triple
 from lambent.materials.document import Material
 from lambent.realtime.baked import BakedScene, Probe
 from lambent.realtime.cube_mips import finite, mip_chain
+from lambent.realtime.triangle_blocks import corners_in_blocks, filled_blocks
 from lambent.scenes.geometry import merge
 from lambent.scenes.scene import Mesh
 from lambent.store.contract import ObjectRecord, SceneRecord
@@ -68,24 +69,18 @@ def unbaked_scene(
 def with_diffuse_light(scene: BakedScene) -> BakedScene:
     """The scene with light maps that hold the irradiance from its environment at every vertex, on both sides.
 
-    Triangles no longer share vertices: each has a block of 2 x 2 texels, whose three corners are its vertices and whose
-    fourth continues their plane, so that the bilinear look-up is linear over the triangle.
+    Triangles no longer share vertices: see `triangle_blocks`.
     """
     assert scene.environment is not None, "a scene without an environment has no light from afar"
     corners = scene.faces.reshape(-1)
     count = len(scene.faces)
     across = int(np.ceil(np.sqrt(count)))
-    row, column = np.divmod(np.arange(count), across)
     maps = []
     for side in (1, -1):
         at = irradiance(scene.environment, side * normalize(scene.normals.astype(np.float64)))[scene.faces]
-        texels = np.zeros((2 * across, 2 * across, 3), np.float32)
-        for k, (dy, dx) in enumerate(((0, 0), (0, 1), (1, 0))):
-            texels[2 * row + dy, 2 * column + dx] = at[:, k]
-        texels[2 * row + 1, 2 * column + 1] = np.maximum(at[:, 1] + at[:, 2] - at[:, 0], 0)
-        maps.append(texels)
-    corner = np.array([(0.5, 0.5), (1.5, 0.5), (0.5, 1.5)])
-    uv2 = (2 * np.stack([column, row], axis=-1)[:, None] + corner) / (2 * across)
+        blocks = filled_blocks(at, across)
+        maps.append(np.pad(blocks, ((0, 2 * across - len(blocks)), (0, 0), (0, 0))))
+    uv2 = corners_in_blocks(count, across) / (2 * across)
     return replace(
         scene,
         positions=scene.positions[corners],

@@ -25,6 +25,7 @@ from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.projections import Projection, View
 from lambent.scenes.look_track import LookTrack
+from lambent.scenes.replacement import Replacement
 from lambent.scenes.scene import Variant
 
 PATH_TRACER = "path"
@@ -85,6 +86,8 @@ class Settings:
         `light` has none. The light answers it.
     looks : LookTrack, optional
         Looks of materials over the time of a film, over those of the variant; the light answers them.
+    replacements : tuple of Replacement
+        Other meshes in the place of objects that have light fields of their volume (`realtime.replaced`).
     """
 
     width: int = 1280
@@ -108,6 +111,7 @@ class Settings:
     recolour: Mapping[str, Triple] = field(default_factory=dict)
     variant: str = ""
     looks: LookTrack | None = None
+    replacements: tuple[Replacement, ...] = ()
 
     @property
     def is_false_coloured(self) -> bool:

@@ -14,6 +14,7 @@ from lambent.core.errors import UserError
 from lambent.core.progress import Progress, silent
 from lambent.materials.recolour import recoloured
 from lambent.render.images import Images, Settings
+from lambent.scenes.replacement import with_replacements
 from lambent.scenes.scene import Scene, Variant
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.scenes.variants import dressed, variant_named
@@ -37,10 +38,11 @@ class PathTraced(Images):
         if settings.planar != "auto":
             got = settings.planar
             raise UserError("the path tracer traces reflectors", field="--planar", got=got, expected="auto")
-        self._baked, self._note = scene_of(store, scene), note
+        baked = scene_of(store, scene)
+        self._baked, self._note = with_replacements(baked, settings.replacements), note
         variants = scene_record(store).variants
         self.wear(variant_named(variants, settings.variant) if settings.variant else Variant("as baked"))
-        for name in changed_inputs(store, self._baked):
+        for name in changed_inputs(store, baked):
             note(f"{name} has changed since the store was baked")
         engine()
 

@@ -25,6 +25,7 @@ from lambent.realtime.incident.light_field import check_serves
 from lambent.realtime.integrators import integrator
 from lambent.realtime.planar_integrators import check_planar
 from lambent.realtime.renderer import SUPERSAMPLES, Renderer
+from lambent.realtime.replaced import with_replacements
 from lambent.realtime.turned_sky import under_turned_sky
 from lambent.render.images import NOISE, Images, Settings
 from lambent.render.wearing import Wearing
@@ -62,6 +63,12 @@ class RealTime(Images):
         )  # fmt: skip
         lookup = known("look-up", settings.lookup, (AUTO, *look_ups()), field="--lookup")
         baked = read_baked(store, settings.light_field_mb, settings.light_field_cache)
+        if settings.replacements:
+            if settings.recolour or settings.variant or settings.looks or settings.light:
+                hint = "leave out other materials and mixes of the light"
+                raise UserError("a replaced object is lit as baked", field="--replace", hint=hint)
+            baked = with_replacements(baked, settings.replacements)
+            note("other objects keep the shadows and reflections of what was replaced")
         baked = under_turned_sky(baked, settings.sky_turn_deg)
         check_serves(baked, lookup, store.folder.name)
         self._renderer = Renderer(open_device(), baked)

@@ -268,6 +268,9 @@ class LightFieldWish:
     `points` at most, each with a map of `texels` a side, at `offset_m` off the surface; with one of
     `levels`, the object shows itself without its lobes. With an `error`, the mean
     difference in log(1 + L/median) to what viewers see mirrored, only as many points as it takes to come down to it.
+    With `volume`, points fill the object's box, and maps are taken without the object, so that another may stand there
+    (thesis R, "Object Replacement"). With `refracts`, maps are without it too, and light that it transmits is
+    refracted ("Thin Lens Refractions").
     """
 
     points: int | None = None
@@ -275,6 +278,13 @@ class LightFieldWish:
     offset_m: float | None = None
     error: float | None = None
     levels: int | None = None
+    volume: bool = False
+    refracts: bool = False
+
+    @property
+    def without_object(self) -> bool:
+        """Whether maps are taken without the object."""
+        return self.volume or self.refracts
 
 
 @dataclass(frozen=True)

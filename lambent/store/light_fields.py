@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.core.light_field import CANDIDATES, NO_POINT, LightField
+from lambent.core.light_field import CANDIDATES, NO_POINT, Glass, LightField
+from lambent.core.plain import triple
 from lambent.store.consistency import numbers_of
 from lambent.store.contract import light_field_name
 from lambent.store.store import Store
 
 PARTS = ("points", "normals", "radiance", "inverse_distance", "sample_map")
 BLOCKS = "blocks"  # in place of radiance
+EXITS = "exits"  # of glass
+COVER = "cover"  # of texels' quarters; stores of earlier versions have none
 
 
 def has_light_field(store: Store, object_name: str) -> bool:
@@ -53,8 +56,32 @@ def read_light_field(store: Store, object_name: str) -> LightField:
     return LightField(
         points, normals, radiance, inverse_distance, sample_map,
         (int(corner[0]), int(corner[1])), (int(grid[0]), int(grid[1])), offset_m, blocks,
-        store.artefact(name).meta.get("levels") == 1,
+        store.artefact(name).meta.get("levels") == 1, store.artefact(name).meta.get("volume") is True,
+        _glass(store, object_name, sample_map.shape), _cover(store, object_name, inverse_distance.shape),
     )  # fmt: skip
+
+
+def _cover(store: Store, object_name: str, shape: tuple[int, ...]) -> NDArray[np.uint8] | None:
+    """Which quarters of texels show surfaces, where the store knows."""
+    name = light_field_name(object_name, COVER)
+    if name not in store:
+        return None
+    cover = store.read(name)
+    if cover.shape != shape or cover.dtype != np.uint8:
+        raise UserError("broken store", file=store.folder, field=name, got=str(cover.shape), expected=str(shape))
+    return cover
+
+
+def _glass(store: Store, object_name: str, shape: tuple[int, ...]) -> Glass | None:
+    """What refracts; None where the store has none."""
+    name = light_field_name(object_name, EXITS)
+    if name not in store:
+        return None
+    exits = store.read(name)
+    if exits.shape != shape or exits.dtype != np.float16 or not np.isfinite(exits).all():
+        raise UserError("broken store", file=store.folder, field=name, got=str(exits.shape), expected=str(shape))
+    eta, *tint, power = numbers_of(store, name, "glass", 5)
+    return Glass(exits, float(eta), triple(tint), float(power))
 
 
 def light_name(store: Store, object_name: str) -> str:

@@ -153,6 +153,8 @@ WISH: Answers = {
     "offset_m": (0.02, FIELDS),
     "error": (0.1, FIELDS),
     "levels": (1, FIELDS),
+    "volume": (True, FIELDS),
+    "refracts": (True, FIELDS),
 }
 SCENE: Answers = {
     "name": ("renamed", NOTHING),

@@ -7,17 +7,16 @@ import pytest
 
 from lambent.bake.light_fields.sample_map import (
     GUTTER,
-    HORIZON_DEG,
     LONGEST,
     MOST_TEXELS,
     finer_by,
-    nearest_points,
     sample_map,
     with_gutters,
 )
 from lambent.core.arrays import Floats
 from lambent.core.directions import normalize
 from lambent.core.light_field import CANDIDATES, NO_POINT
+from lambent.core.nearest_points import HORIZON_DEG, nearest_points
 
 
 def by_brute_force(places: Floats, normals: Floats, points: Floats) -> np.ndarray:
@@ -96,6 +95,25 @@ def test_a_map_has_room_however_large_the_object_is(size: tuple[int, int], spaci
 def test_gutters_have_the_entries_of_the_nearest_texel() -> None:
     entries, covered = np.full((9, 9, CANDIDATES), NO_POINT, np.uint16), np.zeros((9, 9), bool)
     entries[4, 4], covered[4, 4] = (7, 5, NO_POINT, NO_POINT), True
-    filled = with_gutters(entries, covered)
+    filled = with_gutters(entries, covered, NO_POINT)
     assert (filled[2:7, 4] == entries[4, 4]).all() and (filled[4, 2:7] == entries[4, 4]).all()
     assert (filled[[0, 1, 7, 8]] == NO_POINT).all()
+
+
+def test_points_behind_a_wall_are_left_out_where_others_are_seen() -> None:
+    """A wall at x = 0: places see points of their own side; one that sees none has the nearest of all."""
+    rng = np.random.default_rng(2)
+    points = np.concatenate([rng.random((200, 3)), rng.random((200, 3)) * [-1, 1, 1]])
+    places, up = np.array([[0.05, 0.5, 0.0], [-0.05, 0.5, 0.0], [0.5, 0.5, 0.0]]), np.tile([0.0, 0, 1], (3, 1))
+
+    def same_side(p: Floats, n: Floats, q: Floats) -> np.ndarray:
+        return (p[:, 0] > 0) == (q[:, 0] > 0)
+
+    found = nearest_points(places, up, points, same_side)
+    assert (points[found[0], 0] > 0).all() and (points[found[1], 0] < 0).all()
+    by_hand = by_brute_force(places[:1], up[:1], np.where(points[:, :1] > 0, points, 1e6))
+    np.testing.assert_array_equal(found[:1], by_hand)
+    blind = nearest_points(places, up, points, lambda p, n, q: np.zeros(len(p), bool))
+    np.testing.assert_array_equal(blind, by_brute_force(places, up, points))
+    few = nearest_points(places[:1], up[:1], points[:3], same_side)
+    np.testing.assert_array_equal(few, by_brute_force(places[:1], up[:1], points[:3]))

@@ -123,3 +123,14 @@ def test_the_adapter_decodes_the_same_bits(adapter: None) -> None:
     device.queue.submit([encoder.finish()])
     got = pixels(device, target)[..., :3].astype(np.float32)
     np.testing.assert_array_equal(got, decoded(blocks)[0].astype(np.float32))
+
+
+def test_a_lamp_keeps_its_light_before_what_is_dark_and_uneven() -> None:
+    """One texel of a lamp in each block, at most as bright as it is seen in part; without weights 2.5 % were lost."""
+    rng = np.random.default_rng(0)
+    dark = 0.3 * (1 + 0.1 * rng.standard_normal((1, 160, 160, 1))).clip(0.1) * np.ones(3)
+    lamp = dark.copy()
+    row, column = 4 * np.mgrid[:40, :40] + rng.integers(4, size=(2, 40, 40))
+    lamp[0, row, column] += rng.uniform(25, 100, (40, 40, 1)) * np.array([1, 0.8, 0.5])
+    kept = (decoded(encoded(lamp)).astype(float) - dark).sum(axis=(0, 1, 2)) / (lamp - dark).sum(axis=(0, 1, 2))
+    np.testing.assert_allclose(kept, 1, atol=0.006)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,16 +25,18 @@ from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
 from lambent.scenes.scene import LightFieldWish
 from lambent.store.contract import LIGHT_FIELD_CHOICE, light_field_name, needs_probe
+from lambent.store.light_fields import COVER, EXITS
 from lambent.store.store import Array
 
 if TYPE_CHECKING:
     from lambent.bake.light_fields.acquisition import Around
     from lambent.bake.light_fields.choosing import Chooser
-    from lambent.bake.light_fields.placing import Placing
+    from lambent.bake.light_fields.placing import Placed, Placing
+    from lambent.bake.light_fields.sample_map import Behind
 
 KIND = "light_field"
 NEEDS = ("geometry", "light_map", "probe")
-REVISION = 4
+REVISION = 5
 MATTE = "%s: light_field: its material reflects nothing but diffuse light, it gets none"
 PATHS_OF_A_CHUNK = 1 << 21
 MIRROR_DEPTH = 6  # glossy surfaces in a row on paths of level 1, of objects without light fields
@@ -61,7 +64,7 @@ class Settings:
     @property
     def parts(self) -> tuple[str, ...]:
         """The arrays of a light field, in the order in which they are written."""
-        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", "sample_map"
+        return "points", "normals", "blocks" if self.blocks else "radiance", "inverse_distance", COVER, "sample_map"
 
 
 SETTINGS = {
@@ -75,13 +78,20 @@ SETTINGS = {
 class Traced:
     """The scene that points are placed in, what they see, and the unit of its light in half floats.
 
-    `bare` is what points of objects see whose light fields have one level.
+    Points of objects whose light fields have one level see `bare`; those whose maps are without the object, `without`.
     """
 
     placing: Placing
     around: Around
     unit: float
     bare: Around
+    without: Callable[[str], Around]
+
+    def seen(self, name: str, how: Settings, wish: LightFieldWish) -> Around:
+        """What points of an object see."""
+        if wish.without_object:
+            return self.without(name)
+        return self.bare if how.levels == 1 else self.around
 
 
 def keys(context: BakeContext) -> dict[str, str]:
@@ -92,7 +102,11 @@ def keys(context: BakeContext) -> dict[str, str]:
         inputs += [context.seed, context.methods["probes"]]
         if not _cached(context):
             inputs.append(context.settings("light_map").max_depth)
-        found |= dict.fromkeys((light_field_name(name, part) for part in how.parts), key_of(KIND, REVISION, *inputs))
+        if wish.without_object:  # keys of other light fields stay as they were
+            inputs.append("volume" if wish.volume else "refracts")
+        found |= dict.fromkeys(
+            (light_field_name(name, part) for part in parts_of(how, wish)), key_of(KIND, REVISION, *inputs)
+        )
     return found
 
 
@@ -101,7 +115,7 @@ def bake(context: BakeContext) -> None:
     left = {
         name: how.points * how.texels**2
         for name, how in ((name, settings_of(context, wish)) for name, wish in wishes.items())
-        if stale & {light_field_name(name, part) for part in how.parts}
+        if stale & {light_field_name(name, part) for part in parts_of(how, wishes[name])}
     }
     done, total = 0, sum(left.values())
     for name, work in left.items():
@@ -127,6 +141,11 @@ def wished(context: BakeContext) -> dict[str, LightFieldWish]:
     return {one["object"]: LightFieldWish(points=one["points"]) for one in _choice(context)} | asked
 
 
+def parts_of(how: Settings, wish: LightFieldWish) -> tuple[str, ...]:
+    """The arrays of an object's light field, in the order in which they are written."""
+    return (*how.parts[:-1], EXITS, how.parts[-1]) if wish.refracts else how.parts
+
+
 def settings_of(context: BakeContext, wish: LightFieldWish) -> Settings:
     """This bake's settings, with what is asked of one object."""
     asked = {name: value for name in ("points", "texels", "levels") if (value := getattr(wish, name)) is not None}
@@ -150,7 +169,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
     how, budget_mb = context.settings(KIND), float(context.methods[request.MEGABYTES])
     named = sorted(context.scene.light_fields)
     inputs = [context.keys("light_map"), context.keys("probe"), asdict(how), named, budget_mb, context.seed]
-    key = key_of(LIGHT_FIELD_CHOICE, 1, *inputs)
+    key = key_of(LIGHT_FIELD_CHOICE, 2, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
         from lambent.bake.light_fields.choice import chosen
@@ -180,49 +199,61 @@ def _traced(context: BakeContext) -> Traced:
     kind = {"diffuse": not cached}
     placing = Placing(traced.builder(**kind), traced.whole(**kind))
     unit = unit_of(context.scene, maps[0], traced.sun)
-    return Traced(placing, seen, unit, seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare))
+
+    def without(name: str) -> Around:
+        return replace(seen, scene=traced.builder(**kind).build(leave_out={name}))
+
+    bare_seen = seen if levels == 1 or not bare else around(traced, maps_seen, depth, bare)
+    return Traced(placing, seen, unit, bare_seen, without)
 
 
 def _chooser(context: BakeContext, traced: Traced) -> Chooser:
     from lambent.bake.light_fields.choosing import Chooser
 
     places = context.traced.places
-    return Chooser(context.scene, context.store, traced.placing, traced.around, places, context.seed)
+    return Chooser(
+        context.scene, context.store, traced.placing, traced.around, places, context.settings(KIND).texels, context.seed
+    )
 
 
 def _light_field(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, progress: Progress) -> None:
-    from lambent.bake.light_fields.acquisition import inverse_distances, radiance_maps
+    from lambent.bake.light_fields.acquisition import covered_distances, radiance_maps
     from lambent.core.light_field_blocks import blocks_of, blocks_shape
 
     start, how = time.perf_counter(), settings_of(context, wish)
-    seen = traced.bare if how.levels == 1 else traced.around
+    seen = traced.seen(name, how, wish)
     progress(0, 1, "points")
     points = _points(context, name, wish, traced)
     normals = context.store.read(light_field_name(name, "normals"))
 
     def radiance(region: tuple[slice, ...], seed: int) -> Array:
         some = region[0]
-        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, normals[some])
+        surface = None if wish.without_object else normals[some]  # what is beneath points is seen as well
+        light = radiance_maps(seen, points[some], how.texels, how.strata, seed, how.onward, surface, covers=True)
         maps = halves(light, traced.unit)
         return blocks_of(maps) if how.blocks else maps
 
     def inverse_distance(region: tuple[slice, ...], seed: int) -> Array:
-        return inverse_distances(seen.scene, points[region[0]], how.texels)
+        return covered_distances(seen.scene, points[region[0]], how.texels)[0]
+
+    def cover(region: tuple[slice, ...], seed: int) -> Array:
+        return covered_distances(seen.scene, points[region[0]], how.texels)[1]
 
     at_once = max(1, min(PATHS_OF_A_CHUNK // (how.texels * how.strata) ** 2, len(points)))
     of_light = blocks_shape(how.texels) if how.blocks else (how.texels, how.texels, 3)
-    light, distance = (light_field_name(name, how.parts[i]) for i in (2, 3))
+    light, distance, quarters = (light_field_name(name, how.parts[i]) for i in (2, 3, 4))
     kind = "uint32" if how.blocks else "float16"
     for at, shape, dtype, tile, begin, end in (
         (light, (len(points), *of_light), kind, radiance, 0.0, 0.9),
-        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 1.0),
+        (distance, (len(points), how.texels, how.texels), "float16", inverse_distance, 0.9, 0.95),
+        (quarters, (len(points), how.texels, how.texels), "uint8", cover, 0.95, 1.0),
     ):
         key, note = context.keys(KIND)[at], context.provenance(**({"unit": traced.unit} if at == light else {}))
         chunks = (at_once, *shape[1:])  # an interrupted bake continues with the next points
         writer = context.store.begin(at, KIND, shape, chunks, dtype, key=key, meta=note)
         run_tiles(writer, tile, seed=context.seed, progress=part_of(progress, begin, end, at), what=at)
         writer.finish()
-    _sample_map(context, name, points, how.levels, start)
+    _sample_map(context, name, wish, traced, start)
 
 
 def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Floats:
@@ -230,14 +261,8 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     names = [light_field_name(name, part) for part in ("points", "normals")]
     if not context.stale(KIND) & set(names):
         return context.store.read(names[0])
-    mesh, seed, count = context.scene.object(name).mesh, seed_of(context.seed, KIND, name), None
-    most = settings_of(context, wish).points
     try:
-        if wish.error is not None:
-            chooser = _chooser(context, traced)
-            if (seen := chooser.watched(name)) is not None:
-                count = chooser.trial(name, seen, most).count_for(wish.error)
-        found = traced.placing.points(mesh, count or most, seed, wish.offset_m)
+        found = _placed(context, name, wish, traced)
     except UserError as error:
         raise UserError(error.message, field=f"light_field of {name}", hint=error.hint) from error
     for at, array in zip(names, (found.positions, found.normals), strict=True):
@@ -245,19 +270,71 @@ def _points(context: BakeContext, name: str, wish: LightFieldWish, traced: Trace
     return context.store.read(names[0])
 
 
-def _sample_map(context: BakeContext, name: str, points: Floats, levels: int, start: float) -> None:
-    """Written last: a light field that has it is whole."""
-    from lambent.bake.light_fields.sample_map import sample_map
+def _placed(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced) -> Placed:
+    """Where the points of an object stand."""
+    from lambent.bake.light_fields.facing import turned_to_viewers
+    from lambent.bake.light_fields.glass import clearest
+    from lambent.bake.light_fields.volume import volume_points
 
-    objects = context.scene.objects
+    o, seed = context.scene.object(name), seed_of(context.seed, KIND, name)
+    mesh = o.mesh
+    if wish.refracts:
+        clearest(context.scene.materials[o.material])  # an error before anything is traced
+    count = most = settings_of(context, wish).points
+    if wish.volume:
+        return volume_points(context.traced.builder(diffuse=not _cached(context)), mesh, name, most)
+    if wish.error is not None:
+        chooser = _chooser(context, traced)
+        if (seen := chooser.watched(name)) is not None:
+            count = chooser.trial(name, seen, most=most).count_for(wish.error)
+    mesh = turned_to_viewers(mesh, context.traced.places, traced.around.scene, seed)
+    return traced.placing.points(mesh, count, seed, wish.offset_m)
+
+
+def _sample_map(context: BakeContext, name: str, wish: LightFieldWish, traced: Traced, start: float) -> None:
+    """Written last: a light field that has it is whole."""
+    from lambent.bake.light_fields.facing import side_seen, views_in
+    from lambent.bake.light_fields.sample_map import sample_map
+    from lambent.bake.light_fields.volume import spacing_m
+
+    objects, how = context.scene.objects, settings_of(context, wish)
+    points = context.store.read(light_field_name(name, "points"))
     first = np.cumsum([0, *(len(o.mesh.faces) for o in objects)])
     number = next(i for i, o in enumerate(objects) if o.name == name)
-    area_m2 = float(triangle_areas(objects[number].mesh.corners).sum())
+    mesh = objects[number].mesh
+    spacing = np.sqrt(triangle_areas(mesh.corners).sum() / len(points))
+    if wish.volume:
+        spacing = spacing_m(mesh, len(points))
     size = context.atlas.width, context.atlas.height
     faces = np.arange(first[number], first[number + 1])
-    found = sample_map(context.geometry, faces, size, points, float(np.sqrt(area_m2 / len(points))))
+    behind = _exits(context, name) if wish.refracts else None
+    sees = views_in(traced.seen(name, how, wish).scene)
+    side = side_seen(mesh, context.traced.places, traced.around.scene, seed_of(context.seed, KIND, name))
+    found = sample_map(context.geometry, faces, size, points, float(spacing), behind, sees, side)
+    if found.exits is not None:
+        context.put(KIND, light_field_name(name, EXITS), found.exits, context.provenance(glass=_glass(context, name)))
     offset_m = context.store.artefact(light_field_name(name, "points")).meta["offset_m"]
-    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": levels}
+    note = {"corner": list(found.corner), "grid": list(found.grid), "offset_m": offset_m, "levels": how.levels}
+    note |= {"volume": True} if wish.volume else {}
     seconds = round(time.perf_counter() - start, 2)
     name_of_map = light_field_name(name, "sample_map")
     context.put(KIND, name_of_map, found.entries, context.provenance(**note, seconds=seconds))
+
+
+def _exits(context: BakeContext, name: str) -> Behind:
+    """Finds the faces behind the surface of an object of glass."""
+    from lambent.bake.light_fields.glass import Exits
+
+    o = context.scene.object(name)
+    builder = context.traced.builder(diffuse=not _cached(context))
+    return Exits(builder, name, context.scene.materials[o.material]).behind
+
+
+def _glass(context: BakeContext, name: str) -> list[float]:
+    """Index of refraction, share of light RGB, and power of the cosine of the glass of an object."""
+    from lambent.bake.light_fields.glass import clearest, index_of_refraction
+    from lambent.core.thin_glass import normal_transmittance
+
+    material = context.scene.materials[context.scene.object(name).material]
+    lobe = clearest(material)
+    return [index_of_refraction(material), *normal_transmittance(lobe).tolist(), 1 - 2 * lobe.alpha]

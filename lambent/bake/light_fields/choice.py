@@ -2,7 +2,7 @@
 
 What is wrong with an object is the error of its look-ups times the solid angle that it takes for viewers. Points are
 given where they take most of that away for their memory, until a budget is spent. A number of points is only taken
-where it lowers the error of the one before to WORTH.
+where it lowers the error of the one before to WORTH, and that of points held out from the choice, too.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from typing import Any
 from lambent.bake.light_fields.trial import Trial
 
 WORTH = 0.85
-SHARE = 0.005  # of what is wrong with all objects: those with less are not tried
+CHECKED = 0.95  # the same at places that are held out, where noise does not favour what is chosen
+SHARE = 0.0002  # of what is wrong with all objects: those with less are not tried
 MOST_TRIED = 48
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """One object's light field, and what the trial found: errors in log(1 + L/median) of what viewers see mirrored."""
+    """One object's light field, and what the trial found: errors in log(1 + L/median) of what viewers see."""
 
     object: str
     points: int
@@ -49,10 +50,11 @@ def chosen(trials: Mapping[str, Trial], texels: int, budget_mb: float, bytes_per
         best, gain = None, 0.0
         for name, trial in trials.items():
             before = taken.get(name, 0)
-            error = trial.fields[before] if before else trial.probe
+            error, check = trial.fields[before] if before else trial.probe, trial.held_out[before]
             for count, found in trial.fields.items():
                 cost = (count - before) * megabytes
-                if count > before and cost <= left and found < WORTH * error:
+                falls = found < WORTH * error and trial.held_out[count] < CHECKED * check
+                if count > before and cost <= left and falls:
                     worth = (error - found) * trial.size_sr / cost
                     if worth > gain:
                         best, gain = (name, count, cost), worth

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 
 import numpy as np
 
 from lambent.bake.light_fields.acquisition import Around
 from lambent.bake.light_fields.choice import worth_trying
+from lambent.bake.light_fields.facing import turned_to_viewers
 from lambent.bake.light_fields.placing import Placing
 from lambent.bake.light_fields.trial import ProbeLight, Trial, tried
 from lambent.bake.light_fields.watched import Watched, watched
 from lambent.bake.tiles import seed_of
 from lambent.core.arrays import Floats
+from lambent.core.colour import luminance
 from lambent.core.errors import UserError
 from lambent.core.geometry import triangle_areas
 from lambent.core.progress import Progress, part_of
-from lambent.scenes.scene import Scene
-from lambent.store.contract import probe_name, radiance_unit, scene_record, shared_probes
+from lambent.scenes.scene import Mesh, Scene
+from lambent.store.contract import probe_irradiance, probe_name, radiance_unit, scene_record, shared_probes
 from lambent.store.store import Store
 
 REFLECTED = 0.9  # of an object's area: then planar reflectors show it
@@ -28,8 +30,11 @@ REFLECTED = 0.9  # of an object's area: then planar reflectors show it
 class Chooser:
     """Tries light fields on objects of a scene, whose probes a store holds; viewers stand at `places` (m, 3)."""
 
-    def __init__(self, scene: Scene, store: Store, placing: Placing, around: Around, places: Floats, seed: int) -> None:
-        self._scene, self._store, self._seed = scene, store, seed
+    def __init__(
+        self, scene: Scene, store: Store, placing: Placing, around: Around, places: Floats, texels: int, seed: int
+    ) -> None:
+        """`texels` are those along a side of the maps that will be baked."""
+        self._scene, self._store, self._texels, self._seed = scene, store, texels, seed
         self._placing, self._around, self._places = placing, around, places
 
     def trials(self, names: Collection[str], progress: Progress) -> dict[str, Trial]:
@@ -39,30 +44,52 @@ class Chooser:
             part_of(progress, 0.0, 0.5, "what probes show")(i, len(curved), "")
             if (seen := self.watched(name)) is not None:
                 looks[name] = seen
-        wrong = {name: seen.size_sr * self._probe_error(name, seen) for name, seen in looks.items()}
+        level = usual_level(looks.values())
+        wrong = {name: seen.size_sr * self._probe_error(name, seen, level) for name, seen in looks.items()}
         found = dict[str, Trial]()
         for i, name in enumerate(some := worth_trying(wrong)):
             part_of(progress, 0.5, 1.0, "light fields on trial")(i, len(some), "")
             with suppress(UserError):  # nothing of it is in the open
-                found[name] = self.trial(name, looks[name])
+                found[name] = self.trial(name, looks[name], level)
         return found
 
     def watched(self, name: str) -> Watched | None:
-        """What viewers see mirrored in an object."""
+        """What viewers see of an object by its lobes."""
         o = self._scene.object(name)
-        return watched(o.mesh, self._scene.materials[o.material], self._places, self._around, self._seed_of(name))
+        mesh = self._turned(name)
+        return watched(mesh, self._scene.materials[o.material], self._places, self._around, self._seed_of(name))
 
-    def trial(self, name: str, seen: Watched, most: int | None = None) -> Trial:
-        """Errors of the object's probe and of its light fields, up to `most` points."""
-        mesh, probe = self._scene.object(name).mesh, probe_light(self._store, name)
+    def trial(self, name: str, seen: Watched, level: float | None = None, most: int | None = None) -> Trial:
+        """Errors of the object's probe and of its light fields, up to `most` points.
+
+        They are relative to a `level` of luminance, by default the object's own.
+        """
+        probe = probe_light(self._store, name)
         more = {} if most is None else {"most": most}
-        return tried(self._placing, mesh, seen, probe, self._around, self._seed_of(name), **more)
+        mesh, seed = self._turned(name), self._seed_of(name)
+        return tried(self._placing, mesh, seen, probe, self._around, seed, self._texels, level or seen.level, **more)
 
-    def _probe_error(self, name: str, seen: Watched) -> float:
-        return seen.error(probe_light(self._store, name).along(seen.origins, seen.directions).mean(axis=1))
+    def _turned(self, name: str) -> Mesh:
+        mesh = self._scene.object(name).mesh
+        return turned_to_viewers(mesh, self._places, self._around.scene, self._seed_of(name))
+
+    def _probe_error(self, name: str, seen: Watched, level: float) -> float:
+        return seen.error(probe_light(self._store, name).seen(seen), level)
 
     def _seed_of(self, name: str) -> int:
         return seed_of(self._seed, "light field", name)
+
+
+def usual_level(looks: Iterable[Watched]) -> float:
+    """Median luminance of what viewers see of some objects, by the solid angle of each."""
+    seen = list(looks)
+    if not seen:
+        return 1.0
+    light = np.concatenate([luminance(one.light) for one in seen])
+    weight = np.concatenate([np.full(len(one.x), one.size_sr / len(one.x)) for one in seen])
+    order = np.argsort(light)
+    total = np.cumsum(weight[order])
+    return max(float(light[order][np.searchsorted(total, total[-1] / 2)]), 1e-6)
 
 
 def shown_by_reflectors(scene: Scene, store: Store) -> set[str]:
@@ -80,4 +107,6 @@ def probe_light(store: Store, name: str) -> ProbeLight:
     at = probe_name(owner, "radiance")
     radiance, distance, planes = (store.read(probe_name(owner, part)) for part in ("radiance", "distance", "planes"))
     centre = np.array(store.artefact(at).meta["centre"], float)
-    return ProbeLight(radiance.astype(float) * radiance_unit(store, at), distance.astype(float), planes, centre)
+    unit, whole = radiance_unit(store, at), probe_irradiance(store, owner)
+    scaled = np.array(whole) if len(whole) else None
+    return ProbeLight(radiance.astype(float) * unit, distance.astype(float), planes, centre, scaled)

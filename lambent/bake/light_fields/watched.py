@@ -1,54 +1,75 @@
-"""What viewers see mirrored in an object, and how far a probe or a light field is from it.
+"""What viewers see of an object by its lobes, and how far a probe or a light field is from it.
 
-Points all over the object, each seen by one viewer; directions spread as its widest lobe spreads them are path traced,
-and the mean over them is compared with the mean over look-ups: a rough surface blurs what look-ups confuse.
+Points all over the object, each seen by one viewer; directions spread as the widest lobe of each side spreads them are
+path traced. What the whole surface shows with them is compared with what it shows by look-ups: rough surfaces blur what
+look-ups confuse, and diffuse light hides it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import drjit as dr
 import numpy as np
 
 from lambent.bake.light_fields.acquisition import Around
 from lambent.bake.light_fields.sampling import spread_evenly
-from lambent.bake.probes.selection import difference, light_along, spread_mirrored, viewers_of, widest_lobe
-from lambent.bake.tracing.rays import array_of, leaving, towards
-from lambent.core.arrays import Floats
+from lambent.bake.probes.selection import light_along, spread_mirrored, viewers_of
+from lambent.bake.tracing.rays import array_of, leaving, rays_from, towards
+from lambent.core.arrays import Flags, Floats
 from lambent.core.colour import luminance
 from lambent.core.directions import normalize
 from lambent.core.geometry import triangle_areas
-from lambent.materials.document import Material
+from lambent.materials.document import Lobe, Material
 from lambent.materials.lobes import fresnel
 from lambent.scenes.scene import Mesh
 
-POINTS, SPREAD, LEAST = 384, 8, 32  # points, directions from each, points in view below which nothing is known
+POINTS, SPREAD, LEAST = 768, 8, 32  # points, directions of each side, points in view below which nothing is known
 TRIES = 4  # viewers for each point, of whom those who see it tell how large the object is
 
 
 @dataclass(frozen=True)
 class Watched:
-    """n points x of unit normals `normals`, (n, 3); rays from them, origins and unit directions, (n, SPREAD, 3).
+    """n points x of unit normals `normals`, (n, 3); rays from them, origins and unit directions, (n, S, 3).
 
-    `light` (n, 3) is the mean radiance that they bring, `share` (n,) the share of it that the surface reflects, and
-    `size_sr` how much of a viewer's sphere the object takes, on average over all viewers.
+    `share` (n, S, 3) is what the surface shows of each ray's light, RGB, `own` (n, 3) its diffuse radiance, `light`
+    (n, 3) the radiance of the whole, and `irradiance` (n,) that of the light map, its luminance; 0 where there is none.
+    `size_sr` is how much of a viewer's sphere the object takes, on average over all viewers.
     """
 
     x: Floats
     normals: Floats
     origins: Floats
     directions: Floats
-    light: Floats
     share: Floats
+    own: Floats
+    light: Floats
+    irradiance: Floats
     size_sr: float
 
-    def error(self, shown: Floats) -> float:
-        """Mean difference of means (n, 3) that are shown, as `probes.selection.error`."""
-        return float(difference(luminance(shown) * self.share, luminance(self.light) * self.share).mean())
+    @property
+    def level(self) -> float:
+        """Median luminance."""
+        return max(float(np.median(luminance(self.light))), 1e-6)
+
+    def error(self, along: Floats, level: float) -> float:
+        """Mean difference of what is shown, RGB, in log(1 + L/level), for light (n, S, 3) that look-ups find."""
+        shown = self.own + (self.share * along).sum(axis=1)
+        return float(np.abs(np.log1p(shown / level) - np.log1p(self.light / level)).mean())
+
+    def halves(self) -> tuple[Flags, Flags]:
+        """Every other point (n,): those that decide, and those that are held out."""
+        first = np.arange(len(self.x)) % 2 == 0
+        return first, ~first
+
+    def of(self, which: Flags) -> Watched:
+        """Some of the points."""
+        names = "x", "normals", "origins", "directions", "share", "own", "light", "irradiance"
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
 def watched(mesh: Mesh, material: Material, places: Floats, around: Around, seed: int) -> Watched | None:
-    """What viewers at `places` (m, 3) see mirrored in a mesh; None where they see too little of it."""
+    """What viewers at `places` (m, 3) see of a mesh; None where they see too little of it."""
     rng = np.random.default_rng(seed)
     spots = spread_evenly(mesh, POINTS, rng)
     if not len(spots) or not len(places):
@@ -60,14 +81,51 @@ def watched(mesh: Mesh, material: Material, places: Floats, around: Around, seed
     size_sr = _size_sr(spots.positions, spots.normals, places, around, rng) * area_m2
     x, n = spots.positions[found], spots.normals[found]
     view = normalize(eyes[found] - x)
-    w = spread_mirrored(view, n, widest_lobe(material), SPREAD, rng)
-    ray = leaving(around.scene, np.repeat(x, SPREAD, axis=0), np.repeat(n, SPREAD, axis=0), w.reshape(-1, 3))
+    w, share = _rays_of_lobes(material, view, n, rng)
+    if not w.shape[1]:
+        return None
+    count = w.shape[1]
+    ray = leaving(around.scene, np.repeat(x, count, axis=0), np.repeat(n, count, axis=0), w.reshape(-1, 3))
     light = light_along(around.scene, ray, around.depth, around.cache, seed).reshape(w.shape)
     origins = array_of(ray.o).astype(float).reshape(w.shape)
-    cosine = np.abs((view * n).sum(axis=1))
-    lobes = [(float(np.mean(lobe.k)), float(np.mean(lobe.r0))) for lobe in material.lobes]
-    share = sum((k * fresnel(cosine, r0) for k, r0 in lobes), np.zeros(len(x)))
-    return Watched(x, n, origins, w, light.mean(axis=1), share, size_sr)
+    own, irradiance = _diffuse(around, x, n)
+    return Watched(x, n, origins, w, share, own, own + (share * light).sum(axis=1), irradiance, size_sr)
+
+
+def _rays_of_lobes(material: Material, view: Floats, n: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """(n, S, 3) directions that viewers see mirrored, and through the surface, and what is shown of each, RGB."""
+    cosine = np.abs((view * n).sum(axis=1))[:, None]
+    directions: list[Floats] = [np.zeros((len(n), 0, 3))]
+    shares = list(directions)
+    for through in (False, True):
+        lobes = [one for one in material.lobes if (one.side == "transmission") == through and not one.retro]
+        if not lobes:
+            continue
+        w = spread_mirrored(view, n, max((one.mx * one.my) ** 0.5 for one in lobes), SPREAD, rng)
+        if through:
+            w = w - 2 * (w * n[:, None]).sum(axis=-1, keepdims=True) * n[:, None]
+        share = sum((_shown(lobe, cosine, through) for lobe in lobes), np.zeros((len(n), 3)))
+        directions.append(w)
+        shares.append(np.repeat(share[:, None] / SPREAD, SPREAD, axis=1))
+    return np.concatenate(directions, axis=1), np.concatenate(shares, axis=1)
+
+
+def _shown(lobe: Lobe, cosine: Floats, through: bool) -> Floats:
+    """(n, 3) share of light that a lobe passes on."""
+    reflected = fresnel(cosine, np.asarray(lobe.r0, float))
+    return np.asarray(np.asarray(lobe.k, float) * (1 - reflected if through else reflected))
+
+
+def _diffuse(around: Around, x: Floats, n: Floats) -> tuple[Floats, Floats]:
+    """Diffuse radiance (n, 3) of surface points, and the luminance (n,) of their irradiance, by the light map."""
+    if around.cache is None:
+        return np.zeros(x.shape), np.zeros(len(x))
+    start = array_of(leaving(around.scene, x, n, n).o)
+    si = around.scene.ray_intersect(rays_from(start, -n))
+    light, irradiance = around.cache(si, si.is_valid()), around.cache.irradiance(si, si.is_valid())
+    dr.eval(light, irradiance)
+    own, lit = (np.nan_to_num(array_of(found).astype(float), posinf=0.0) for found in (light, irradiance))
+    return own, np.asarray(luminance(lit))  # a texel without light, or a triangle without area, may be no number
 
 
 def _size_sr(

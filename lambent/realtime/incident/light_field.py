@@ -50,13 +50,17 @@ class LightFieldLookUp:
         return np.full(len(w), np.inf)
 
     def constants(self, probe: Probe) -> dict[str, float]:
+        light_field = probe.light_field
+        glass = {"GLASS": light_field is not None and light_field.glass is not None}
         if self.METHOD < MARCHED:
-            return {"METHOD": self.METHOD, "POWER": self.POWER}
+            return {"METHOD": self.METHOD, "POWER": self.POWER, **glass}
         rule = self.RULE
         return {
             "METHOD": self.METHOD, "POWER": self.POWER, "MARCHES": rule.candidates, "STEPS": rule.steps,
             "SECANTS": rule.secants, "FIRST": rule.first, "LAST": rule.last, "TOLERANCE": rule.tolerance,
             "ALIKE": rule.alike, "HAS_SKY": probe.sky is not None, "SURFACE": self.SURFACE,
+            "QUARTERS": light_field is not None and light_field.cover is not None,
+            **glass,
         }  # fmt: skip
 
     def resources(self, device: Any, probe: Probe, streams: list[Any]) -> tuple[Any, ...]:
@@ -72,7 +76,11 @@ class LightFieldLookUp:
         record["columns"], record["rows"] = atlas.grid.columns, atlas.grid.rows
         record["corner"], record["grid"] = light_field.corner[::-1], light_field.grid[::-1]
         record["sky_texels"] = np.log2(sky.shape[1] / 2)
-        numbers = upload(device, [filled(light_field.sample_map)[None]], "rgba16uint")
+        texels = filled(light_field.sample_map)
+        if (glass := light_field.glass) is not None:
+            record["tint"], record["eta"], record["power"] = glass.tint, glass.eta, glass.power
+            texels = np.concatenate([texels, glass.exits.astype(np.float16).view(np.uint16)])
+        numbers = upload(device, [texels[None]], "rgba16uint")
         return (
             device.create_buffer_with_data(data=record.tobytes(), usage=wgpu.BufferUsage.UNIFORM),
             maps.points.create_view(),

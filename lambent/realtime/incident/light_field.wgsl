@@ -3,6 +3,7 @@
 
 #include "frame.wgsl"
 #include "light_field_record.wgsl"
+#include "thin_glass.wgsl"
 
 @group(2) @binding(3) var<uniform> field: LightFieldRecord;
 @group(2) @binding(4) var points: texture_2d<f32>; // places, and where the map is in the atlas; adapters in software read textures faster than buffers
@@ -23,6 +24,9 @@ override ALIKE: f32 = 0.15;
 override SURFACE: bool = false; // points show the surface itself, too
 override HAS_SKY: bool = true; // or the maps answer for it
 
+override QUARTERS: bool = false; // texels say which of their quarters show a surface
+override GLASS: bool = false; // what is transmitted is refracted; the lower half of the sample map then has the exits
+
 const NEAREST = 0u;
 const ANGLE = 1u;
 const AVERAGE = 2u;
@@ -35,7 +39,35 @@ const NO_POINT = 0xffffu;
 
 fn points_near(uv2: vec2f) -> vec4u {
     let texel = vec2i(floor(uv2 * field.grid - field.corner));
-    return textureLoad(sample_map, clamp(texel, vec2i(0), vec2i(textureDimensions(sample_map)) - 1), 0);
+    return textureLoad(sample_map, clamp(texel, vec2i(0), map_size() - 1), 0);
+}
+
+fn map_size() -> vec2i {
+    let size = vec2i(textureDimensions(sample_map));
+    return select(size, vec2i(size.x, size.y / 2), GLASS);
+}
+
+fn exit_of(texel: vec2i) -> vec4f {
+    let size = map_size();
+    let bits = textureLoad(sample_map, clamp(texel, vec2i(0), size - 1) + vec2i(0, size.y), 0);
+    return vec4f(unpack2x16float(bits.x | (bits.y << 16u)), unpack2x16float(bits.z | (bits.w << 16u)));
+}
+
+// The face behind a place that is seen from the side of its normal, between the four nearest texels; the nearest alone
+// where one of these has none.
+fn exit_near(uv2: vec2f, front: bool) -> vec4f {
+    if (!GLASS) { return vec4f(0.0); }
+    let at = uv2 * field.grid - field.corner - 0.5;
+    let low = vec2i(floor(at));
+    let share = fract(at);
+    let a = exit_of(low);
+    let b = exit_of(low + vec2i(1, 0));
+    let c = exit_of(low + vec2i(0, 1));
+    let d = exit_of(low + 1);
+    let between = mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
+    let nearest = exit_of(vec2i(floor(at + 0.5)));
+    let whole = min(min(a.w, b.w), min(c.w, d.w)) >= 0.0;
+    return select(vec4f(0.0, 0.0, 0.0, -1.0), select(nearest, between, whole), front);
 }
 
 fn place_of_point(point: u32) -> vec3f {
@@ -79,10 +111,18 @@ fn light_of(point: u32, w: vec3f, half_log2_omega: f32) -> vec3f {
     return light;
 }
 
-// 1/m, of the texel that a direction from a point lies in; 0 for the sky.
+// 1/m, of the quarter of a texel that a direction from a point lies in; 0 for the sky. The quarters that show a surface are
+// the lowest bits of the half float, and its sign: light_field_atlas.py.
 fn inverse_distance(tile: vec3u, w: vec3f) -> f32 {
-    let texel = min(vec2u(map_place(w) * f32(field.side)), vec2u(field.side - 1u));
-    return textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
+    let at = map_place(w) * f32(field.side);
+    let texel = min(vec2u(at), vec2u(field.side - 1u));
+    let found = textureLoad(inverse_atlas, tile.xy + 1u + texel, tile.z, 0).r;
+    if (!QUARTERS) { return found; }
+    let bits = pack2x16float(vec2f(found, 0.0));
+    let beyond = select(vec2u(0u), vec2u(1u), at - vec2f(texel) >= vec2f(0.5));
+    let quarter = 2u * beyond.y + beyond.x;
+    let shows = ((bits >> select(quarter, 15u, quarter == 3u)) & 1u) == 1u;
+    return select(0.0, unpack2x16float(bits & 0x7ff8u).x, shows);
 }
 
 fn light_of_sky(w: vec3f, half_log2_omega: f32) -> vec3f {
@@ -281,7 +321,22 @@ fn own_light(s: Surface, of_light_map: vec3f) -> vec3f {
     return light_of(point, select(-s.n, q, dot(q, q) > 0.0), SHARP);
 }
 
+// Light that comes through the glass: s is moved to where rays leave it.
+fn light_through_glass(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
+    let found = through_glass(r, s.n, s.exit, field.eta);
+    var beyond = s;
+    beyond.x += found.offset;
+    let passed = select(vec3f(1.0), found.share * field.tint * lambent_under_fresnel(found.cosine)
+        * pow(max(found.cosine, LAMBENT_COS_MIN), field.power), s.exit.w >= 0.0);
+    return passed * light_along(beyond, found.w, half_log2_omega);
+}
+
 fn incident_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
+    if (GLASS && dot(r, s.n) < 0.0) { return light_through_glass(s, r, half_log2_omega); }
+    return light_along(s, r, half_log2_omega);
+}
+
+fn light_along(s: Surface, r: vec3f, half_log2_omega: f32) -> vec3f {
     if (METHOD == CHOSEN) { return chosen(s, r); }
     if (METHOD == MARCHED) { return marched_light(s, r, half_log2_omega); }
     return blended(s, r, half_log2_omega);

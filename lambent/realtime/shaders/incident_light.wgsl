@@ -5,6 +5,11 @@ fn points_near(uv2: vec2f) -> vec4u {
     return vec4u(0u);
 }
 
+// The face behind a place of glass that refracts; here none does.
+fn exit_near(uv2: vec2f, front: bool) -> vec4f {
+    return vec4f(0.0);
+}
+
 // Light from local direction w, averaged over the solid angle omega sr.
 fn incident(s: Surface, w: vec3f, half_log2_omega: f32) -> vec3f {
     let found = incident_look_up(s.x, to_world(s, w));

@@ -7,6 +7,9 @@ struct LightFieldRecord {
     rows: u32,
     corner: vec2f, // column and row of the sample map's first texel in its grid
     grid: vec2f,   // columns and rows of the grid
+    tint: vec3f, // of an interface of glass at normal incidence
+    eta: f32,      // its index of refraction
+    power: f32,    // of the cosine in what it lets pass
     levels: f32,
     sky_texels: f32, // half the log2 of the sky's texels per unit area of the cube [-1, 1]^3
 }

@@ -41,7 +41,7 @@ fn shading_frame(v: Varyings, facing: f32, view: vec3f) -> Surface {
     let n = normalize(given + max(GRAZING - dot(given, view), 0.0) * view);
     let along = rejection(brushed, n);
     let t = normalize(select(perpendicular(n), along, dot(along, along) > 1e-8));
-    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, points_near(v.uv2));
+    return Surface(t, cross(n, t), n, v.p_world - object.centre.xyz, vec2u(v.position.xy), shown, 1.0, points_near(v.uv2), exit_near(v.uv2, facing > 0.0));
 }
 
 // Layers past the last are black.

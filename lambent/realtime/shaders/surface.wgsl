@@ -42,6 +42,7 @@ struct Surface {
     painted: Painted,
     occlusion: f32, // share of the probe's light that reaches the pixel
     points: vec4u,  // of a light field, near the pixel
+    exit: vec4f,    // of glass with a light field: the face behind the pixel
 }
 
 // A lobe where the textures have changed its numbers: the samples, of slopes of the material's mx and my, grow by

@@ -13,11 +13,13 @@ from lambent.scenes.geometry.grid import (
     turn,
 )
 from lambent.scenes.geometry.shapes import box, cushion, cylinder, extrusion, fan, lathe, patch, sphere, tube
+from lambent.scenes.geometry.subdivision import subdivided
 from lambent.scenes.geometry.teapot import teapot, teapot_parts
 
 __all__ = [
     "box", "build", "catmull_rom", "cushion", "cylinder", "extrusion", "fan", "grid", "lathe", "merge",
-    "patch", "placed", "positions_under", "signed_volume", "smooth_curve", "sphere", "tangents_along", "teapot",
+    "patch", "placed", "positions_under", "signed_volume", "smooth_curve", "sphere", "subdivided",
+    "tangents_along", "teapot",
     "teapot_parts",
     "transformed", "tube", "turn",
 ]  # fmt: skip

@@ -118,6 +118,18 @@ class LightFieldSection(Section):
     offset_m: Annotated[float, Field(gt=0, le=1000)] | None = None
     error: Positive | None = None
     levels: Literal[1] | None = None
+    volume: bool = False
+    refracts: bool = False
+
+    @model_validator(mode="after")
+    def _one_place(self) -> LightFieldSection:
+        if self.volume and self.refracts:
+            raise ValueError("volume fills the object's box for another object, refracts is for the object itself")
+        if self.volume and (self.offset_m is not None or self.error is not None):
+            raise ValueError("offset_m and error are of points on the surface, not of a volume")
+        if self.levels is not None and (self.volume or self.refracts):
+            raise ValueError("levels is of maps that show the object; those of a volume, and of refraction, do not")
+        return self
 
     def wish(self) -> LightFieldWish:
         return LightFieldWish(**self.model_dump(exclude={"use"}))

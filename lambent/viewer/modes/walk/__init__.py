@@ -14,9 +14,11 @@ NO_DISPLAY = "use `lambent render`, or `lambent demo --headless`"
 
 def start(
     path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
-    sky_turn_deg: float = 0.0,
+    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
 ) -> Mode:  # fmt: skip
     """The mode on the store at `path`; `light_field_mb`: for maps of light fields on the GPU, cached by a `policy`."""
     from lambent.viewer.modes.walk.mode import open_store
 
-    return open_store(path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg)
+    return open_store(
+        path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg, replaced
+    )

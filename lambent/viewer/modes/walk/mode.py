@@ -10,8 +10,10 @@ from lambent.core.map_cache import LEAST_RECENT
 from lambent.realtime.baked import read_baked
 from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
+from lambent.realtime.replaced import with_replacements
 from lambent.realtime.resources import device_needs
 from lambent.realtime.turned_sky import under_turned_sky
+from lambent.scenes.replacement import parse_replacements
 from lambent.store.store import Store
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
@@ -32,20 +34,21 @@ from lambent.viewer.work import POLL_S
 
 def open_store(
     path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
-    sky_turn_deg: float = 0.0,
+    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (),
 ) -> WalkMode:  # fmt: skip
     """The mode on a baked store that holds at least geometry and the scene record; else a `UserError`.
 
     `light_field_mb` is for the maps of light fields on the GPU, in caches of a `policy` of `core.map_cache`; the sky
-    is turned by `sky_turn_deg`.
+    is turned by `sky_turn_deg`, and meshes stand in the place of objects (`scenes.replacement`).
     """
     store = Store.open(path)
-    baked = under_turned_sky(read_baked(store, light_field_mb, policy), sky_turn_deg)
+    baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
+    baked = under_turned_sky(baked, sky_turn_deg)
     state = WalkState.of(baked.record, movement, screen, store.folder)
     state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
     state.lights.groups = baked.groups.records if baked.groups is not None else ()
     state.lights.fields = bool(baked.light_fields)
-    state.sky_turn_deg = sky_turn_deg
+    state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
     state.missing = (*baked.missing, *state.missing)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)

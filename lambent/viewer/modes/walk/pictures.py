@@ -179,7 +179,9 @@ class Pictures(Pair):
                 self.shown = (a,)
                 a.update(wanted, refine=False)
                 return
-            self._traced = TracedPicture(self._renderer.given(), state.screen, state.store, state.sky_turn_deg)
+            self._traced = TracedPicture(
+                self._renderer.given(), state.screen, state.store, state.sky_turn_deg, state.replaced
+            )
         b = self._traced
         self.shown = (a, b)
         b.update(wanted)

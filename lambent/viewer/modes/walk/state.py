@@ -140,6 +140,7 @@ class WalkState:
     lights: Lights = field(default_factory=Lights)
     store: Path | None = None  # its folder
     sky_turn_deg: float = 0.0  # under which the scene was opened
+    replaced: tuple[str, ...] = ()  # meshes that it was opened with, as `scenes.replacement` reads them
     store_name: str = "STORE"
     missing: tuple[str, ...] = ()  # artefacts that the store lacks
     notes: tuple[str, ...] = ()  # on the light map

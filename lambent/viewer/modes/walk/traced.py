@@ -24,8 +24,10 @@ class TracedPicture:
 
     under_way = False  # no part of it is drawn on the GPU
 
-    def __init__(self, given: Given, screen: Screen, store: Path, sky_turn_deg: float) -> None:
-        self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg)
+    def __init__(
+        self, given: Given, screen: Screen, store: Path, sky_turn_deg: float, replaced: tuple[str, ...]
+    ) -> None:  # fmt: skip
+        self._given, self._screen, self._tracing = given, screen, Tracing(store, sky_turn_deg, replaced)
         self._of: FrameState | None = None  # what is asked for, by what paths depend on
         self._asked = False
         self._changed_s = 0.0

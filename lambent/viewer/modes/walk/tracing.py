@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -71,8 +71,8 @@ class Tracing:
         Why it ended, in a line; empty while it has not.
     """
 
-    def __init__(self, store: Path, sky_turn_deg: float) -> None:
-        self._words = (str(store), str(sky_turn_deg))
+    def __init__(self, store: Path, sky_turn_deg: float, replaced: Sequence[str] = ()) -> None:
+        self._words = (str(store), str(sky_turn_deg), *replaced)
         self._last: Traced | None = None
         self.what, self.error = "starting", ""
         self._wish = Wish(0)

@@ -14,7 +14,7 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +26,7 @@ from lambent.core.arrays import Floats
 from lambent.core.camera import Camera
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
+from lambent.scenes.replacement import parse_replacements, with_replacements
 from lambent.scenes.scene import Scene
 from lambent.scenes.turned_sky import under_turned_sky
 from lambent.store.source import SOURCE, scene_of
@@ -89,8 +90,8 @@ class Views:
         return True
 
 
-def main(folder: Path, sky_turn_deg: float, wishes: Wishes, out: BinaryIO) -> None:
-    """Trace what is wished until the wishes end."""
+def main(folder: Path, sky_turn_deg: float, replaced: Sequence[str], wishes: Wishes, out: BinaryIO) -> None:
+    """Trace what is wished until the wishes end; `replaced` as `scenes.replacement` reads it."""
     from lambent.bake.engine import engine
 
     store = Store.open(folder)
@@ -99,7 +100,8 @@ def main(folder: Path, sky_turn_deg: float, wishes: Wishes, out: BinaryIO) -> No
     say(out, what="loading the scene")
     engine()
     with TemporaryDirectory() as images:
-        views, wish = Views(under_turned_sky(scene_of(store), sky_turn_deg, Path(images))), wishes.newest(None)
+        scene = with_replacements(scene_of(store), parse_replacements(replaced))
+        views, wish = Views(under_turned_sky(scene, sky_turn_deg, Path(images))), wishes.newest(None)
         while wish is not None:
             if wish.camera is not None:
                 trace(views, wish, wish.camera, wishes, out)
@@ -142,7 +144,7 @@ if __name__ == "__main__":
     os.dup2(2, 1)  # what libraries print is none of the pictures
     try:
         main(
-            Path(sys.argv[1]), float(sys.argv[2]), Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own
+            Path(sys.argv[1]), float(sys.argv[2]), sys.argv[3:], Wishes(os.fdopen(os.dup(0), "rb", buffering=0)), own
         )  # no lock to end with
     except UserError as error:
         say(own, error=str(error))

@@ -1,0 +1,51 @@
+"""Irradiance within a volume, from the maps of a light field's points (Greger et al. 1998, "The irradiance volume").
+
+Each point has the irradiance by the normal that its map gives, to the second band of harmonics. Between points it is
+interpolated by Shepard's weights in the form of Franke and Little, which vanish at the first point that is left out, so
+that light is continuous.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.irradiance import WEIGHTS, basis_of
+from lambent.core.light_field import LightField
+from lambent.core.octahedral import texel_directions, texel_solid_angles
+
+NEAREST = 12
+MAPS_AT_ONCE = 64
+
+
+class IrradianceVolume:
+    """The irradiance within the volume of a light field."""
+
+    def __init__(self, field: LightField) -> None:
+        from scipy.spatial import cKDTree
+
+        side = field.radiance.shape[1]
+        flux = (basis_of(texel_directions(side)) * texel_solid_angles(side)[..., None]).reshape(-1, 9)
+        maps = np.concatenate([_summed(some, flux) for some in _parts(field.radiance)])
+        self._by_normal: Floats = WEIGHTS[:, None] * maps
+        self._tree = cKDTree(field.points)
+
+    def at(self, x: Floats, n: Floats) -> Floats:
+        """(k, 3) W/m^2 at places x of unit normals n, (k, 3) each."""
+        count = len(self._by_normal)
+        distance, point = self._tree.query(x, min(NEAREST + 1, count))
+        distance, point = distance.reshape(len(x), -1), point.reshape(len(x), -1)
+        reach = distance[:, -1:] * (1 if count > NEAREST else 2) + 1e-9
+        weight = (np.maximum(reach - distance, 0) / (reach * np.maximum(distance, 1e-9))) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        by_normal = np.einsum("kj,kjbc->kbc", weight, self._by_normal[point])
+        return np.asarray(np.maximum(np.einsum("kb,kbc->kc", basis_of(n), by_normal), 0))
+
+
+def _parts(maps: Floats) -> list[Floats]:
+    return [maps[i : i + MAPS_AT_ONCE] for i in range(0, len(maps), MAPS_AT_ONCE)]
+
+
+def _summed(maps: Floats, flux: Floats) -> Floats:
+    """(P, 9, 3) of maps (P, E, E, 3)."""
+    return np.asarray(np.einsum("pkc,kb->pbc", maps.reshape(len(maps), -1, 3).astype(float), flux, optimize=True))

@@ -1,0 +1,83 @@
+"""Refraction by two faces, against rays traced through panes and lenses by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lambent.core.directions import normalize
+from lambent.core.thin_glass import eta_of, refracted, through_glass
+
+ETA, DEPTH = 1.5, 0.02
+
+
+def rays(count: int = 500, most_deg: float = 60.0) -> np.ndarray:
+    """Unit directions (count, 3) downwards."""
+    rng = np.random.default_rng(2)
+    theta, phi = np.radians(most_deg) * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), -np.cos(theta)], axis=-1)
+
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def test_snell() -> None:
+    w = rays()
+    found, passes = refracted(w, np.broadcast_to(UP, w.shape), 1 / ETA)
+    assert passes.all()
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1)
+    np.testing.assert_allclose(found[:, :2], w[:, :2] / ETA, atol=1e-12)
+    back, passes = refracted(rays(most_deg=89), np.broadcast_to(UP, w.shape), ETA)
+    beyond = np.linalg.norm(rays(most_deg=89)[:, :2], axis=1) > 1 / ETA
+    np.testing.assert_array_equal(passes, ~beyond)
+    np.testing.assert_allclose(back[beyond], rays(most_deg=89)[beyond] * [1, 1, -1])
+
+
+def test_a_pane_displaces_rays_and_keeps_their_direction() -> None:
+    """By d tan of the angle inside."""
+    w = rays()
+    n = np.broadcast_to(UP, w.shape)
+    exits = np.broadcast_to([0.0, 0.0, -0.9, DEPTH], (len(w), 4))
+    offset, leaving, cosine, share = through_glass(w, n, exits, ETA)
+    np.testing.assert_allclose(leaving, w, atol=1e-12)
+    np.testing.assert_allclose(offset[:, 2], -DEPTH)
+    sine = np.linalg.norm(w[:, :2], axis=1)
+    inside = sine / ETA / np.sqrt(1 - (sine / ETA) ** 2)
+    np.testing.assert_allclose(np.linalg.norm(offset[:, :2], axis=1), DEPTH * inside)
+    np.testing.assert_allclose(cosine, -w[:, 2])
+    np.testing.assert_allclose(share, 0.9)
+
+
+def test_a_sheet_lets_rays_pass() -> None:
+    w = rays()
+    offset, leaving, cosine, share = through_glass(w, np.broadcast_to(UP, w.shape), np.full((len(w), 4), -1.0), ETA)
+    assert (offset == 0).all() and (leaving == w).all() and (cosine == 1).all() and (share == 1).all()
+
+
+@pytest.mark.parametrize("most_deg", [2.0, 25.0])
+def test_a_thin_lens_brings_parallel_light_to_its_focus(most_deg: float) -> None:
+    """Plane in front, behind a sphere of radius R: f = R/(eta - 1). Beside rays traced exactly."""
+    radius, thickness, rng = 1.0, 0.02, np.random.default_rng(4)
+    x = np.concatenate([0.1 * (rng.random((300, 2)) - 0.5), np.zeros((300, 1))], axis=1)
+    w = normalize(np.concatenate([np.tan(np.radians(most_deg)) * (rng.random((300, 2)) - 0.5), -np.ones((300, 1))], 1))
+    centre = np.array([0.0, 0.0, radius - thickness])
+    depth = np.sqrt(radius**2 - (x[:, :2] ** 2).sum(axis=1)) - centre[2]
+    normal = (x - [0, 0, 1] * depth[:, None] - centre) / radius
+    offset, leaving, _, _ = through_glass(w, np.broadcast_to(UP, x.shape), np.column_stack([normal, depth]), ETA)
+    inside, _ = refracted(w, np.broadcast_to(UP, x.shape), 1 / ETA)
+    along = np.sum(inside * (x - centre), axis=1)
+    t = -along + np.sqrt(along**2 - np.sum((x - centre) ** 2, axis=1) + radius**2)
+    exact_at = x + t[:, None] * inside
+    exact, _ = refracted(inside, -(exact_at - centre) / radius, ETA)
+    turned = np.degrees(np.arccos(np.clip(np.sum(exact * w, axis=1), -1, 1)))
+    wrong = np.degrees(np.arccos(np.clip(np.sum(exact * leaving, axis=1), -1, 1)))
+    assert wrong.max() < 0.12 * turned.max()
+    assert np.abs(offset - (exact_at - x)).max() < 0.15 * thickness
+    if most_deg < 5:
+        focal = radius / (ETA - 1)
+        slope = leaving[:, :2] / -leaving[:, 2:] - w[:, :2] / -w[:, 2:]
+        np.testing.assert_allclose(slope, -x[:, :2] / focal, atol=2e-3)
+
+
+def test_the_index_follows_the_reflectance() -> None:
+    assert eta_of(0.04) == pytest.approx(1.5) and eta_of(0.0) == 1.0 and np.isfinite(eta_of(1.0))
