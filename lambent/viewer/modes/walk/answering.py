@@ -70,6 +70,12 @@ class AnsweringLight:
         elif renderer.scene.groups is not None:
             shown.said = WITH_GROUPS
 
+    def another(self, renderer: Renderer, shown: Answering) -> AnsweringLight:
+        """The same for another renderer of the scene; what was read of the store is shared."""
+        made = AnsweringLight(self._store, renderer, shown)
+        made._answer = self._answer
+        return made
+
     @property
     def busy(self) -> bool:
         """Whether light is being computed."""
