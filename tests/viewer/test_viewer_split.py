@@ -1,4 +1,4 @@
-"""Two states of the room beside each other: each side is the picture of its state in its own light, and both are live."""
+"""Two states of the room beside each other: each side is the picture of its state, in its light, and both are live."""
 
 import numpy as np
 import pytest

@@ -116,7 +116,7 @@ def test_edited_materials_are_traced_and_exposure_needs_no_new_paths(pictures, s
     """A black material in place of all takes the light that they scatter."""
     b = traced_until(pictures, state, 4)
     before = b.read().mean()
-    process = b._tracing._process
+    process = b._tracing._process._process
     state.look.exposure_ev += 1
     count = b.samples
     drawn(pictures, state)
