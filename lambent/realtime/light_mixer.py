@@ -70,6 +70,17 @@ class LightMixer:
                 return
             self._work = self._thread.submit(self._make)
 
+    def light_from(self, scene: BakedScene) -> None:
+        """Take light by group from another bake of the same geometry, in the same units, from the next frame on."""
+        if self._work is not None:
+            self._work.result()
+        self._work = None
+        self._ready.clear()
+        self._made.clear()
+        self._scene, self._sky_of = scene, None
+        for cached in ("_light", "_owners"):
+            self.__dict__.pop(cached, None)
+
     @cached_property
     def _thread(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(1, "light")

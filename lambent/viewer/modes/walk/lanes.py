@@ -58,6 +58,11 @@ class Lane:
             mixed=renderer.mixer.version,
         )  # fmt: skip
 
+    @property
+    def busy(self) -> bool:
+        """Whether light is being computed that the picture does not have yet."""
+        return self.renderer.mixer.busy or (self.answering is not None and self.answering.busy)
+
     def wait_s(self) -> float | None:
         """Seconds until more of its light may be there; None: never."""
         if self.renderer.mixer.busy:

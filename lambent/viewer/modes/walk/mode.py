@@ -14,6 +14,7 @@ from lambent.realtime.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.realtime.turned_sky import under_turned_sky
+from lambent.store.source import SOURCE
 from lambent.store.store import Store
 from lambent.viewer.lost import rescued
 from lambent.viewer.mode import Beside, Drawing, Mode, Panel, Textures
@@ -60,6 +61,8 @@ def open_store(
     state.lights.groups = baked.groups.records if baked.groups is not None else ()
     state.lights.fields = bool(baked.light_fields)
     state.sky_turn_deg = sky_turn_deg
+    from_scene = isinstance(store.documents.get(SOURCE), str)
+    state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # a turned sky has left the light map
     of_session = state.session.open([group.name for group in state.lights.groups])
     state.missing = (*baked.missing, *state.missing, *of_session)
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None

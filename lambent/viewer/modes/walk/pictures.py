@@ -24,6 +24,7 @@ from lambent.viewer.modes.walk.lanes import Lane
 from lambent.viewer.modes.walk.light_fields import FieldDrawing, shows_choice
 from lambent.viewer.modes.walk.metering import read
 from lambent.viewer.modes.walk.outlining import Outlining
+from lambent.viewer.modes.walk.rebaking import RebakedLight
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.traced import TracedPicture
 from lambent.viewer.picture import Pair, Picture, size_px
@@ -42,6 +43,9 @@ class Pictures(Pair):
         self._state = state
         self._lane = Lane.of(renderer, state.screen, answering, state.answering)
         self._beside: Lane | None = None  # of the state that the room is compared with
+        self._rebaked = (
+            None if state.store is None else RebakedLight(state.store, renderer.scene, state.screen, state.rebaking)
+        )
         self._b: Picture | None = None
         self._traced: TracedPicture | None = None
         self._stands_for: Any = None
@@ -86,7 +90,11 @@ class Pictures(Pair):
         self._film()
         self._follow_exchange()
         self._lane.answer(state.materials.edits.room)
-        wanted = self._frame(size_px(place, pixel_ratio))
+        size = size_px(place, pixel_ratio)
+        if self._rebaked is not None and state.films.under_way is None:
+            in_stroke = state.materials.edits.in_stroke
+            self._rebaked.update(self._lane, state.recordings.light, state.navigation.camera, size, in_stroke=in_stroke)
+        wanted = self._frame(size)
         self._outlining.update(wanted, state.selection.record)
         traces = state.comparison.is_traced and state.films.under_way is None and not state.states.split
         if self._traced is not None and not traces:
@@ -126,7 +134,8 @@ class Pictures(Pair):
         loading = POLL_S if self._renderer.streaming.busy else None
         beside = self._beside.wait_s() if self._beside is not None and self._state.states.split else None
         compares = POLL_S if len(self.shown) == 2 and self._state.comparison.busy else None
-        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares)
+        rebakes = None if self._rebaked is None else self._rebaked.wait_s()
+        return least(super().wait_s(), loading, self._lane.wait_s(), beside, compares, rebakes)
 
     def work(self) -> bool:
         """Go on with the frame under way that has come less far."""
@@ -148,6 +157,8 @@ class Pictures(Pair):
 
     def close(self) -> None:
         """Cancel FLIP, path tracing, the film under way, and light that is being computed."""
+        if self._rebaked is not None:
+            self._rebaked.close()
         for lane in (self._lane, self._beside):
             if lane is not None:
                 lane.close()

@@ -24,6 +24,7 @@ from lambent.viewer.modes.walk.light_fields import FieldView
 from lambent.viewer.modes.walk.lights import Lights
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.metering import Meter
+from lambent.viewer.modes.walk.rebaked import Rebaking
 from lambent.viewer.modes.walk.recording import Recordings
 from lambent.viewer.modes.walk.states import States
 from lambent.viewer.modes.walk.views import SavedViews
@@ -134,6 +135,7 @@ class WalkState:
     comparison: Comparison = field(default_factory=Comparison)
     meter: Meter = field(default_factory=Meter)
     answering: Answering = field(default_factory=Answering)
+    rebaking: Rebaking = field(default_factory=Rebaking)
     films: Films = field(default_factory=Films)
     fields: FieldView = field(default_factory=FieldView)
     lights: Lights = field(default_factory=Lights)

@@ -27,11 +27,16 @@ def draw(state: WalkState) -> None:
 
 
 def _light(state: WalkState) -> None:
-    """How exact the light of other surfaces is in one line, and whether it follows an edit at all."""
-    answering = state.answering
+    """How exact the light of other surfaces is in one line, and whether it follows an edit, at once and exactly."""
+    answering, rebaking = state.answering, state.rebaking
     if answering.possible:
-        meaning = "other surfaces get the light of edited colours, estimated at once; a new bake is exact"
-        answering.on = check("##light answers", answering.on, meaning)
+        meaning = "other surfaces get the light of edited colours, estimated at once"
+        answering.on = check("light answers", answering.on, meaning)
         imgui.same_line()
-    imgui.text_disabled(answering.note)
-    explain(answering.note)
+    if rebaking.possible:
+        meaning = "bakes the light of edited materials anew beside the window, and brings it into the picture"
+        rebaking.on = check("bake edits", rebaking.on, meaning)
+    lines = [] if rebaking.exact else [answering.note]
+    line = "; ".join([*lines, *([rebaking.line] if rebaking.line else [])])
+    imgui.text_disabled(line)
+    explain(line)

@@ -1,0 +1,78 @@
+"""Light that was baked anew going over into a lane's picture, a step a frame, each made in a thread beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from lambent.core.camera import Camera
+from lambent.core.light_mix import Factors
+from lambent.materials.document import Material
+from lambent.realtime.resources import SceneResources
+from lambent.viewer.modes.walk.lanes import Lane
+from lambent.viewer.modes.walk.rebaked_light import Rebaked, Step, probe_users, steps
+
+
+class Fade:
+    """From what a lane shows to the light of a bake; seen by a camera in a picture of `size`.
+
+    Attributes
+    ----------
+    lane : Lane
+    done : bool
+        Whether all of it is in the picture.
+    left : tuple of str
+        Objects whose probes the bake does not have: they stay as they were.
+    """
+
+    def __init__(self, rebaked: Rebaked, lane: Lane, light: Factors, camera: Camera, size: tuple[int, int]) -> None:
+        self.lane, self.done, self._light, self._rebaked = lane, False, dict(light), rebaked
+        self._materials: Mapping[str, Material] = lane.room.materials
+        resources, scene = self._resources, lane.renderer.scene
+        self._before = list(resources.light_layers), [item.light for item in resources.objects]
+        owners = probe_users(scene, resources, range(len(resources.objects)))
+        self.left = tuple(name for name in owners if name not in rebaked.scene.probes)
+        self._steps = steps(rebaked, scene, resources, light, camera, size)
+        self._thread = ThreadPoolExecutor(1, "rebaked")
+        self._next: Future[Step | None] = self._thread.submit(next, self._steps, None)
+
+    @property
+    def _resources(self) -> SceneResources:
+        return self.lane.renderer.resources
+
+    @property
+    def _mixes(self) -> bool:
+        """Whether the scene has light groups, and the bake, too."""
+        return self.lane.renderer.scene.groups is not None and self._rebaked.scene.groups is not None
+
+    def serves(self, lane: Lane, light: Factors) -> bool:
+        """Whether this is the light of what the lane shows; once it is there, mixes of its light groups are, too."""
+        same_mix = light == self._light or (self.done and self._mixes)
+        return lane is self.lane and lane.room.materials == self._materials and same_mix
+
+    def step(self) -> None:
+        """Upload what is ready; nothing where the thread is not done with it."""
+        if self.done or not self._next.done():
+            return
+        upload = self._next.result()
+        if upload is not None:
+            upload(self._resources)
+            self._resources.light_version += 1
+            self._next = self._thread.submit(next, self._steps, None)
+            return
+        self.done = True
+        self._thread.shutdown()
+        if self._mixes:
+            self.lane.renderer.mixer.light_from(self._rebaked.scene)
+
+    def end(self, *, answers: bool) -> None:
+        """Take it out of the picture again; where `answers`, other light is about to come by itself."""
+        self._thread.shutdown(cancel_futures=True)
+        if self._mixes:
+            self.lane.renderer.mixer.light_from(self.lane.renderer.scene)
+        elif not answers:
+            layers, lights = self._before
+            self._resources.show_light_map(layers)
+            for item, light in zip(self._resources.objects, lights, strict=True):
+                item.relight(light, item.emission)
+            self._resources.light_version += 1
