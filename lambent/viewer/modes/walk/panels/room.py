@@ -36,7 +36,7 @@ def _light(state: WalkState) -> None:
     if rebaking.possible:
         meaning = "bakes the light of edited materials anew beside the window, and brings it into the picture"
         rebaking.on = check("bake edits", rebaking.on, meaning)
-    lines = [] if rebaking.exact else [answering.note]
-    line = "; ".join([*lines, *([rebaking.line] if rebaking.line else [])])
-    imgui.text_disabled(line)
-    explain(line)
+    for line in ("" if rebaking.exact else answering.note, rebaking.line):
+        if line:
+            imgui.text_disabled(line)
+            explain(line)
